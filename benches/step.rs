@@ -1,0 +1,59 @@
+//! Env-steps per second of a batch in pure Rust: random actions, 25-step episodes, one and two threads.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use innerattn_env::batch::{Autoreset, Batch, Options, StepBuffers};
+use innerattn_env::rng::{Purpose, Stream};
+use innerattn_env::robot::Commands;
+use innerattn_env::scenario::Scenario;
+
+const ROUNDS: usize = 64;
+
+fn random_actions(envs: usize, robots: usize) -> Vec<Vec<i64>> {
+    let mut stream = Stream::new(7, 0, 0, Purpose::Start);
+    (0..ROUNDS).map(|_| (0..envs * robots).map(|_| stream.below(5) as i64).collect()).collect()
+}
+
+fn step(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("step");
+    for threads in [1, 2] {
+        for (envs, substeps) in [(1, 6), (32, 6), (1024, 1), (1024, 6), (4096, 6)] {
+            let scenario = Scenario { substeps, ..Scenario::default() };
+            let options = Options {
+                num_envs: envs,
+                seed: 0,
+                num_threads: Some(threads),
+                first_env: 0,
+                autoreset: Autoreset::SameStep,
+            };
+            let mut batch = Batch::new(scenario, options).expect("a valid scenario");
+            let (robots, width) = (batch.rules().team.len(), batch.rules().layout.width());
+            let actions = random_actions(envs, robots);
+            let mut obs = vec![0.0; envs * robots * width];
+            let mut final_obs = obs.clone();
+            let mut reward = vec![0.0; envs * robots];
+            let mut components = vec![0.0; envs * robots * 4];
+            let (mut terminated, mut truncated) = (vec![false; envs], vec![false; envs]);
+            group.throughput(Throughput::Elements(envs as u64));
+            let name = format!("{threads} threads, {substeps} substeps");
+            let mut round = 0;
+            group.bench_function(BenchmarkId::new(name, envs), |bencher| {
+                bencher.iter(|| {
+                    let buffers = StepBuffers {
+                        obs: &mut obs,
+                        final_obs: &mut final_obs,
+                        reward: &mut reward,
+                        components: &mut components,
+                        terminated: &mut terminated,
+                        truncated: &mut truncated,
+                    };
+                    round += 1;
+                    batch.step(Commands::Discrete(&actions[round % ROUNDS]), buffers).expect("valid actions")
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, step);
+criterion_main!(benches);

@@ -1,0 +1,343 @@
+//! Many worlds over flat buffers: threads, checks at the door, autoreset. Worlds never meet here: the
+//! split over threads changes when a world is stepped, never what happens in it.
+
+use std::iter::zip;
+
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::error::{Error, Result};
+use crate::geometry::Vec2;
+use crate::physics::Workspace;
+use crate::reward::NUM_COMPONENTS;
+use crate::robot::{Commands, NUM_ACTIONS};
+use crate::rules::Rules;
+use crate::scenario::{Actions, Scenario};
+use crate::snapshot;
+use crate::task::Rescue;
+use crate::world::{World, check_room};
+
+/// Most worlds in a batch.
+pub const MAX_ENVS: usize = 1 << 20;
+/// Most threads of a batch.
+pub const MAX_THREADS: usize = 256;
+/// Fewest worlds for which another thread is worth waking.
+const ENVS_PER_THREAD: usize = 32;
+/// Shards for each thread, so that a busy one does not keep the others waiting.
+const SHARDS_PER_THREAD: usize = 4;
+
+/// What happens when an episode ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Autoreset {
+    /// The next episode starts in the same step.
+    SameStep,
+    /// The world waits for a reset.
+    Disabled,
+}
+
+/// How a batch is made.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// Number of worlds E.
+    pub num_envs: usize,
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Threads; as many as are worth it if absent.
+    pub num_threads: Option<usize>,
+    /// Number of the first world's random streams: env i of this batch is world `first_env + i`.
+    pub first_env: u64,
+    /// What happens when an episode ends.
+    pub autoreset: Autoreset,
+}
+
+/// Where a step writes: one buffer for each array, C order.
+pub struct StepBuffers<'a> {
+    /// Observations after the step and any autoreset, E × R × D.
+    pub obs: &'a mut [f32],
+    /// Observations after the step, before any autoreset, E × R × D.
+    pub final_obs: &'a mut [f32],
+    /// Rewards, E × R.
+    pub reward: &'a mut [f32],
+    /// Rewards by component, E × R × 4.
+    pub components: &'a mut [f32],
+    /// Whether the scenario's goal ended the episode, E.
+    pub terminated: &'a mut [bool],
+    /// Whether time ended the episode, E.
+    pub truncated: &'a mut [bool],
+}
+
+impl<'a> StepBuffers<'a> {
+    /// Splits off the first `envs` worlds' part.
+    fn split(self, envs: usize, robots: usize, width: usize) -> (Self, Self) {
+        let rows = envs * robots;
+        let (obs, obs_rest) = self.obs.split_at_mut(rows * width);
+        let (final_obs, final_obs_rest) = self.final_obs.split_at_mut(rows * width);
+        let (reward, reward_rest) = self.reward.split_at_mut(rows);
+        let (components, components_rest) = self.components.split_at_mut(rows * NUM_COMPONENTS);
+        let (terminated, terminated_rest) = self.terminated.split_at_mut(envs);
+        let (truncated, truncated_rest) = self.truncated.split_at_mut(envs);
+        (
+            Self { obs, final_obs, reward, components, terminated, truncated },
+            Self {
+                obs: obs_rest,
+                final_obs: final_obs_rest,
+                reward: reward_rest,
+                components: components_rest,
+                terminated: terminated_rest,
+                truncated: truncated_rest,
+            },
+        )
+    }
+}
+
+/// Neighbouring worlds that one thread steps at a time.
+struct Shard {
+    first: usize,
+    worlds: Vec<World>,
+    workspace: Workspace,
+    rescues: Vec<Rescue>,
+}
+
+/// A batch of worlds of one scenario.
+pub struct Batch {
+    rules: Rules,
+    shards: Vec<Shard>,
+    pool: Option<ThreadPool>,
+    options: Options,
+}
+
+impl Batch {
+    /// Makes the worlds, each at the start of its episode 0.
+    ///
+    /// # Errors
+    /// [`Error::Scenario`] or [`Error::Argument`] for a value that is not allowed.
+    pub fn new(scenario: Scenario, options: Options) -> Result<Self> {
+        argument("num_envs", options.num_envs, MAX_ENVS)?;
+        let available = std::thread::available_parallelism().map_or(1, usize::from);
+        let worth = options.num_envs.div_ceil(ENVS_PER_THREAD);
+        let threads = options.num_threads.unwrap_or(available.min(worth).min(MAX_THREADS));
+        argument("num_threads", threads, MAX_THREADS)?;
+        let rules = Rules::new(scenario)?;
+        check_room(&rules)?;
+        let pool = match threads {
+            1 => None,
+            _ => Some(make_pool(threads)?),
+        };
+        let shards = if threads == 1 { 1 } else { threads * SHARDS_PER_THREAD };
+        let length = options.num_envs.div_ceil(shards);
+        let starts = (0..options.num_envs).step_by(length);
+        let shard = |first: usize| Shard {
+            first,
+            worlds: (first..options.num_envs.min(first + length))
+                .map(|env| World::new(&rules, options.seed, options.first_env + env as u64))
+                .collect(),
+            workspace: Workspace::default(),
+            rescues: Vec::new(),
+        };
+        let shards = starts.map(shard).collect();
+        Ok(Self { rules, shards, pool, options })
+    }
+
+    /// What the worlds share.
+    #[must_use]
+    pub fn rules(&self) -> &Rules {
+        &self.rules
+    }
+
+    /// Number of worlds E.
+    #[must_use]
+    pub fn num_envs(&self) -> usize {
+        self.options.num_envs
+    }
+
+    /// Threads in use.
+    #[must_use]
+    pub fn num_threads(&self) -> usize {
+        self.pool.as_ref().map_or(1, ThreadPool::current_num_threads)
+    }
+
+    /// The worlds in order.
+    pub fn worlds(&self) -> impl Iterator<Item = &World> {
+        self.shards.iter().flat_map(|shard| &shard.worlds)
+    }
+
+    /// Starts new episodes in the worlds of `mask` (all if absent), under `seed` from episode 0 if
+    /// given, else in the episode after the present one (the first reset keeps episode 0), and
+    /// writes everyone's observations into `obs` (E × R × D).
+    pub fn reset(&mut self, seed: Option<u64>, mask: Option<&[bool]>, obs: &mut [f32]) {
+        let rules = &self.rules;
+        let envs = self.shards.iter_mut().flat_map(|shard| &mut shard.worlds).enumerate();
+        for (_, world) in envs.filter(|(env, _)| mask.is_none_or(|mask| mask[*env])) {
+            let next = if world.fresh { 0 } else { world.episode + 1 };
+            world.seed = seed.unwrap_or(world.seed);
+            world.begin(rules, if seed.is_some() { 0 } else { next });
+            world.fresh = false;
+        }
+        self.observe(obs);
+    }
+
+    /// Writes everyone's observations into `obs` (E × R × D).
+    pub fn observe(&self, obs: &mut [f32]) {
+        let row = self.rules.team.len() * self.rules.layout.width();
+        for (world, rows) in zip(self.worlds(), obs.chunks_exact_mut(row)) {
+            world.observe(&self.rules, rows);
+        }
+    }
+
+    /// Does one control step in every world; `commands` are E × R actions in env order. Returns the
+    /// rescues in order of env.
+    ///
+    /// # Errors
+    /// [`Error::Action`] or [`Error::EpisodeOver`], before anything has moved.
+    pub fn step(&mut self, commands: Commands, buffers: StepBuffers) -> Result<Vec<Rescue>> {
+        self.check(commands)?;
+        let (rules, autoreset) = (&self.rules, self.options.autoreset);
+        let (robots, width) = (rules.team.len(), rules.layout.width());
+        match &self.pool {
+            None => self.shards[0].step(rules, autoreset, commands, buffers),
+            Some(pool) => {
+                let mut rest = buffers;
+                let mut jobs = Vec::with_capacity(self.shards.len());
+                for shard in &mut self.shards {
+                    let (part, later) = rest.split(shard.worlds.len(), robots, width);
+                    rest = later;
+                    jobs.push((shard, part));
+                }
+                pool.install(|| {
+                    jobs.into_par_iter()
+                        .with_max_len(1)
+                        .for_each(|(shard, part)| shard.step(rules, autoreset, commands, part));
+                });
+            }
+        }
+        Ok(self.shards.iter().flat_map(|shard| &shard.rescues).copied().collect())
+    }
+
+    /// Refuses actions of the wrong kind or number, out of range, or for a world whose episode is over.
+    fn check(&self, commands: Commands) -> Result<()> {
+        let robots = self.rules.team.len();
+        let place = |index: usize| (index / robots, index % robots);
+        match commands {
+            Commands::Discrete(actions) => {
+                let bad = actions.iter().position(|action| !(0..NUM_ACTIONS as i64).contains(action));
+                if let Some(index) = bad {
+                    let (env, robot) = place(index);
+                    let value = actions[index].to_string();
+                    return Err(Error::Action { env, robot, value, rule: "must be an integer in 0..=4" });
+                }
+            }
+            Commands::Continuous(actions) => {
+                if let Some(index) = actions.iter().position(|share| !(-1.0..=1.0).contains(share)) {
+                    let (env, robot) = place(index / 2);
+                    let value = format!("{:?} on axis {}", actions[index], index % 2);
+                    return Err(Error::Action { env, robot, value, rule: "must be a number in -1..=1" });
+                }
+            }
+        }
+        let per_robot = if self.rules.scenario.actions == Actions::Discrete { 1 } else { 2 };
+        let wanted = self.options.num_envs * robots * per_robot;
+        if commands.kind() != self.rules.scenario.actions || commands.len() != wanted {
+            return Err(Error::Argument {
+                name: "actions",
+                value: format!("{} {:?} values", commands.len(), commands.kind()),
+                rule: format!("must be {wanted} {:?} values", self.rules.scenario.actions),
+            });
+        }
+        match self.worlds().position(|world| world.over) {
+            Some(env) => Err(Error::EpisodeOver { env }),
+            None => Ok(()),
+        }
+    }
+
+    /// An image of all worlds.
+    #[must_use]
+    pub fn snapshot(&self) -> Vec<u8> {
+        snapshot::save(&self.rules, self.worlds())
+    }
+
+    /// Puts all worlds back into the state of an image; nothing changes if it is refused.
+    ///
+    /// # Errors
+    /// [`Error::Snapshot`] that says what is wrong.
+    pub fn restore(&mut self, image: &[u8]) -> Result<()> {
+        let mut worlds = snapshot::load(&self.rules, self.options.num_envs, image)?.into_iter();
+        for shard in &mut self.shards {
+            shard.worlds = worlds.by_ref().take(shard.worlds.len()).collect();
+        }
+        Ok(())
+    }
+
+    /// Puts robots at `positions` with `velocities` (E × R × 2, C order), for tests and studies of
+    /// motion; rules and victims are left alone.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for numbers that are not finite or too many or few.
+    pub fn set_motion(&mut self, positions: &[f32], velocities: &[f32]) -> Result<()> {
+        let robots = self.rules.team.len();
+        for (name, values) in [("positions", positions), ("velocities", velocities)] {
+            let wanted = self.options.num_envs * robots * 2;
+            if values.len() != wanted || !values.iter().all(|value| value.is_finite()) {
+                let value = format!("{} values", values.len());
+                return Err(Error::Argument {
+                    name,
+                    value,
+                    rule: format!("must be {wanted} finite numbers"),
+                });
+            }
+        }
+        let vector = |pair: &[f32]| Vec2::new(pair[0], pair[1]);
+        let rows = zip(positions.chunks_exact(2 * robots), velocities.chunks_exact(2 * robots));
+        let worlds = self.shards.iter_mut().flat_map(|shard| &mut shard.worlds);
+        for (world, (places, speeds)) in zip(worlds, rows) {
+            world.positions = places.chunks_exact(2).map(vector).collect();
+            world.velocities = speeds.chunks_exact(2).map(vector).collect();
+        }
+        Ok(())
+    }
+}
+
+impl Shard {
+    fn step(&mut self, rules: &Rules, autoreset: Autoreset, commands: Commands, buffers: StepBuffers) {
+        let robots = rules.team.len();
+        let row = robots * rules.layout.width();
+        self.rescues.clear();
+        for (index, world) in self.worlds.iter_mut().enumerate() {
+            let components =
+                &mut buffers.components[index * robots * NUM_COMPONENTS..][..robots * NUM_COMPONENTS];
+            let reward = &mut buffers.reward[index * robots..][..robots];
+            let env = self.first + index;
+            let ending =
+                world.step(rules, &mut self.workspace, commands, env, &mut self.rescues, components, reward);
+            buffers.terminated[index] = ending.terminated;
+            buffers.truncated[index] = ending.truncated;
+            let obs = &mut buffers.obs[index * row..][..row];
+            let final_obs = &mut buffers.final_obs[index * row..][..row];
+            world.observe(rules, final_obs);
+            if ending.over() && autoreset == Autoreset::SameStep {
+                world.begin(rules, world.episode + 1);
+                world.observe(rules, obs);
+            } else {
+                obs.copy_from_slice(final_obs);
+            }
+        }
+    }
+}
+
+fn make_pool(threads: usize) -> Result<ThreadPool> {
+    ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|index| format!("worlds-{index}"))
+        .build()
+        .map_err(|error| Error::Argument {
+            name: "num_threads",
+            value: threads.to_string(),
+            rule: error.to_string(),
+        })
+}
+
+fn argument(name: &'static str, value: usize, most: usize) -> Result<()> {
+    if (1..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(Error::Argument { name, value: value.to_string(), rule: format!("must be in 1..={most}") })
+}

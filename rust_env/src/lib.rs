@@ -1,0 +1,29 @@
+//! Batches of 2D rescue worlds for teams of unlike robots, stepped with rigid-body contacts.
+//!
+//! Data flows one way: a [`scenario::Scenario`] becomes [`rules::Rules`], a [`batch::Batch`] holds
+//! [`world::World`]s that play by them, and each step writes flat arrays. Each file uses only those
+//! named above it here.
+
+pub mod error;
+pub mod scenario;
+
+pub mod geometry;
+pub mod rng;
+
+pub mod robot;
+
+pub mod place;
+pub mod task;
+
+pub mod physics;
+
+pub mod observe;
+pub mod reward;
+
+pub mod rules;
+
+pub mod world;
+
+pub mod snapshot;
+
+pub mod batch;

@@ -1,0 +1,113 @@
+//! Random places: for obstacles, robots and victims. Sampling is bounded: if no draw is far enough
+//! from everything, the farthest one is taken and the caller is told.
+
+use crate::error::{Error, Result};
+use crate::geometry::{Solid, Vec2};
+use crate::rng::Stream;
+use crate::robot::Body;
+use crate::scenario::Scenario;
+
+const DRAWS: usize = 512;
+/// Gap between robots, and between robots and solids, at an episode's start, m.
+const START_GAP_M: f32 = 1e-3;
+
+/// A solid and where it is.
+pub type Placed<'a> = (&'a Solid, Vec2);
+
+/// A place, and whether it keeps every distance asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Place {
+    /// The place, m.
+    pub at: Vec2,
+    /// Whether it is far enough from everything.
+    pub clear: bool,
+}
+
+/// A uniform place within ±`half` on both axes whose `clearance` (m, negative if too near) is not
+/// negative; after [`DRAWS`] draws the one with the largest.
+fn draw(stream: &mut Stream, half: f32, clearance: impl Fn(Vec2) -> f32) -> Place {
+    let mut best = (Vec2::zeros(), f32::NEG_INFINITY);
+    for _ in 0..DRAWS {
+        let at = Vec2::new(stream.between(-half, half), stream.between(-half, half));
+        let room = clearance(at);
+        if room >= 0.0 {
+            return Place { at, clear: true };
+        }
+        if room > best.1 {
+            best = (at, room);
+        }
+    }
+    Place { at: best.0, clear: false }
+}
+
+/// The measures that placing needs, read off a valid scenario.
+#[derive(Debug, Clone)]
+pub struct Placing {
+    arena: f32,
+    spawn_clearance: f32,
+    wall_clearance: f32,
+}
+
+impl Placing {
+    /// The measures of `scenario`.
+    ///
+    /// # Errors
+    /// [`Error::Scenario`] if no victim could stand in the arena, or a robot does not fit in it.
+    pub fn new(scenario: &Scenario) -> Result<Self> {
+        let refuse = |key: String, value: f64, rule: String| {
+            Err(Error::Scenario { key, value: value.to_string(), rule })
+        };
+        let half = scenario.arena_half_width_m;
+        if scenario.wall_clearance_m >= half {
+            let rule = format!("must be below arena_half_width_m = {half} m");
+            return refuse("scenario.wall_clearance_m".into(), scenario.wall_clearance_m, rule);
+        }
+        for (index, robot) in scenario.robots.iter().enumerate() {
+            if robot.radius_m * 2.0 >= half {
+                let rule = format!("must be below half of arena_half_width_m = {half} m");
+                return refuse(format!("scenario.robots[{index}].radius_m"), robot.radius_m, rule);
+            }
+        }
+        Ok(Self {
+            arena: half as f32,
+            spawn_clearance: scenario.spawn_clearance_m as f32,
+            wall_clearance: scenario.wall_clearance_m as f32,
+        })
+    }
+
+    /// A place for an obstacle, clear of those already `placed`.
+    pub fn obstacle(&self, stream: &mut Stream, solid: &Solid, placed: &[Placed]) -> Place {
+        draw(stream, (self.arena - solid.reach()).max(0.0), |at| {
+            smallest(placed.iter().map(|(other, centre)| other.distance(at - centre) - solid.reach()))
+        })
+    }
+
+    /// A place for a robot, without overlap with solids and the `others` already placed.
+    pub fn robot(
+        &self,
+        stream: &mut Stream,
+        body: &Body,
+        others: &[(&Body, Vec2)],
+        solids: &[Placed],
+    ) -> Place {
+        draw(stream, self.arena - body.radius - START_GAP_M, |at| {
+            let room = body.radius + START_GAP_M;
+            let others = others.iter().map(|(other, centre)| (at - centre).norm() - other.radius - room);
+            smallest(others.chain(solids.iter().map(|(solid, centre)| solid.distance(at - centre) - room)))
+        })
+    }
+
+    /// A place for a victim: away from walls and solids, and from every robot.
+    pub fn victim(&self, stream: &mut Stream, robots: &[Vec2], solids: &[Placed]) -> Place {
+        draw(stream, self.arena - self.wall_clearance, |at| {
+            let robots = robots.iter().map(|robot| (at - robot).norm() - self.spawn_clearance);
+            let solids =
+                solids.iter().map(|(solid, centre)| solid.distance(at - centre) - self.wall_clearance);
+            smallest(robots.chain(solids))
+        })
+    }
+}
+
+fn smallest(rooms: impl Iterator<Item = f32>) -> f32 {
+    rooms.fold(f32::INFINITY, f32::min)
+}

@@ -1,0 +1,167 @@
+//! Victims and the rescue rule: who is present, what it needs, and which robots rescue it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::Vec2;
+use crate::robot::Body;
+use crate::scenario::{MAX_NEEDS, Scenario};
+
+/// A victim that waits for help.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Victim {
+    /// Number within the episode, from 0.
+    pub id: u32,
+    /// Index of its task.
+    pub task: u32,
+    /// Steps done in the episode when it appeared.
+    pub appeared_step: u32,
+    /// Where it is, m.
+    pub position: Vec2,
+}
+
+/// A task's needs as ability numbers, in the order the scenario names them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Needs(Vec<u32>);
+
+impl Needs {
+    /// The needs of every task of a valid scenario.
+    #[must_use]
+    pub fn of_tasks(scenario: &Scenario) -> Vec<Self> {
+        let abilities = scenario.abilities();
+        let number =
+            |need: &String| abilities.iter().position(|ability| ability == need).unwrap_or_default() as u32;
+        scenario.tasks.iter().map(|task| Self(task.needs.iter().map(number).collect())).collect()
+    }
+
+    /// Ability numbers, one for each need.
+    #[must_use]
+    pub fn abilities(&self) -> &[u32] {
+        &self.0
+    }
+
+    /// Whether a robot with these abilities can fill any need.
+    #[must_use]
+    pub fn helped_by(&self, abilities: u32) -> bool {
+        self.0.iter().any(|need| abilities >> need & 1 == 1)
+    }
+
+    /// Sum over needs of the distance of the nearest able robot, m; a need repeated k times counts
+    /// the k nearest.
+    #[must_use]
+    pub fn distance(&self, victim: Vec2, team: &[Body], positions: &[Vec2]) -> f32 {
+        let mut total = 0.0;
+        for (index, need) in self.0.iter().enumerate() {
+            let rank = self.0[..index].iter().filter(|earlier| *earlier == need).count();
+            total += kth_nearest(rank, *need, victim, team, positions);
+        }
+        total
+    }
+
+    /// The helpers that rescue a victim now: one distinct robot for each need, in the order of needs.
+    /// Each need takes the nearest able robot in `radius` (ties by index) that is not `busy` and
+    /// leaves every later need a robot of its own. `None` if no such team is near.
+    #[must_use]
+    pub fn helpers(
+        &self,
+        victim: Vec2,
+        team: &[Body],
+        positions: &[Vec2],
+        radius: f32,
+        busy: u64,
+    ) -> Option<[Option<u8>; MAX_NEEDS]> {
+        let able = |need: u32| {
+            let near = |robot: &usize| (positions[*robot] - victim).norm_squared() <= radius * radius;
+            let can = |robot: &usize| (busy >> robot | u64::from(!team[*robot].abilities >> need)) & 1 == 0;
+            (0..team.len()).filter(can).filter(near).fold(0_u64, |mask, robot| mask | 1 << robot)
+        };
+        let mut candidates = [0_u64; MAX_NEEDS];
+        for (mask, need) in candidates.iter_mut().zip(&self.0) {
+            *mask = able(*need);
+            if *mask == 0 {
+                return None;
+            }
+        }
+        let candidates = &mut candidates[..self.0.len()];
+        if !fillable(candidates) {
+            return None;
+        }
+        let mut helpers = [None; MAX_NEEDS];
+        for need in 0..candidates.len() {
+            let mut open = candidates[need];
+            while open != 0 {
+                let nearest = nearest(open, victim, positions);
+                open &= !(1 << nearest);
+                let later = &mut candidates[need + 1..];
+                let before: [u64; MAX_NEEDS] = std::array::from_fn(|i| later.get(i).copied().unwrap_or(0));
+                later.iter_mut().for_each(|mask| *mask &= !(1 << nearest));
+                if fillable(later) {
+                    helpers[need] = Some(nearest as u8);
+                    break;
+                }
+                later.copy_from_slice(&before[..later.len()]);
+            }
+        }
+        Some(helpers)
+    }
+}
+
+/// Whether distinct robots can be taken from the masks, one from each (Kuhn's augmenting paths).
+fn fillable(candidates: &[u64]) -> bool {
+    fn fill(need: usize, candidates: &[u64], tried: &mut u64, by: &mut [u8; 64]) -> bool {
+        for robot in bits(candidates[need]) {
+            if *tried >> robot & 1 == 1 {
+                continue;
+            }
+            *tried |= 1 << robot;
+            if by[robot] == u8::MAX || fill(usize::from(by[robot]), candidates, tried, by) {
+                by[robot] = need as u8;
+                return true;
+            }
+        }
+        false
+    }
+    let mut by = [u8::MAX; 64];
+    (0..candidates.len()).all(|need| fill(need, candidates, &mut 0, &mut by))
+}
+
+/// The robot of `mask` nearest to the victim, ties by index.
+fn nearest(mask: u64, victim: Vec2, positions: &[Vec2]) -> usize {
+    let distance = |robot: usize| (positions[robot] - victim).norm_squared();
+    bits(mask).min_by(|a, b| distance(*a).total_cmp(&distance(*b))).unwrap_or_default()
+}
+
+/// The robots of a mask, lowest index first.
+fn bits(mask: u64) -> impl Iterator<Item = usize> {
+    (0..64).filter(move |robot| mask >> robot & 1 == 1)
+}
+
+/// Distance of the able robot with `rank` nearer ones, m.
+fn kth_nearest(rank: usize, need: u32, victim: Vec2, team: &[Body], positions: &[Vec2]) -> f32 {
+    let able = team.iter().zip(positions).filter(|(body, _)| body.abilities >> need & 1 == 1);
+    let distances = able.map(|(_, position)| (position - victim).norm());
+    if rank == 0 {
+        return distances.fold(f32::INFINITY, f32::min);
+    }
+    let mut sorted: Vec<f32> = distances.collect();
+    sorted.sort_unstable_by(f32::total_cmp);
+    sorted[rank]
+}
+
+/// A rescue: which victim, when and by whom.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rescue {
+    /// Index of the env in the batch.
+    pub env: u32,
+    /// Episode of that env, from 0.
+    pub episode: u64,
+    /// Step of the episode, from 0.
+    pub step: u32,
+    /// Slot in which the victim was.
+    pub slot: u32,
+    /// The victim's number within the episode.
+    pub victim: u32,
+    /// Index of its task.
+    pub task: u32,
+    /// Helpers, one for each need.
+    pub helpers: [Option<u8>; MAX_NEEDS],
+}
