@@ -1,0 +1,75 @@
+//! The arrays that a batch lends to Python: allocated once as numpy arrays, written by Rust between
+//! calls, and handed out read-only.
+
+use innerattn_env::batch::StepBuffers;
+use innerattn_env::reward::NUM_COMPONENTS;
+use numpy::{Element, Ix1, Ix2, Ix3, PyArray, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+/// An array that only this module writes.
+pub struct Lent<T, D> {
+    array: Py<PyArray<T, D>>,
+    start: *mut T,
+    length: usize,
+}
+
+// SAFETY: the pointer leads into the array that is kept alive beside it; it is followed only through
+// `&mut self`, so never from two threads at once.
+unsafe impl<T: Send, D> Send for Lent<T, D> {}
+// SAFETY: `&self` gives out nothing but the array object, which Python guards itself.
+unsafe impl<T: Sync, D> Sync for Lent<T, D> {}
+
+impl<T: Element, D: numpy::ndarray::Dimension> Lent<T, D> {
+    fn zeros<S: numpy::ndarray::IntoDimension<Dim = D>>(py: Python, shape: S) -> PyResult<Self> {
+        let array = PyArray::<T, D>::zeros(py, shape, false);
+        let (start, length) = (array.data(), array.len());
+        array.getattr("flags")?.setattr("writeable", false)?;
+        Ok(Self { array: array.unbind(), start, length })
+    }
+
+    /// The array, for Python.
+    pub fn lend(&self, py: Python) -> Py<PyArray<T, D>> {
+        self.array.clone_ref(py)
+    }
+
+    /// The array's memory, C order.
+    pub fn memory(&mut self) -> &mut [T] {
+        // SAFETY: `start` and `length` are those of the contiguous array kept alive by `self`, whose
+        // memory is never resized; Python sees it read-only, and only while no call is under way.
+        unsafe { std::slice::from_raw_parts_mut(self.start, self.length) }
+    }
+}
+
+/// One set of everything that a step writes.
+pub struct Arrays {
+    pub obs: Lent<f32, Ix3>,
+    pub final_obs: Lent<f32, Ix3>,
+    pub reward: Lent<f32, Ix2>,
+    pub components: Lent<f32, Ix3>,
+    pub terminated: Lent<bool, Ix1>,
+    pub truncated: Lent<bool, Ix1>,
+}
+
+impl Arrays {
+    pub fn new(py: Python, envs: usize, robots: usize, width: usize) -> PyResult<Self> {
+        Ok(Self {
+            obs: Lent::zeros(py, [envs, robots, width])?,
+            final_obs: Lent::zeros(py, [envs, robots, width])?,
+            reward: Lent::zeros(py, [envs, robots])?,
+            components: Lent::zeros(py, [envs, robots, NUM_COMPONENTS])?,
+            terminated: Lent::zeros(py, [envs])?,
+            truncated: Lent::zeros(py, [envs])?,
+        })
+    }
+
+    pub fn buffers(&mut self) -> StepBuffers<'_> {
+        StepBuffers {
+            obs: self.obs.memory(),
+            final_obs: self.final_obs.memory(),
+            reward: self.reward.memory(),
+            components: self.components.memory(),
+            terminated: self.terminated.memory(),
+            truncated: self.truncated.memory(),
+        }
+    }
+}
