@@ -1,0 +1,67 @@
+"""Finding presets, reading TOML with errors that name the file, writing files whole.
+
+It knows no field of any model.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from innerattn.errors import ConfigError
+
+_PRESETS = files("innerattn.config") / "presets"
+
+
+def preset_names(folder: str) -> tuple[str, ...]:
+    """Names of the presets in ``folder`` ("scenarios" or "budgets"), sorted."""
+    entries = (entry.name for entry in (_PRESETS / folder).iterdir())
+    return tuple(sorted(name[:-5] for name in entries if name.endswith(".toml")))
+
+
+def preset_table(folder: str, name: str) -> dict[str, Any]:
+    """The table of the preset ``name`` in ``folder``.
+
+    Raises:
+        ConfigError: no such preset; the message names the known ones.
+    """
+    known = preset_names(folder)
+    if name not in known:
+        what = folder.removesuffix("s")
+        raise ConfigError(f"unknown {what} preset {name!r}: known are {', '.join(known)}")
+    return tomllib.loads((_PRESETS / folder / f"{name}.toml").read_text("utf-8"))
+
+
+def toml_table(path: str | Path) -> dict[str, Any]:
+    """The table in the TOML file at ``path``.
+
+    Raises:
+        ConfigError: the file cannot be read, or is not TOML.
+    """
+    try:
+        return tomllib.loads(Path(path).read_text("utf-8"))
+    except OSError as error:
+        raise ConfigError(f"cannot read {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path} is not a TOML file: {error}") from error
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Put ``data`` at ``path``; a reader sees the old file or the new one, never a part.
+
+    Raises:
+        OSError: the file cannot be written; no partial file is left.
+    """
+    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with partial.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(partial, path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise

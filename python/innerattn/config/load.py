@@ -1,0 +1,84 @@
+"""From presets, a file and single values to one `RunConfig`, and from there to TOML and back.
+
+Later sources win: scenario preset, budget, configuration file, single values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import ValidationError
+
+from innerattn.config.files import preset_table, toml_table, write_whole
+from innerattn.config.model import config_error
+from innerattn.config.run import RunConfig
+from innerattn.errors import ConfigError
+
+
+def load_run_config(
+    preset: str = "mixed",
+    method: str = "td-inner",
+    budget: str = "quick",
+    config_file: str | Path | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> RunConfig:
+    """The configuration of a run.
+
+    Args:
+        preset: name of a built-in scenario.
+        method: value of `train.method`.
+        budget: name of a built-in budget.
+        config_file: TOML file with any of `RunConfig`'s sections and keys.
+        overrides: values by dotted key, e.g. ``{"td.gamma": 0.99}``.
+
+    Raises:
+        ConfigError: unknown preset or key, value out of range, or values that contradict each
+            other; the message names the key and what is allowed.
+    """
+    table: dict[str, Any] = {"scenario": preset_table("scenarios", preset)}
+    _merge(table, preset_table("budgets", budget))
+    _merge(table, {"train": {"method": method}})
+    if config_file is not None:
+        _merge(table, toml_table(config_file))
+    for key, value in (overrides or {}).items():
+        section, dot, name = key.partition(".")
+        if not dot or not isinstance(table.setdefault(section, {}), dict):
+            raise ConfigError(f"{key}: unknown key; keys are written SECTION.KEY")
+        table[section][name] = value
+    return _validated(table)
+
+
+def write_toml(config: RunConfig, path: str | Path) -> None:
+    """Write ``config`` to ``path`` with all defaults; keys without a value are left out.
+
+    The file appears whole or not at all.
+    """
+    write_whole(Path(path), tomli_w.dumps(config.model_dump(exclude_none=True)).encode())
+
+
+def read_toml(path: str | Path) -> RunConfig:
+    """The configuration in a file; `write_toml` and `read_toml` give the same one back.
+
+    Raises:
+        ConfigError: the file cannot be read, is not TOML, or holds no valid configuration.
+    """
+    return _validated(toml_table(path), str(path))
+
+
+def _validated(table: dict[str, Any], source: str = "") -> RunConfig:
+    try:
+        return RunConfig.model_validate(table)
+    except ValidationError as error:
+        raise config_error(error, source=source) from error
+
+
+def _merge(table: dict[str, Any], other: Mapping[str, Any]) -> None:
+    """Put ``other`` into ``table``, section by section; a list replaces a list."""
+    for key, value in other.items():
+        if isinstance(value, Mapping) and isinstance(table.get(key), dict):
+            _merge(table[key], value)
+        else:
+            table[key] = value

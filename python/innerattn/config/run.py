@@ -1,0 +1,184 @@
+"""Everything that a training run needs, in five sections; a run is repeated from it alone.
+
+Ranges of the sections below live here; those of a scenario live in the compiled module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, Self
+
+from pydantic import BaseModel, Field, model_validator
+
+from innerattn.config.files import preset_names
+from innerattn.config.model import Model
+from innerattn.config.scenario import Scenario
+
+BUDGETS = preset_names("budgets")
+"""Names of the built-in budgets: how long to train, and with which numbers."""
+
+Method = Literal["td-inner", "td-uniform"]
+Attention = Literal["inner", "uniform"]
+
+_ATTENTION: dict[str, Attention] = {"td-inner": "inner", "td-uniform": "uniform"}
+
+
+class NetworkConfig(Model):
+    """Sizes and kind of the networks; every robot has networks of its own."""
+
+    place: ClassVar[str] = "network"
+
+    hidden_width: int = Field(128, ge=1, le=4096, description="width of encodings and layers")
+    attention_heads: int = Field(4, ge=1, le=64, description="attention heads of the critic")
+    attention: Attention = Field(
+        "inner", description="learnt, or fixed at 1/(N-1); follows from the method"
+    )
+    mask_unavailable: bool = Field(
+        False, description="keep unavailable teammates out of the attention"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.hidden_width % self.attention_heads:
+            raise ValueError(
+                f"network.hidden_width = {self.hidden_width}: must be a multiple of "
+                f"network.attention_heads = {self.attention_heads}"
+            )
+        return self
+
+
+class TDConfig(Model):
+    """Off-policy, maximum-entropy actor-critic learning from a replay memory."""
+
+    place: ClassVar[str] = "td"
+
+    gamma: float = Field(0.95, ge=0.0, le=1.0, description="discount per control step")
+    polyak: float = Field(
+        0.02, gt=0.0, le=1.0, description="step of the target networks towards the trained ones"
+    )
+    reward_scale: float = Field(
+        30.0, gt=0.0, description="1/temperature: higher rewards less randomness"
+    )
+    learning_rate: float = Field(0.002, gt=0.0, le=1.0, description="step size of Adam")
+    batch_size: int = Field(256, ge=1, description="transitions per update")
+    update_every_env_steps: int = Field(
+        50, ge=1, description="one update per so many steps, all worlds counted [env-steps]"
+    )
+    warmup_env_steps: int = Field(
+        1_000, ge=0, description="steps collected before the first update [env-steps]"
+    )
+    replay_capacity: int = Field(200_000, ge=1, description="size of the replay memory")
+    attention_logit_penalty: float = Field(
+        0.0, ge=0.0, description="weight of the squared attention logits in the critic's loss"
+    )
+    critic_weight_decay: float = Field(0.0, ge=0.0, description="L2 penalty of the critic's Adam")
+    critic_grad_clip: float = Field(40.0, gt=0.0, description="largest norm of critic gradients")
+    actor_grad_clip: float = Field(0.5, gt=0.0, description="largest norm of an actor's gradients")
+    policy_gradient: Literal["expected", "sampled"] = Field(
+        "expected", description="exact expectation over the own action, or one sample"
+    )
+    entropy_target: Literal["consistent", "maac"] = Field(
+        "consistent",
+        description="entropy term of the target: discounted and masked with the value, or as in "
+        "the MAAC reference",
+    )
+    reward_std_floor: float = Field(
+        1e-2, gt=0.0, description="least deviation that rewards are divided by"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.replay_capacity < self.batch_size:
+            raise ValueError(
+                f"td.replay_capacity = {self.replay_capacity}: must be at least "
+                f"td.batch_size = {self.batch_size}"
+            )
+        return self
+
+
+class TrainConfig(Model):
+    """How long to train, where, and how often to log."""
+
+    place: ClassVar[str] = "train"
+
+    method: Method = Field("td-inner", description="learning algorithm and kind of attention")
+    seed: int = Field(0, ge=0, lt=2**63, description="seed of everything random")
+    device: str = Field("cpu", description="where networks run: cpu, cuda, cuda:0, ...")
+    threads: int | None = Field(
+        None, ge=1, le=256, description="threads of worlds and networks; None: all cores"
+    )
+    num_envs: int = Field(64, ge=1, le=1_000_000, description="worlds stepped side by side")
+    env_steps: int = Field(
+        150_000, ge=1, description="length of training, all worlds counted [env-steps]"
+    )
+    log_every_env_steps: int = Field(
+        5_000, ge=1, description="one line of metrics per so many steps [env-steps]"
+    )
+
+
+class EvaluateConfig(Model):
+    """How a policy is measured."""
+
+    place: ClassVar[str] = "evaluate"
+
+    episodes: int = Field(
+        80, ge=1, le=1_000_000, description="episodes that cooperation is counted over"
+    )
+    score_episodes: int = Field(
+        1_000, ge=1, le=1_000_000, description="episodes that rescues are averaged over"
+    )
+    long_episodes: int = Field(200, ge=1, le=1_000_000, description="episodes of the second length")
+    long_episode_steps: int = Field(
+        100, ge=1, le=100_000, description="second episode length [control steps]"
+    )
+    greedy_actions: bool = Field(
+        False, description="take the likeliest action instead of drawing one"
+    )
+    seed: int = Field(12_345, ge=0, lt=2**63, description="seed of the evaluation's worlds")
+
+
+class RunConfig(Model):
+    """A whole run. `network.attention` follows from `train.method` where it is not given.
+
+    Raises:
+        pydantic.ValidationError: (a `ValueError`) unknown key, wrong type, value out of range, or
+            values that contradict each other; the message names the key and what is allowed.
+    """
+
+    scenario: Scenario = Field(default_factory=Scenario, description="the world")
+    network: NetworkConfig = Field(default_factory=NetworkConfig, description="the networks")
+    td: TDConfig = Field(default_factory=TDConfig, description="the learning algorithm")
+    train: TrainConfig = Field(default_factory=TrainConfig, description="the run")
+    evaluate: EvaluateConfig = Field(default_factory=EvaluateConfig, description="measuring")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _attention_follows_method(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        method = _given(data.get("train"), "method")
+        network = data.get("network", {})
+        if method not in _ATTENTION or _given(network, "attention") is not None:
+            return data
+        if isinstance(network, NetworkConfig):
+            network = network.model_dump(exclude_unset=True)
+        if not isinstance(network, Mapping):
+            return data  # the field's own check names the wrong type
+        return {**data, "network": {**network, "attention": _ATTENTION[method]}}
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        wanted = _ATTENTION[self.train.method]
+        if self.network.attention != wanted:
+            raise ValueError(
+                f"network.attention = {self.network.attention!r}: train.method = "
+                f"{self.train.method!r} needs {wanted!r}"
+            )
+        return self
+
+
+def _given(section: object, key: str) -> Any:
+    """The value of ``key`` where a section (a table or a model) sets it, else None."""
+    if isinstance(section, BaseModel):
+        return getattr(section, key) if key in section.model_fields_set else None
+    return section.get(key) if isinstance(section, Mapping) else None

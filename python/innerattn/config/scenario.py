@@ -1,0 +1,164 @@
+"""The description of one rescue world: team, tasks, arena, reward.
+
+Names, types, defaults and units live here; ranges and rules between fields live in the compiled
+module, which checks every scenario when it is made.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from innerattn import _core
+from innerattn.config.files import preset_names, preset_table, toml_table
+from innerattn.config.model import Model, config_error
+
+SCENARIOS = preset_names("scenarios")
+"""Names of the built-in scenarios."""
+
+Count = Annotated[int, Field(ge=0, lt=2**32)]
+"""What the compiled module can hold as a count; how many are allowed is decided there."""
+
+
+class Robot(Model):
+    """One robot of the team."""
+
+    name: str = Field(description="unique name")
+    kind: str = Field(description="kind, shared by robots that are alike")
+    abilities: tuple[str, ...] = Field(description="what it can do for a victim")
+    max_speed_mps: float = Field(description="speed limit [m/s]")
+    mass_kg: float = Field(description="mass [kg]")
+    radius_m: float = Field(0.05, description="radius of the disc [m]")
+    drive_force_n: float = Field(5.0, description="force of a full command [N]")
+
+
+class Task(Model):
+    """One kind of emergency: the abilities a victim needs, each from a robot of its own."""
+
+    name: str = Field(description="unique name")
+    needs: tuple[str, ...] = Field(description="needed abilities; the same may stand twice")
+
+
+class Obstacle(Model):
+    """A fixed body in the way."""
+
+    shape: Literal["disc", "box"] = Field(description="outline")
+    radius_m: float | None = Field(None, description="radius of a disc [m]")
+    half_extents_m: tuple[float, float] | None = Field(
+        None, description="half width and half height of a box [m]"
+    )
+    position_m: tuple[float, float] | None = Field(
+        None, description="centre [m]; None: a new random place each episode"
+    )
+
+
+def _default_team() -> tuple[Robot, ...]:
+    """The four robots of Table I."""
+    slow: dict[str, Any] = {"kind": "food", "abilities": ("food",), "max_speed_mps": 1.0}
+    fast: dict[str, Any] = {"max_speed_mps": 1.5, "mass_kg": 0.5}
+    return (
+        Robot(name="food_0", mass_kg=1.0, **slow),
+        Robot(name="food_1", mass_kg=1.0, **slow),
+        Robot(name="navigation_0", kind="navigation", abilities=("information",), **fast),
+        Robot(name="medical_0", kind="medical", abilities=("medicine",), **fast),
+    )
+
+
+def _default_tasks() -> tuple[Task, ...]:
+    return (
+        Task(name="task_1", needs=("food", "medicine")),
+        Task(name="task_2", needs=("food", "information")),
+    )
+
+
+class Scenario(Model):
+    """Everything that defines a rescue world.
+
+    Raises:
+        pydantic.ValidationError: (a `ValueError`) unknown key, wrong type, value out of range, or
+            values that contradict each other; the message names the key and the allowed range.
+    """
+
+    place: ClassVar[str] = "scenario"
+
+    situation: Literal["single", "double", "mixed"] = Field(
+        "mixed",
+        description="single: one victim at a time; double: one of each task, always; "
+        "mixed: waves of 1 to max_victims victims of random tasks",
+    )
+    robots: tuple[Robot, ...] = Field(default_factory=_default_team, description="the team")
+    tasks: tuple[Task, ...] = Field(default_factory=_default_tasks, description="kinds of victim")
+    max_victims: Count = Field(2, description="most victims of a wave in mixed")
+    obstacles: tuple[Obstacle, ...] = Field((), description="fixed bodies in the way")
+    arena_half_width_m: float = Field(1.0, description="half the side of the square arena [m]")
+    rescue_radius_m: float = Field(0.15, description="how near a helper must be [m]")
+    spawn_clearance_m: float = Field(
+        0.2, description="least distance of a new victim to robots [m]"
+    )
+    wall_clearance_m: float = Field(0.1, description="least distance of a new victim to walls [m]")
+    episode_steps: Count = Field(25, description="length of an episode [control steps]")
+    end_when_rescued: Count | None = Field(
+        None, description="end an episode after so many rescues; None: never"
+    )
+    dt_s: float = Field(0.1, description="control period [s]")
+    substeps: Count = Field(6, description="physics steps per control period")
+    damping: float = Field(0.25, description="share of speed lost per control period")
+    friction: float = Field(0.0, description="friction coefficient at contacts")
+    engine: Literal["rapier"] = Field("rapier", description="physics engine for contacts")
+    actions: Literal["discrete", "continuous"] = Field(
+        "discrete", description="discrete: stay, +x, -x, +y, -y; continuous: a force in the plane"
+    )
+    rescue_credit: Literal["helpers", "team"] = Field(
+        "helpers", description="who is rewarded for a rescue"
+    )
+    rescue_reward: float = Field(1.0, description="reward of one rescue")
+    shaping: Literal["progress", "potential", "none"] = Field(
+        "progress", description="reward for coming nearer to victims"
+    )
+    shaping_weight: float = Field(1.0, description="weight of the shaping reward [1/m]")
+    shaping_discount: float = Field(0.95, description="discount used by potential shaping")
+    contact_cost: float = Field(0.0, description="cost of a control step with a contact")
+    action_cost: float = Field(0.0, description="cost of a control step with the drive on")
+    victim_order: Literal["relevant", "slot"] = Field(
+        "relevant",
+        description="order of victims in an observation; relevant: helpable first, then nearest",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _core.check_scenario(self.model_dump_json())
+        return self
+
+    @classmethod
+    def preset(cls, name: str) -> Scenario:
+        """The built-in scenario ``name``.
+
+        Raises:
+            ConfigError: no such preset; the message names the known ones.
+        """
+        return cls.model_validate(preset_table("scenarios", name))
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Scenario:
+        """The scenario in a TOML file whose keys are this model's fields.
+
+        Raises:
+            ConfigError: the file cannot be read, is not TOML, or describes no valid scenario.
+        """
+        table = toml_table(path)
+        try:
+            return cls.model_validate(table)
+        except ValidationError as error:
+            raise config_error(error, "scenario", str(path)) from error
+
+    @property
+    def num_robots(self) -> int:
+        """Number of robots R."""
+        return len(self.robots)
+
+    @property
+    def num_victims(self) -> int:
+        """Number of victim slots V."""
+        return {"single": 1, "double": len(self.tasks), "mixed": self.max_victims}[self.situation]

@@ -1,0 +1,187 @@
+"""Sources of a configuration, their order, and TOML there and back."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from innerattn.config import (
+    BUDGETS,
+    SCENARIOS,
+    EvaluateConfig,
+    NetworkConfig,
+    RunConfig,
+    Scenario,
+    TDConfig,
+    TrainConfig,
+    load_run_config,
+    read_toml,
+    write_toml,
+)
+from innerattn.errors import ConfigError
+
+PAPER = {
+    "scenario.episode_steps": 25,
+    "network.hidden_width": 128,
+    "network.attention_heads": 4,
+    "td.gamma": 0.99,
+    "td.polyak": 0.001,
+    "td.reward_scale": 100.0,
+    "td.learning_rate": 0.001,
+    "td.batch_size": 1024,
+    "td.update_every_env_steps": 100 // 4,
+    "td.replay_capacity": 1_000_000,
+    "td.attention_logit_penalty": 0.001,
+    "td.critic_weight_decay": 0.001,
+    "td.critic_grad_clip": 40.0,
+    "td.actor_grad_clip": 0.5,
+    "td.entropy_target": "maac",
+    "train.num_envs": 12,
+    "train.env_steps": 25_000 * 25,
+    "evaluate.episodes": 80,
+}
+
+
+def value(config: RunConfig, key: str) -> Any:
+    section, name = key.split(".")
+    return getattr(getattr(config, section), name)
+
+
+@pytest.mark.parametrize("key", PAPER)
+@pytest.mark.parametrize("preset", SCENARIOS)
+def test_paper_budget_is_the_papers(preset: str, key: str) -> None:
+    assert value(load_run_config(preset, budget="paper"), key) == PAPER[key]
+
+
+def test_budgets_differ_in_length() -> None:
+    steps = {budget: load_run_config(budget=budget).train.env_steps for budget in BUDGETS}
+    assert set(steps) == {"quick", "short", "paper"}
+    assert steps["quick"] < steps["short"] < steps["paper"]
+
+
+@pytest.mark.parametrize("method", ["td-inner", "td-uniform"])
+@pytest.mark.parametrize("budget", BUDGETS)
+@pytest.mark.parametrize("preset", SCENARIOS)
+def test_every_combination_loads_and_round_trips(
+    tmp_path: Path, preset: str, budget: str, method: str
+) -> None:
+    config = load_run_config(preset, method, budget)
+    assert config.scenario == Scenario.preset(preset)
+    assert f"td-{config.network.attention}" == config.train.method == method
+    write_toml(config, tmp_path / "config.toml")
+    assert read_toml(tmp_path / "config.toml") == config
+
+
+def test_later_sources_win(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text("[td]\ngamma = 0.5\nbatch_size = 7\n[train]\nmethod = 'td-uniform'\n")
+    config = load_run_config("single", "td-inner", "paper", file, {"td.batch_size": 8})
+    assert config.td.learning_rate == 0.001  # budget
+    assert (config.td.gamma, config.train.method) == (0.5, "td-uniform")  # file
+    assert config.td.batch_size == 8  # single value
+    assert config.network.attention == "uniform"
+    assert config.scenario.situation == "single"
+
+
+def test_tables_in_a_file_replace_lists(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text("[[scenario.tasks]]\nname = 'only'\nneeds = ['food', 'food']\n")
+    config = load_run_config(config_file=file)
+    assert [task.name for task in config.scenario.tasks] == ["only"]
+    assert len(config.scenario.robots) == 4
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ({"td.gama": 0.9}, r"^td\.gama: unknown key$"),
+        ({"tdd.gamma": 0.9}, r"^tdd: unknown key$"),
+        ({"gamma": 0.9}, r"^gamma: unknown key"),
+        ({"td.gamma": 2}, r"^td\.gamma = 2: must be less than or equal to 1$"),
+        ({"scenario.colour": 1}, r"^scenario\.colour: unknown key$"),
+        ({"scenario.episode_steps": 0}, r"^scenario\.episode_steps = 0: must be"),
+        ({"network.attention": "uniform"}, r"^network\.attention = 'uniform': train\.method"),
+    ],
+)
+def test_wrong_values_are_named(overrides: dict[str, object], message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        load_run_config(overrides=overrides)
+
+
+def test_unknown_sources_are_named() -> None:
+    with pytest.raises(ConfigError, match=r"'triple': known are double, mixed, single"):
+        load_run_config("triple")
+    with pytest.raises(ConfigError, match=r"'long': known are paper, quick, short"):
+        load_run_config(budget="long")
+    with pytest.raises(ConfigError, match=r"train\.method = 'ppo'"):
+        load_run_config(method="ppo")
+
+
+def test_a_section_must_be_a_table(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text("td = 3\n")
+    with pytest.raises(ConfigError, match=r"^td = 3: "):
+        load_run_config(config_file=file)
+
+
+def test_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "config.toml"
+    write_toml(load_run_config(), file)
+    before = file.read_bytes()
+
+    def full_disk(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full_disk)
+    with pytest.raises(OSError, match="No space left"):
+        write_toml(load_run_config(budget="paper"), file)
+    assert file.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def positive(limit: float) -> st.SearchStrategy[float]:
+    return st.floats(0.0, limit, exclude_min=True, allow_nan=False)
+
+
+CONFIGS = st.builds(
+    RunConfig,
+    scenario=st.builds(
+        Scenario,
+        situation=st.sampled_from(["single", "double", "mixed"]),
+        max_victims=st.integers(1, 4),
+        episode_steps=st.integers(1, 1000),
+        end_when_rescued=st.none() | st.integers(1, 10),
+        damping=st.floats(0.0, 0.9),
+        rescue_credit=st.sampled_from(["helpers", "team"]),
+        shaping_weight=st.floats(0.0, 10.0),
+    ),
+    network=st.builds(
+        NetworkConfig, hidden_width=st.sampled_from([4, 64]), mask_unavailable=st.booleans()
+    ),
+    td=st.builds(
+        TDConfig,
+        gamma=st.floats(0.0, 1.0),
+        polyak=positive(1.0),
+        learning_rate=positive(1.0),
+        reward_scale=positive(1e300),
+        critic_weight_decay=st.floats(0.0, 1e-300),
+        warmup_env_steps=st.integers(0, 10**12),
+    ),
+    train=st.builds(
+        TrainConfig,
+        seed=st.integers(0, 2**63 - 1),
+        device=st.text(st.characters(exclude_categories=["Cs"])),
+        threads=st.none() | st.integers(1, 64),
+    ),
+    evaluate=st.builds(EvaluateConfig, seed=st.integers(0, 2**63 - 1)),
+)
+
+
+@given(CONFIGS)
+def test_toml_round_trip_is_exact(
+    tmp_path_factory: pytest.TempPathFactory, config: RunConfig
+) -> None:
+    file = tmp_path_factory.getbasetemp() / "round_trip.toml"
+    write_toml(config, file)
+    assert read_toml(file) == config

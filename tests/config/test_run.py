@@ -1,0 +1,70 @@
+"""The run configuration: ranges, contradictions, and attention that follows from the method."""
+
+import pytest
+from innerattn.config import NetworkConfig, RunConfig, TDConfig, TrainConfig
+from pydantic import ValidationError
+
+
+@pytest.mark.parametrize(
+    ("method", "attention"), [("td-inner", "inner"), ("td-uniform", "uniform")]
+)
+def test_attention_follows_method(method: str, attention: str) -> None:
+    train = {"method": method}
+    as_tables = RunConfig.model_validate({"train": train, "network": {"hidden_width": 64}})
+    as_models = RunConfig(train=TrainConfig(**train), network=NetworkConfig(hidden_width=64))
+    assert as_tables == as_models
+    assert (as_tables.network.attention, as_tables.network.hidden_width) == (attention, 64)
+
+
+@pytest.mark.parametrize(
+    ("method", "attention"), [("td-inner", "uniform"), ("td-uniform", "inner")]
+)
+def test_contradicting_attention_is_refused(method: str, attention: str) -> None:
+    with pytest.raises(ValidationError, match=rf"network\.attention = '{attention}'.*'{method}'"):
+        RunConfig.model_validate({"train": {"method": method}, "network": {"attention": attention}})
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value"),
+    [
+        ("network", "hidden_width", 0),
+        ("network", "attention_heads", 0),
+        ("td", "gamma", 1.5),
+        ("td", "gamma", float("nan")),
+        ("td", "polyak", 0.0),
+        ("td", "reward_scale", 0.0),
+        ("td", "learning_rate", -1e-3),
+        ("td", "batch_size", 0),
+        ("td", "update_every_env_steps", 0),
+        ("td", "warmup_env_steps", -1),
+        ("td", "critic_grad_clip", float("inf")),
+        ("td", "reward_std_floor", 0.0),
+        ("train", "method", "ppo"),
+        ("train", "seed", -1),
+        ("train", "threads", 0),
+        ("train", "num_envs", 0),
+        ("train", "env_steps", 0),
+        ("evaluate", "episodes", 0),
+    ],
+)
+def test_out_of_range_is_refused(section: str, key: str, value: object) -> None:
+    with pytest.raises(ValidationError) as caught:
+        RunConfig.model_validate({section: {key: value}})
+    assert [error["loc"] for error in caught.value.errors()] == [(section, key)]
+
+
+def test_heads_must_divide_width() -> None:
+    with pytest.raises(ValidationError, match=r"network\.hidden_width = 100.*attention_heads = 8"):
+        NetworkConfig(hidden_width=100, attention_heads=8)
+
+
+def test_replay_must_hold_a_batch() -> None:
+    with pytest.raises(ValidationError, match=r"td\.replay_capacity = 10.*td\.batch_size = 11"):
+        TDConfig(replay_capacity=10, batch_size=11)
+
+
+def test_every_key_says_what_it_is() -> None:
+    for section, info in RunConfig.model_fields.items():
+        assert info.annotation is not None
+        for name, key in info.annotation.model_fields.items():
+            assert key.description, f"{section}.{name} has no description"
