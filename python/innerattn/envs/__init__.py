@@ -1,0 +1,6 @@
+"""Rescue worlds for Python: batches, and the view of other libraries on them. Never imports torch."""
+
+from innerattn.envs.batch import BatchEnv, Step
+from innerattn.envs.parallel import parallel_env
+
+__all__ = ["BatchEnv", "Step", "parallel_env"]

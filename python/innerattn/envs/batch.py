@@ -1,0 +1,254 @@
+"""`BatchEnv`: many rescue worlds stepped together, over numpy arrays. Knows no rule of the worlds."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Any, Literal, NamedTuple, Self, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from innerattn import _core
+from innerattn.config.scenario import Scenario
+
+Autoreset = Literal["same_step", "disabled"]
+Array = TypeVar("Array", bound=NDArray[Any])
+
+NUM_DISCRETE_ACTIONS = 5
+_RESCUE_FIELDS = ("env", "episode", "step", "slot", "victim", "task")
+_VICTIM_DTYPE = np.dtype(
+    [
+        ("present", "?"),
+        ("task", "i8"),
+        ("id", "i8"),
+        ("appeared_step", "i8"),
+        ("x", "f4"),
+        ("y", "f4"),
+    ]
+)
+
+
+class Step(NamedTuple):
+    """What one control step of E worlds with R robots gave."""
+
+    obs: NDArray[np.float32]
+    """(E, R, D): observations now; of the next episode where one ended (autoreset)."""
+    reward: NDArray[np.float32]
+    """(E, R): sum of the reward components."""
+    terminated: NDArray[np.bool_]
+    """(E,): the scenario's goal ended the episode."""
+    truncated: NDArray[np.bool_]
+    """(E,): time ended the episode."""
+    final_obs: NDArray[np.float32]
+    """(E, R, D): observations after the step and before any autoreset, for every env."""
+    rescues: NDArray[np.void]
+    """(n,) structured int64: env, episode, step, slot, victim, task, helper_0, ... (-1 = none)."""
+
+
+class BatchEnv:
+    """E rescue worlds of one scenario, stepped together by compiled code on several threads.
+
+    Autoreset is Gymnasium's SAME_STEP: on an episode's last step `obs` is already the next episode's
+    first and `final_obs` holds the last of the old one. Arrays are C-contiguous read-only views of
+    buffers owned by the environment, valid until the step after next; `copy=True` gives fresh ones.
+    World i depends on scenario, seed, `first_env + i` and its actions alone, whatever the number of
+    threads or worlds.
+
+    Args:
+        scenario: a `Scenario` or the name of a preset.
+        num_envs: number of worlds E, 1 to 1,048,576.
+        seed: seed of all random streams, 0 to 2**64 - 1.
+        num_threads: 1 to 256; as many cores as are worth it if None.
+        autoreset: "same_step", or "disabled" to leave ended worlds until `reset(mask=...)`.
+        copy: return fresh arrays instead of views.
+        first_env: number of the first world's random streams, for batches split over processes.
+
+    Raises:
+        ConfigError: unknown preset.
+        ValueError: a value that is not allowed, named with its range.
+    """
+
+    reward_component_names: tuple[str, ...] = tuple(_core.Batch.reward_component_names())
+
+    def __init__(
+        self,
+        scenario: Scenario | str,
+        num_envs: int,
+        seed: int = 0,
+        num_threads: int | None = None,
+        *,
+        autoreset: Autoreset = "same_step",
+        copy: bool = False,
+        first_env: int = 0,
+    ) -> None:
+        self.scenario = Scenario.preset(scenario) if isinstance(scenario, str) else scenario
+        if autoreset not in ("same_step", "disabled"):
+            raise ValueError(f"autoreset = {autoreset!r}: must be 'same_step' or 'disabled'")
+        self._batch: _core.Batch | None = _core.Batch(
+            self.scenario.model_dump_json(),
+            _whole("num_envs", num_envs, 1, 2**20),
+            _whole("seed", seed, 0, 2**64 - 1),
+            None if num_threads is None else _whole("num_threads", num_threads, 1, 256),
+            _whole("first_env", first_env, 0, 2**63),
+            autoreset == "same_step",
+        )
+        self.num_envs = int(num_envs)
+        self.num_threads = self._core.num_threads
+        self.robot_names = tuple(robot.name for robot in self.scenario.robots)
+        self.num_robots = len(self.robot_names)
+        self.continuous = self.scenario.actions == "continuous"
+        self.num_actions = 0 if self.continuous else NUM_DISCRETE_ACTIONS
+        self.obs_width = self._core.obs_width
+        helpers = [f"helper_{need}" for need in range(self._core.max_helpers)]
+        self._rescue_dtype = np.dtype([(name, "i8") for name in (*_RESCUE_FIELDS, *helpers)])
+        self._copy = copy
+
+    def reset(
+        self, seed: int | None = None, mask: ArrayLike | None = None
+    ) -> NDArray[np.float32]:
+        """Start new episodes.
+
+        Args:
+            seed: restart from episode 0 under this seed; None goes on to each world's next episode
+                (the first reset keeps episode 0).
+            mask: (E,) bool, the worlds to reset; all if None.
+
+        Returns:
+            Observations of all worlds, (E, R, D) float32.
+
+        Raises:
+            TypeError, ValueError: a seed or mask that is not allowed; nothing has changed then.
+        """
+        if seed is not None:
+            seed = _whole("seed", seed, 0, 2**64 - 1)
+        chosen = None if mask is None else np.asarray(mask)
+        if chosen is not None and (chosen.dtype != np.bool_ or chosen.ndim != 1):
+            raise TypeError(
+                f"mask has dtype {chosen.dtype} and shape {chosen.shape}: "
+                f"must be bool of shape ({self.num_envs},)"
+            )
+        return self._lend(self._core.reset(seed, chosen))
+
+    def step(self, actions: ArrayLike) -> Step:
+        """Do one control step in every world.
+
+        Args:
+            actions: (E, R) integers (0 stay, 1 +x, 2 -x, 3 +y, 4 -y), or (E, R, 2) floats in [-1, 1]
+                when the scenario's actions are continuous.
+
+        Raises:
+            TypeError: wrong dtype.
+            ValueError: wrong shape, an action out of range or not a number (named by env and robot),
+                or a world whose episode is over (autoreset disabled). Nothing has moved then.
+        """
+        obs, reward, terminated, truncated, final_obs, rescues = self._core.step(
+            np.asarray(actions)
+        )
+        return Step(
+            self._lend(obs),
+            self._lend(reward),
+            self._lend(terminated),
+            self._lend(truncated),
+            self._lend(final_obs),
+            rescues.view(self._rescue_dtype)[:, 0],
+        )
+
+    def observation_names(self) -> list[str]:
+        """Names of the D columns of an observation; units are m and m/s."""
+        return self._core.observation_names()
+
+    def observe(self) -> NDArray[np.float32]:
+        """Present observations, (E, R, D) float32 (after `restore`, say)."""
+        return self._lend(self._core.observe())
+
+    def reward_components(self) -> NDArray[np.float32]:
+        """Rewards of the last step by component, (E, R, 4) float32; see `reward_component_names`."""
+        return self._lend(self._core.reward_components())
+
+    def positions(self) -> NDArray[np.float32]:
+        """Places of the robots, (E, R, 2) float32, m, world frame."""
+        return self._core.positions()
+
+    def velocities(self) -> NDArray[np.float32]:
+        """Velocities of the robots, (E, R, 2) float32, m/s, world frame."""
+        return self._core.velocities()
+
+    def obstacles(self) -> NDArray[np.float32]:
+        """Centres of the obstacles in scenario order, (E, O, 2) float32, m."""
+        return self._core.obstacles()
+
+    def victims(self) -> NDArray[np.void]:
+        """Victims by slot, (E, V) structured: present, task, id, appeared_step, x, y (m)."""
+        numbers, places = self._core.victims()
+        table = np.empty(numbers.shape[:2], dtype=_VICTIM_DTYPE)
+        for column, name in enumerate(("present", "task", "id", "appeared_step")):
+            table[name] = numbers[..., column]
+        table["x"], table["y"] = places[..., 0], places[..., 1]
+        return table
+
+    def step_counts(self) -> NDArray[np.int64]:
+        """Steps done in each world's episode, (E,) int64."""
+        return self._core.step_counts()
+
+    def episodes(self) -> NDArray[np.int64]:
+        """Each world's episode, from 0, (E,) int64."""
+        return self._core.episodes()
+
+    def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
+        """Put the robots somewhere else, for studies of motion; rules and victims are left alone.
+
+        Args:
+            positions: (E, R, 2), m.
+            velocities: (E, R, 2), m/s.
+
+        Raises:
+            ValueError: wrong shape, or numbers that are not finite.
+        """
+        self._core.set_motion(
+            np.asarray(positions, dtype=np.float32), np.asarray(velocities, dtype=np.float32)
+        )
+
+    def snapshot(self) -> bytes:
+        """Image of all worlds, with a checksum; `restore` continues from it bit for bit."""
+        return self._core.snapshot()
+
+    def restore(self, image: bytes) -> None:
+        """Put all worlds back into the state of an image, made by any batch of this size and scenario.
+
+        Raises:
+            ValueError: truncated, altered or foreign bytes; nothing has changed then.
+        """
+        self._core.restore(image)
+
+    def close(self) -> None:
+        """Give back memory and threads; the environment cannot be used afterwards."""
+        self._batch = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def _core(self) -> _core.Batch:
+        if self._batch is None:
+            raise RuntimeError("this environment is closed")
+        return self._batch
+
+    def _lend(self, array: Array) -> Array:
+        return array.copy() if self._copy else array
+
+
+def _whole(name: str, value: int, low: int, high: int) -> int:
+    """The value as an int, if it is a whole number in low..=high."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise TypeError(f"{name} = {value!r}: must be an integer in {low}..={high}")
+    if not low <= value <= high:
+        raise ValueError(f"{name} = {value}: must be in {low}..={high}")
+    return int(value)

@@ -1,0 +1,158 @@
+"""A picture of one world: robots, victims, obstacles and walls as seen from above.
+
+It draws from plain arrays and needs matplotlib only when it is called.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.config import Scenario
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+# Okabe & Ito's palette, told apart with every common colour blindness.
+_KIND_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#F0E442")
+_VICTIM_COLOUR = "#D55E00"
+_TASK_MARKERS = "*XDP^v"
+_ARROW_S = 0.2  # an arrow's tip is where the robot would be after so many seconds
+
+
+def draw_world(
+    scenario: Scenario,
+    positions: NDArray[np.float32],
+    velocities: NDArray[np.float32],
+    victims: NDArray[np.void],
+    obstacles: NDArray[np.float32],
+    *,
+    title: str = "",
+    pixels: int = 600,
+) -> NDArray[np.uint8]:
+    """The picture of one world as pixels.
+
+    Args:
+        scenario: the world's description.
+        positions: (R, 2) robots' centres [m].
+        velocities: (R, 2) robots' velocities [m/s].
+        victims: (V,) structured; fields ``present``, ``task``, ``x``, ``y`` [m] are used.
+        obstacles: (O, 2) obstacles' centres [m].
+        title: text above the picture.
+        pixels: height of the picture.
+
+    Returns:
+        (pixels, 4/3 pixels, 3) red, green and blue, 0 to 255.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8, 6), dpi=pixels / 6)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.1, 0.1, 0.63, 0.84))
+    axes.set_title(title)
+    legend = paint_world(axes, scenario, positions, velocities, victims, obstacles)
+    figure.legend(legend.values(), legend.keys(), loc=(0.74, 0.6), frameon=False, labelspacing=0.9)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    pixels_rgba = canvas.buffer_rgba()  # type: ignore[no-untyped-call]
+    return np.asarray(pixels_rgba, np.uint8)[..., :3].copy()
+
+
+def paint_world(
+    axes: Axes,
+    scenario: Scenario,
+    positions: NDArray[np.float32],
+    velocities: NDArray[np.float32],
+    victims: NDArray[np.void],
+    obstacles: NDArray[np.float32],
+) -> dict[str, Artist]:
+    """Paint one world on ``axes``; arguments as in `draw_world`.
+
+    Returns:
+        What a legend shows: label to symbol.
+    """
+    half = scenario.arena_half_width_m
+    axes.set(xlim=(-1.05 * half, 1.05 * half), ylim=(-1.05 * half, 1.05 * half), aspect="equal")
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    _paint_arena(axes, scenario, obstacles)
+    legend = _paint_victims(axes, scenario, victims)
+    return legend | _paint_robots(axes, scenario, positions, velocities)
+
+
+def _paint_arena(axes: Axes, scenario: Scenario, obstacles: NDArray[np.float32]) -> None:
+    from matplotlib.patches import Circle, Rectangle
+
+    half = scenario.arena_half_width_m
+    axes.add_patch(Rectangle((-half, -half), 2 * half, 2 * half, fill=False, linewidth=2.5))
+    style: dict[str, Any] = {"facecolor": "#999999", "edgecolor": "#444444", "zorder": 1}
+    for shape, (x, y) in zip(scenario.obstacles, obstacles.tolist(), strict=True):
+        if shape.shape == "disc":
+            axes.add_patch(Circle((x, y), shape.radius_m or 0.0, **style))
+        else:
+            width, height = shape.half_extents_m or (0.0, 0.0)
+            axes.add_patch(Rectangle((x - width, y - height), 2 * width, 2 * height, **style))
+
+
+def _paint_victims(axes: Axes, scenario: Scenario, victims: NDArray[np.void]) -> dict[str, Artist]:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Circle
+
+    legend: dict[str, Artist] = {}
+    markers = [_TASK_MARKERS[i % len(_TASK_MARKERS)] for i in range(len(scenario.tasks))]
+    style: dict[str, Any] = {"color": _VICTIM_COLOUR, "linestyle": "", "markersize": 11}
+    for task, marker in zip(scenario.tasks, markers, strict=True):
+        legend[f"{task.name}:\n{' + '.join(task.needs)}"] = Line2D([], [], marker=marker, **style)
+    for victim in victims[victims["present"].astype(bool)]:
+        x, y = float(victim["x"]), float(victim["y"])
+        axes.plot([x], [y], marker=markers[int(victim["task"])], zorder=2, **style)
+        ring = Circle((x, y), scenario.rescue_radius_m, fill=False, linestyle="--")
+        ring.set_edgecolor(_VICTIM_COLOUR)
+        axes.add_patch(ring)
+    return legend
+
+
+def _paint_robots(
+    axes: Axes,
+    scenario: Scenario,
+    positions: NDArray[np.float32],
+    velocities: NDArray[np.float32],
+) -> dict[str, Artist]:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Circle
+    from matplotlib.patheffects import withStroke
+
+    legend: dict[str, Artist] = {}
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    kinds = list(dict.fromkeys(robot.kind for robot in scenario.robots))
+    for robot, (x, y), velocity in zip(scenario.robots, positions, velocities, strict=True):
+        colour = _KIND_COLOURS[kinds.index(robot.kind) % len(_KIND_COLOURS)]
+        if robot.kind not in legend:
+            legend[robot.kind] = Line2D(
+                [], [], color=colour, marker="o", linestyle="", markersize=11
+            )
+        axes.add_patch(
+            Circle((float(x), float(y)), robot.radius_m, facecolor=colour, edgecolor="k", zorder=3)
+        )
+        axes.annotate(
+            robot.name,
+            (float(x), float(y) + robot.radius_m),
+            xytext=(0, 2),
+            textcoords="offset points",
+            ha="center",
+            fontsize="small",
+            path_effects=halo,
+            zorder=5,
+        )
+        if np.hypot(*velocity) > 1e-3:
+            axes.annotate(
+                "",
+                (float(x + _ARROW_S * velocity[0]), float(y + _ARROW_S * velocity[1])),
+                xytext=(float(x), float(y)),
+                arrowprops={"arrowstyle": "->", "linewidth": 1.5},
+                zorder=6,
+            )
+    return legend

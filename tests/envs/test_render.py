@@ -1,0 +1,74 @@
+"""The picture of a world shows what is in it, where it is."""
+
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from innerattn.config import Obstacle, Scenario
+from innerattn.envs import parallel_env
+from innerattn.envs.render import draw_world
+from matplotlib.colors import to_rgb
+from numpy.typing import NDArray
+
+VICTIM = np.dtype([("present", "i1"), ("task", "i1"), ("x", "f4"), ("y", "f4")])
+PLACES = np.array([[-0.7, -0.7], [0.7, -0.7], [-0.7, 0.7], [0.7, 0.7]], np.float32)
+
+
+def picture(
+    scenario: Scenario, places: NDArray[np.float32] = PLACES, present: int = 1
+) -> NDArray[np.uint8]:
+    victims = np.array([(present, 0, 0.0, 0.0)], VICTIM)
+    obstacles = np.zeros((len(scenario.obstacles), 2), np.float32)
+    return draw_world(scenario, places, np.zeros_like(places), victims, obstacles)
+
+
+def count(image: NDArray[np.uint8], colour: str) -> int:
+    return int((image == np.round(np.array(to_rgb(colour)) * 255)).all(-1).sum())
+
+
+def test_picture_is_pixels() -> None:
+    image = picture(Scenario())
+    assert image.shape == (600, 800, 3)
+    assert image.dtype == np.uint8
+    assert image.min() < 50
+    assert image.max() == 255
+
+
+def test_victims_and_obstacles_appear() -> None:
+    plain, empty = picture(Scenario()), picture(Scenario(), present=0)
+    assert count(plain, "#D55E00") > count(empty, "#D55E00") + 50
+    blocks = Scenario(
+        obstacles=(Obstacle(shape="box", half_extents_m=(0.2, 0.2), position_m=(0.0, 0.0)),)
+    )
+    disc = Scenario(obstacles=(Obstacle(shape="disc", radius_m=0.2, position_m=(0.0, 0.0)),))
+    box_area, disc_area = (
+        count(picture(blocks, present=0), "#999999"),
+        count(picture(disc, present=0), "#999999"),
+    )
+    assert count(plain, "#999999") < 50
+    assert disc_area / box_area == pytest.approx(np.pi / 4, rel=0.05)
+
+
+def test_robots_are_where_they_are() -> None:
+    left, right = PLACES.copy(), PLACES.copy()
+    left[:, 0], right[:, 0] = -0.8, 0.8
+    difference = (picture(Scenario(), left) != picture(Scenario(), right)).any(-1)
+    columns = np.flatnonzero(difference.any(0))
+    assert columns.max() - columns.min() > 250
+    middle = (columns.max() + columns.min()) // 2
+    assert not difference[:, middle - 40 : middle + 40].any()
+
+
+def test_render_through_the_environment() -> None:
+    env = parallel_env(render_mode="rgb_array")
+    with pytest.raises(ResetNeeded, match="reset"):
+        env.render()
+    env.reset(seed=0)
+    before = env.render()
+    env.step({"food_0": 1, "food_1": 2, "navigation_0": 3, "medical_0": 4})
+    after = env.render()
+    assert before is not None
+    assert after is not None
+    assert (before != after).any()
+    silent = parallel_env()
+    silent.reset(seed=0)
+    assert silent.render() is None
