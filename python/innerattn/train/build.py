@@ -1,0 +1,62 @@
+"""From a configuration to the learner it names; the only place that knows which classes exist."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import torch
+
+from innerattn.config import RunConfig
+from innerattn.envs import BatchEnv
+from innerattn.errors import ConfigError
+from innerattn.learn.td import TD
+from innerattn.learn.types import Learner, Team
+
+
+def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
+    """A fresh learner for the team in ``env``, seeded by `train.seed`.
+
+    Raises:
+        ConfigError: the device does not exist here, or the actions are continuous.
+    """
+    if env.num_actions == 0:
+        raise ConfigError(
+            "scenario.actions = 'continuous': learning needs 'discrete'; "
+            "continuous worlds are for scripted policies"
+        )
+    return TD(
+        Team(env.num_robots, env.obs_width, env.num_actions),
+        config.network,
+        config.td,
+        seed=config.train.seed,
+        device=_device(config.train.device),
+        availability_column=env.observation_names().index("own.available"),
+    )
+
+
+def thread_count(config: RunConfig) -> int:
+    """Threads of worlds and networks: `train.threads`, or every core this process may use."""
+    return config.train.threads or len(os.sched_getaffinity(0))
+
+
+@contextmanager
+def torch_threads(count: int) -> Iterator[None]:
+    """Let torch use ``count`` threads inside the block."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def _device(name: str) -> torch.device:
+    try:
+        device = torch.device(name)
+        torch.empty(0, device=device)  # a well-formed name may still be of a device not here
+    except (RuntimeError, AssertionError) as error:
+        reason = str(error).splitlines()[0]
+        raise ConfigError(f"train.device = {name!r}: not usable here ({reason})") from error
+    return device

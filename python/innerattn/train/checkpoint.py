@@ -1,0 +1,224 @@
+"""The run folder: configuration, a record of how it was made, and weights; made, filled and read.
+
+A folder is made whole or not at all, and nothing in it is trusted when it is read: links and
+paths that lead out of it are refused, and no file is unpickled.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+import shutil
+import subprocess
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Literal, get_args
+
+from torch import Tensor
+
+from innerattn.config import RunConfig, read_toml, write_toml
+from innerattn.config.files import write_whole
+from innerattn.envs import BatchEnv
+from innerattn.errors import RunError
+from innerattn.learn.types import Learner
+from innerattn.train.build import build_learner
+from innerattn.train.weights import read_weights, write_weights
+
+SCHEMA_VERSION = 1
+State = Literal["running", "done", "interrupted"]
+
+_PACKAGES = ("innerattn", "torch", "numpy")
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """How a run was made and how far it came; the contents of ``run.json``."""
+
+    schema_version: int
+    versions: dict[str, str]
+    seed: int
+    commit: str | None
+    threads: int
+    device: str
+    state: State
+    env_steps: int
+    updates: int
+    seconds: float
+
+
+class RunFolder:
+    """A run folder that is being filled."""
+
+    def __init__(self, path: Path, info: RunInfo) -> None:
+        """Take over a folder that exists; `create` makes one."""
+        self.path = path
+        self.info = info
+
+    @classmethod
+    def create(cls, path: Path, config: RunConfig, threads: int) -> RunFolder:
+        """Make the folder at ``path``; it appears with its files or not at all.
+
+        Raises:
+            RunError: something is at ``path`` already, or the folder cannot be made.
+        """
+        refuse_existing(path)
+        info = RunInfo(
+            schema_version=SCHEMA_VERSION,
+            versions=_versions(),
+            seed=config.train.seed,
+            commit=_commit(),
+            threads=threads,
+            device=config.train.device,
+            state="running",
+            env_steps=0,
+            updates=0,
+            seconds=0.0,
+        )
+        partial = path.with_name(f".{path.name}.{os.getpid()}")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            partial.mkdir()
+            write_toml(config, partial / "config.toml")
+            _write_info(partial, info)
+            (partial / "checkpoints").mkdir()
+            os.rename(partial, path)
+        except OSError as error:
+            shutil.rmtree(partial, ignore_errors=True)
+            raise RunError(f"{path}: cannot make the run folder ({error.strerror})") from error
+        return cls(path, info)
+
+    def save_weights(self, tensors: Mapping[str, Tensor], env_steps: int) -> None:
+        """Write a checkpoint named after ``env_steps`` and make it the newest one.
+
+        Raises:
+            OSError: the files cannot be written; the newest checkpoint stays what it was.
+        """
+        folder = self.path / "checkpoints" / str(env_steps)
+        folder.mkdir(exist_ok=True)
+        write_weights(folder / "weights.safetensors", tensors)
+        write_whole(folder.with_name("latest"), f"{env_steps}\n".encode())
+
+    def mark(self, state: State, env_steps: int, updates: int, seconds: float) -> None:
+        """Write down how far the run has come."""
+        self.info = replace(
+            self.info,
+            state=state,
+            env_steps=env_steps,
+            updates=updates,
+            seconds=round(seconds, 3),
+        )
+        _write_info(self.path, self.info)
+
+
+def refuse_existing(path: Path) -> None:
+    """Let no run overwrite anything.
+
+    Raises:
+        RunError: something is at ``path``.
+    """
+    if os.path.lexists(path):
+        raise RunError(f"{path}: exists already; choose another run folder or remove it")
+
+
+def read_info(run: str | Path) -> RunInfo:
+    """What ``run.json`` says.
+
+    Raises:
+        RunError: there is no such folder, or it was not made by training.
+    """
+    path = Path(run)
+    if not path.is_dir():
+        raise RunError(f"{path}: no such run folder")
+    try:
+        info = RunInfo(**json.loads(_plain_file(path / "run.json").read_text("utf-8")))
+    except (OSError, ValueError, TypeError) as error:
+        raise RunError(f"{path / 'run.json'}: not the record of a run") from error
+    if info.schema_version != SCHEMA_VERSION:
+        raise RunError(
+            f"{path / 'run.json'}: schema version {info.schema_version}, "
+            f"only {SCHEMA_VERSION} is known"
+        )
+    if info.state not in get_args(State):
+        raise RunError(f"{path / 'run.json'}: state {info.state!r} is not one of {get_args(State)}")
+    return info
+
+
+def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learner]:
+    """The configuration of a run and a learner with its newest weights.
+
+    Args:
+        run: the run folder.
+        device: where the networks are put; the device of training need not exist here.
+
+    Raises:
+        RunError: no run folder, none of ours, no checkpoint yet, or weights that are truncated,
+            altered or of other networks.
+        ConfigError: its ``config.toml`` is not valid.
+    """
+    path = Path(run)
+    read_info(path)
+    config = read_toml(_plain_file(path / "config.toml"))
+    train = config.train.model_copy(update={"device": device})
+    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
+        learner = build_learner(config.model_copy(update={"train": train}), env)
+    weights = _newest_weights(path)
+    try:
+        learner.load(read_weights(weights))
+    except ValueError as error:
+        raise RunError(f"{weights}: {error}") from error
+    return config, learner
+
+
+def _newest_weights(run: Path) -> Path:
+    """The weights file that ``checkpoints/latest`` names; a name is a plain number."""
+    checkpoints = run / "checkpoints"
+    latest = checkpoints / "latest"
+    if checkpoints.is_symlink() or not checkpoints.is_dir() or not os.path.lexists(latest):
+        raise RunError(f"{run}: holds no checkpoint yet")
+    try:
+        name = _plain_file(latest).read_text("ascii").strip()
+    except ValueError:
+        name = ""
+    folder = checkpoints / name
+    if not re.fullmatch(r"[0-9]{1,18}", name) or folder.is_symlink() or not folder.is_dir():
+        raise RunError(f"{latest}: must name a folder beside it by its number")
+    return folder / "weights.safetensors"
+
+
+def _plain_file(path: Path) -> Path:
+    if path.is_symlink() or not path.is_file():
+        raise RunError(f"{path}: missing, or not a plain file")
+    return path
+
+
+def _write_info(folder: Path, info: RunInfo) -> None:
+    write_whole(folder / "run.json", (json.dumps(asdict(info), indent=1) + "\n").encode())
+
+
+def _versions() -> dict[str, str]:
+    versions = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "not installed"
+    return versions
+
+
+def _commit() -> str | None:
+    """The commit of the source tree this module is in; none where it is installed or untracked."""
+    here = Path(__file__)
+    command = ["git", "-C", str(here.parent)]
+    quiet = {"capture_output": True, "text": True, "check": True, "timeout": 10}
+    try:
+        # An installed package may lie inside somebody else's repository.
+        subprocess.run([*command, "ls-files", "--error-unmatch", here.name], **quiet)  # type: ignore[call-overload]
+        found = subprocess.run([*command, "rev-parse", "HEAD"], **quiet)  # type: ignore[call-overload]
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return str(found.stdout.strip())

@@ -1,0 +1,80 @@
+"""Steps a learner's policy and a batch of worlds, and gives back what was seen.
+
+It learns nothing and keeps only running counts of episodes and rescues.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from innerattn.envs import BatchEnv
+from innerattn.learn.types import Learner, Transitions
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Episodes that ended since the last count, the rescues in them, and all episodes so far."""
+
+    episodes: int
+    rescues: int
+    total_episodes: int
+
+
+class Collector:
+    """One policy acting in one batch of worlds, step by step."""
+
+    def __init__(self, env: BatchEnv, learner: Learner, device: torch.device) -> None:
+        """Reset the worlds; tensors are made on ``device``."""
+        self._env = env
+        self._learner = learner
+        self._device = device
+        self._obs = self._tensor(env.reset())
+        self._open_rescues: NDArray[np.int64] = np.zeros(env.num_envs, np.int64)
+        self._episodes = self._rescues = self._total = 0
+
+    def step(self) -> tuple[Transitions, Tensor]:
+        """One control step of all worlds, with actions sampled from the policy.
+
+        Returns:
+            The transitions, obs (E, R, D) float32, actions (E, R) int64, reward (E, R) float32,
+            next_obs (E, R, D) float32, terminated (E,) bool; and truncated (E,) bool. The next
+            observation is always that of the same episode, also where a new one has begun.
+        """
+        actions = self._learner.act(self._obs)
+        step = self._env.step(actions.cpu().numpy())
+        truncated = self._tensor(step.truncated)
+        transitions = Transitions(
+            obs=self._obs,
+            actions=actions,
+            reward=self._tensor(step.reward),
+            next_obs=self._tensor(step.final_obs),
+            terminated=self._tensor(step.terminated),
+        )
+        self._obs = self._tensor(step.obs)
+        np.add.at(self._open_rescues, step.rescues["env"], 1)
+        self._count(step.terminated | step.truncated)
+        return transitions, truncated
+
+    def take_tally(self) -> Tally:
+        """What has happened since the last call."""
+        tally = Tally(self._episodes, self._rescues, self._total)
+        self._episodes = self._rescues = 0
+        return tally
+
+    def _count(self, ended: NDArray[np.bool_]) -> None:
+        count = int(ended.sum())
+        if count:
+            self._episodes += count
+            self._total += count
+            self._rescues += int(self._open_rescues[ended].sum())
+            self._open_rescues[ended] = 0
+
+    def _tensor(self, array: NDArray[Any]) -> Tensor:
+        # The worlds reuse their buffers, so a copy is made in any case.
+        return torch.tensor(array, device=self._device)

@@ -1,0 +1,117 @@
+"""Figures of a training run, one JSON line per logging interval; it decides nothing.
+
+`Interval` gathers what happens between two lines, `MetricsFile` writes a line.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.errors import RunError
+from innerattn.train.collect import Tally
+
+Metrics = Mapping[str, Any]
+"""One line: env_steps, episodes, updates, seconds, env_steps_per_s, updates_per_s, losses by name,
+rescues_per_episode (none where no episode ended) and attention_entropy by robot and head [nats]."""
+
+
+class MetricsFile:
+    """A file that only grows, by whole lines."""
+
+    def __init__(self, path: Path) -> None:
+        """Write to ``path`` from its end on; it is made when the first line comes."""
+        self._path = path
+
+    def append(self, metrics: Metrics) -> None:
+        """Add one line.
+
+        Raises:
+            RunError: a figure is not finite, which means that training has diverged.
+        """
+        try:
+            line = json.dumps(metrics, allow_nan=False)
+        except ValueError as error:
+            bad = ", ".join(_not_finite(metrics)) or "a figure"
+            raise RunError(
+                f"training diverged: {bad} is not finite at env_steps = {metrics['env_steps']}"
+            ) from error
+        # One write of one line to a file opened for appending: a reader never sees half of it.
+        with self._path.open("ab", buffering=0) as file:
+            file.write(f"{line}\n".encode())
+
+
+class Interval:
+    """What has happened since the last line of metrics."""
+
+    def __init__(self) -> None:
+        """Start at zero steps, now."""
+        self._start = time.perf_counter()
+        self._seconds = 0.0
+        self._env_steps = 0
+        self._updates = 0
+        self._losses: dict[str, list[float]] = {}
+
+    @property
+    def seconds(self) -> float:
+        """Time since the start of training [s]."""
+        return time.perf_counter() - self._start
+
+    def add_losses(self, losses: Mapping[str, float] | None) -> None:
+        """Take the losses of the updates of one control step, if there were any."""
+        for name, value in (losses or {}).items():
+            self._losses.setdefault(name, []).append(value)
+
+    def close(
+        self, env_steps: int, updates: int, tally: Tally, entropy: Mapping[str, list[float]]
+    ) -> dict[str, Any]:
+        """The line for this interval; the next one starts now."""
+        seconds = self.seconds
+        elapsed = max(seconds - self._seconds, 1e-9)
+        line: dict[str, Any] = {
+            "env_steps": env_steps,
+            "episodes": tally.total_episodes,
+            "updates": updates,
+            "seconds": round(seconds, 3),
+            "env_steps_per_s": round((env_steps - self._env_steps) / elapsed, 1),
+            "updates_per_s": round((updates - self._updates) / elapsed, 2),
+            "losses": {name: sum(all_) / len(all_) for name, all_ in self._losses.items()},
+            "rescues_per_episode": tally.rescues / tally.episodes if tally.episodes else None,
+            "attention_entropy": dict(entropy),
+        }
+        self._seconds, self._env_steps, self._updates = seconds, env_steps, updates
+        self._losses = {}
+        return line
+
+
+def attention_entropy(weights: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Mean entropy of attention by robot and head, in nats.
+
+    Args:
+        weights: (..., H, R, R) attention weights; row i holds robot i's over its teammates.
+
+    Returns:
+        (R, H) float64; 0 for a robot alone, ln(R - 1) for a robot that attends evenly.
+    """
+    *batch, heads, robots, _ = weights.shape
+    # float32 softmax of far-apart logits gives exact zeros, whose share of the entropy is 0.
+    w = weights.reshape(math.prod(batch), heads, robots, robots).astype(np.float64)
+    terms = w * np.log(np.where(w > 0.0, w, 1.0))
+    return np.asarray(-terms.sum(-1).mean(0).T + 0.0)
+
+
+def _not_finite(metrics: Mapping[str, Any], prefix: str = "") -> list[str]:
+    names = []
+    for name, value in metrics.items():
+        if isinstance(value, Mapping):
+            names += _not_finite(value, f"{prefix}{name}.")
+        elif not np.all(np.isfinite(np.asarray(0.0 if value is None else value))):
+            names.append(prefix + name)
+    return names

@@ -1,0 +1,71 @@
+"""The collector against a plain loop over a second, equal batch of worlds."""
+
+import numpy as np
+import torch
+from innerattn.config import Scenario
+from innerattn.envs import BatchEnv
+from innerattn.evaluate.dispatch import scripted_policy
+from innerattn.evaluate.episodes import View
+from innerattn.train.collect import Collector
+from torch import Tensor
+
+
+class Scripted:
+    """Acts by script, so that rescues happen; of a learner it has only what collecting needs."""
+
+    def __init__(self, env: BatchEnv) -> None:
+        self.env = env
+        self.policy = scripted_policy("hungarian", env.scenario)
+        self.seen: list[Tensor] = []
+
+    def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
+        assert not greedy  # training explores
+        self.seen.append(obs)
+        env = self.env
+        view = View(obs.numpy(), env.positions(), env.velocities(), env.victims())
+        return torch.from_numpy(self.policy.act(view))
+
+
+def test_transitions_and_counts_against_a_plain_loop() -> None:
+    scenario = Scenario.preset("double").replace(episode_steps=15)
+    env, other = (BatchEnv(scenario, 5, seed=3, num_threads=1) for _ in range(2))
+    learner = Scripted(env)
+    collector = Collector(env, learner, torch.device("cpu"))
+    obs = other.reset().copy()
+    episodes = rescues = 0
+    open_rescues = [0] * 5
+    for step_index in range(50):
+        transitions, truncated = collector.step()
+        step = other.step(transitions.actions.numpy())
+        np.testing.assert_array_equal(transitions.obs, obs)
+        np.testing.assert_array_equal(transitions.next_obs, step.final_obs)
+        np.testing.assert_array_equal(transitions.reward, step.reward)
+        np.testing.assert_array_equal(transitions.terminated, step.terminated)
+        np.testing.assert_array_equal(truncated, step.truncated)
+        assert transitions.actions.dtype == torch.int64
+        obs = step.obs.copy()
+        for event in step.rescues:
+            open_rescues[event["env"]] += 1
+        for e in range(5):
+            if step.truncated[e]:
+                episodes += 1
+                rescues += open_rescues[e]
+                open_rescues[e] = 0
+        if step_index == 20:
+            tally = collector.take_tally()
+            assert (tally.episodes, tally.rescues) == (episodes, rescues)
+            assert tally.episodes == 5
+            episodes = rescues = 0
+    tally = collector.take_tally()
+    assert (tally.episodes, tally.rescues, tally.total_episodes) == (episodes, rescues, 15)
+    assert tally.rescues > 0
+
+
+def test_transitions_stay_when_the_worlds_go_on() -> None:
+    env = BatchEnv("mixed", 3, seed=0, num_threads=1)
+    collector = Collector(env, Scripted(env), torch.device("cpu"))
+    first, _ = collector.step()
+    copy = [tensor.clone() for tensor in first]
+    for _ in range(5):
+        collector.step()
+    assert all(torch.equal(a, b) for a, b in zip(first, copy, strict=True))

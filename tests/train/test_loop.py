@@ -1,0 +1,139 @@
+"""Whole runs: what they leave behind when they end, are interrupted, or cannot begin."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import torch
+from innerattn.config import RunConfig
+from innerattn.errors import ConfigError, RunError
+from innerattn.learn import TD
+from innerattn.train import Progress, load_policy, read_info, train
+
+Configure = Callable[..., RunConfig]
+
+
+def files(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_finished_run_holds_what_is_promised(finished_run: Path) -> None:
+    assert files(finished_run) == {
+        "config.toml",
+        "run.json",
+        "metrics.jsonl",
+        "checkpoints/latest",
+        "checkpoints/600/weights.safetensors",
+    }
+    info = read_info(finished_run)
+    assert (info.state, info.env_steps, info.seed, info.threads) == ("done", 600, 0, 1)
+    assert info.updates == load_policy(finished_run)[1].updates > 0
+
+
+def test_metrics_of_a_run(finished_run: Path) -> None:
+    text = (finished_run / "metrics.jsonl").read_text()
+    lines = [json.loads(line) for line in text.splitlines()]
+    assert [line["env_steps"] for line in lines] == [204, 408, 600]
+    # Episodes of 25 steps in 12 worlds: the first end with the 300th env-step.
+    assert [line["episodes"] for line in lines] == [0, 12, 24]
+    assert lines[0]["rescues_per_episode"] is None
+    assert lines[1]["rescues_per_episode"] >= 0
+    assert lines[2]["updates"] == read_info(finished_run).updates
+    assert lines[2]["losses"]["critic_loss"] > 0
+    for line in lines:
+        assert set(line["attention_entropy"]) == {"food_0", "food_1", "navigation_0", "medical_0"}
+        for heads in line["attention_entropy"].values():
+            assert len(heads) == 4
+            assert all(0 < nats <= 1.0987 for nats in heads)
+
+
+def test_the_same_run_twice_gives_the_same_weights(
+    small_config: Configure, finished_run: Path, tmp_path: Path
+) -> None:
+    again = load_policy(train(small_config(), tmp_path / "again"))[1].state()
+    first = load_policy(finished_run)[1].state()
+    assert all(torch.equal(first[name], again[name]) for name in first)
+    other = load_policy(train(small_config(**{"train.seed": 1}), tmp_path / "other"))[1].state()
+    assert not all(torch.equal(first[name], other[name]) for name in first)
+
+
+def test_progress_is_reported_each_step(small_config: Configure, tmp_path: Path) -> None:
+    seen: list[Progress] = []
+    train(small_config(**{"train.env_steps": 250}), tmp_path / "run", progress=seen.append)
+    assert [progress.env_steps for progress in seen] == list(range(12, 253, 12))
+    assert {progress.total_env_steps for progress in seen} == {250}
+    assert seen[0].metrics is None
+    assert seen[-1].metrics is not None
+    assert seen[-1].metrics["env_steps"] == 252
+
+
+@pytest.mark.parametrize("after", [1, 30])
+def test_an_interrupt_saves_and_is_passed_on(
+    small_config: Configure, tmp_path: Path, after: int
+) -> None:
+    seen: list[Progress] = []
+
+    def press_ctrl_c(progress: Progress) -> None:
+        seen.append(progress)
+        if len(seen) == after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(small_config(), tmp_path / "run", progress=press_ctrl_c)
+    info = read_info(tmp_path / "run")
+    assert (info.state, info.env_steps) == ("interrupted", 12 * after)
+    _, learner = load_policy(tmp_path / "run")
+    assert learner.updates == info.updates == seen[-1].updates
+
+
+def test_a_run_that_breaks_says_so(
+    small_config: Configure, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(TD, "learn", lambda _: {"critic_loss": float("nan")})
+    with pytest.raises(RunError, match=r"losses\.critic_loss is not finite"):
+        train(small_config(), tmp_path / "run")
+    assert read_info(tmp_path / "run").state == "interrupted"
+    with pytest.raises(RunError, match="holds no checkpoint yet"):
+        load_policy(tmp_path / "run")
+
+
+def test_an_existing_folder_is_refused_untouched(small_config: Configure, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "mine.txt").write_text("mine")
+    with pytest.raises(RunError, match="exists already"):
+        train(small_config(), folder)
+    assert files(tmp_path) == {"run/mine.txt"}
+
+
+@pytest.mark.parametrize(
+    ("values", "place"),
+    [
+        ({"train.device": "abacus"}, r"train\.device = 'abacus'"),
+        ({"train.device": "cuda:99"}, r"train\.device = 'cuda:99'"),
+        ({"scenario.actions": "continuous"}, r"scenario\.actions = 'continuous'"),
+    ],
+)
+def test_a_run_that_cannot_begin_leaves_nothing(
+    small_config: Configure, tmp_path: Path, values: dict[str, object], place: str
+) -> None:
+    with pytest.raises(ConfigError, match=place) as caught:
+        train(small_config(**values), tmp_path / "runs" / "run")
+    assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_torch_threads_are_as_before(small_config: Configure, tmp_path: Path) -> None:
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    inside: list[int] = []
+    try:
+        train(
+            small_config(**{"train.env_steps": 12}),
+            tmp_path / "run",
+            progress=lambda _: inside.append(torch.get_num_threads()),
+        )
+        assert (inside, torch.get_num_threads()) == ([1], 2)
+    finally:
+        torch.set_num_threads(before)

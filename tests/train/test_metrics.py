@@ -1,0 +1,96 @@
+"""Metrics: lines of JSON, and the entropy of attention against a plain loop."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from innerattn.errors import RunError
+from innerattn.train.collect import Tally
+from innerattn.train.metrics import Interval, MetricsFile, attention_entropy
+
+
+def plain_entropy(weights: np.ndarray) -> list[list[float]]:
+    batch, heads, robots, _ = weights.shape
+    rows = []
+    for robot in range(robots):
+        row = []
+        for head in range(heads):
+            total = 0.0
+            for b in range(batch):
+                for w in weights[b, head, robot]:
+                    total -= float(w) * math.log(w) if w > 0 else 0.0
+            row.append(total / batch)
+        rows.append(row)
+    return rows
+
+
+def test_entropy_against_a_plain_loop() -> None:
+    rng = np.random.default_rng(0)
+    weights = rng.dirichlet(np.full(4, 0.3), (6, 3, 4)).astype(np.float32)
+    weights[0, 0, 0] = [0, 1, 0, 0]
+    found = attention_entropy(weights)
+    assert found.shape == (4, 3)
+    np.testing.assert_allclose(found, plain_entropy(weights), atol=1e-12)
+
+
+@pytest.mark.parametrize(("robots", "nats"), [(1, 0.0), (2, 0.0), (4, 1.0986122886681098)])
+def test_entropy_of_even_attention(robots: int, nats: float) -> None:
+    even = (1 - np.eye(robots)) / max(robots - 1, 1)
+    weights = np.broadcast_to(even, (5, 2, robots, robots)).astype(np.float32)
+    np.testing.assert_allclose(attention_entropy(weights), np.full((robots, 2), nats), atol=1e-6)
+
+
+def test_entropy_takes_time_and_episodes_together() -> None:
+    rng = np.random.default_rng(1)
+    weights = rng.dirichlet(np.ones(3), (5, 7, 2, 3)).astype(np.float32)
+    np.testing.assert_allclose(
+        attention_entropy(weights), plain_entropy(weights.reshape(35, 2, 3, 3)), atol=1e-12
+    )
+
+
+def test_interval_counts_from_line_to_line() -> None:
+    interval = Interval()
+    interval.add_losses(None)
+    interval.add_losses({"critic_loss": 1.0, "q": 2.0})
+    interval.add_losses({"critic_loss": 3.0, "q": 4.0})
+    line = interval.close(1000, 20, Tally(4, 10, 4), {"food_0": [1.0]})
+    assert line["losses"] == {"critic_loss": 2.0, "q": 3.0}
+    assert line["rescues_per_episode"] == 2.5
+    assert line["attention_entropy"] == {"food_0": [1.0]}
+    line = interval.close(1500, 30, Tally(0, 0, 4), {})
+    assert line["losses"] == {}
+    assert line["rescues_per_episode"] is None
+    assert (line["env_steps"], line["updates"], line["episodes"]) == (1500, 30, 4)
+
+
+def test_rates_are_of_the_interval_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr("innerattn.train.metrics.time.perf_counter", lambda: now[0])
+    interval = Interval()
+    now[0] = 110.0
+    line = interval.close(1000, 20, Tally(0, 0, 0), {})
+    assert (line["seconds"], line["env_steps_per_s"], line["updates_per_s"]) == (10.0, 100.0, 2.0)
+    now[0] = 115.0
+    line = interval.close(4000, 30, Tally(0, 0, 0), {})
+    assert (line["seconds"], line["env_steps_per_s"], line["updates_per_s"]) == (15.0, 600.0, 2.0)
+
+
+def test_lines_are_appended_whole(tmp_path: Path) -> None:
+    file = MetricsFile(tmp_path / "metrics.jsonl")
+    lines = [{"env_steps": n, "losses": {"critic_loss": 0.1 * n}} for n in range(3)]
+    for line in lines:
+        file.append(line)
+    text = (tmp_path / "metrics.jsonl").read_text()
+    assert text.endswith("\n")
+    assert [json.loads(line) for line in text.splitlines()] == lines
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_divergence_is_named(tmp_path: Path, bad: float) -> None:
+    file = MetricsFile(tmp_path / "metrics.jsonl")
+    line = {"env_steps": 600, "rescues_per_episode": None, "losses": {"q": 1.0, "critic_loss": bad}}
+    with pytest.raises(RunError, match=r"losses\.critic_loss is not finite at env_steps = 600"):
+        file.append(line)
+    assert not (tmp_path / "metrics.jsonl").exists()

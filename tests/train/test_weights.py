@@ -1,0 +1,119 @@
+"""Weights come back as they were written, or not at all."""
+
+import pickle
+from pathlib import Path
+
+import pytest
+import torch
+from innerattn.errors import RunError
+from innerattn.train.weights import FORMAT, SCHEMA_VERSION, read_weights, write_weights
+from safetensors.torch import load, save, save_file
+
+TENSORS = {
+    "actor.weight": torch.arange(12, dtype=torch.float32).reshape(3, 4).t(),  # not contiguous
+    "actor.bias": torch.tensor([float("nan"), -0.0, 1e-40]),
+    "updates": torch.tensor(7),
+    "empty": torch.zeros(0, 3),
+}
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "weights.safetensors"
+    write_weights(path, TENSORS)
+    return path
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(RunError) as caught:
+        read_weights(path)
+    message = str(caught.value)
+    assert str(path) in message
+    assert "\n" not in message
+    return message
+
+
+def test_round_trip_is_exact(file: Path) -> None:
+    read = read_weights(file)
+    assert read.keys() == TENSORS.keys()
+    for name, tensor in TENSORS.items():
+        assert read[name].dtype == tensor.dtype
+        assert read[name].shape == tensor.shape
+        assert read[name].numpy().tobytes() == tensor.contiguous().numpy().tobytes()
+
+
+def test_writing_leaves_one_file_and_replaces_the_old(file: Path) -> None:
+    write_weights(file, {"other": torch.ones(2)})
+    assert list(read_weights(file)) == ["other"]
+    assert [path.name for path in file.parent.iterdir()] == [file.name]
+
+
+def test_every_truncation_is_refused(file: Path) -> None:
+    whole = file.read_bytes()
+    for length in [*range(0, len(whole), 7), len(whole) - 1]:
+        file.write_bytes(whole[:length])
+        refusal(file)
+
+
+def test_every_altered_byte_is_refused_or_harmless(file: Path) -> None:
+    whole = file.read_bytes()
+    refused = 0
+    for place in range(len(whole)):
+        file.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        try:
+            read = read_weights(file)
+        except RunError:
+            refused += 1
+        else:  # what is read is what was written: padding and the like
+            assert {name: t.numpy().tobytes() for name, t in read.items()} == {
+                name: t.contiguous().numpy().tobytes() for name, t in TENSORS.items()
+            }
+    assert refused > 0.9 * len(whole)
+
+
+@pytest.mark.parametrize(
+    ("metadata", "reason"),
+    [
+        (None, "not a file of"),
+        ({"format": "pt"}, "not a file of"),
+        ({"format": FORMAT, "schema_version": "2"}, "version 2"),
+        ({"format": FORMAT, "schema_version": SCHEMA_VERSION}, "digest"),
+        ({"format": FORMAT, "schema_version": SCHEMA_VERSION, "sha256": "0" * 64}, "digest"),
+    ],
+)
+def test_foreign_metadata_is_refused(
+    tmp_path: Path, metadata: dict[str, str] | None, reason: str
+) -> None:
+    path = tmp_path / "weights.safetensors"
+    save_file({"a": torch.ones(2)}, path, metadata)
+    assert reason in refusal(path)
+
+
+def test_digest_covers_names_and_shapes(file: Path) -> None:
+    from safetensors import safe_open
+
+    with safe_open(file, "pt") as opened:
+        metadata = opened.metadata()
+    tensors = load(file.read_bytes())
+    tensors["actor.weights"] = tensors.pop("actor.weight")
+    file.write_bytes(save(tensors, metadata))
+    assert "digest" in refusal(file)
+    tensors["actor.weight"] = tensors.pop("actor.weights").reshape(3, 4)
+    file.write_bytes(save(tensors, metadata))
+    assert "digest" in refusal(file)
+
+
+def test_other_files_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "weights.safetensors"
+    refusal(path)
+    path.write_bytes(pickle.dumps({"a": 1}))
+    refusal(path)
+    path.unlink()
+    path.mkdir()
+    refusal(path)
+
+
+def test_a_link_is_refused(file: Path) -> None:
+    link = file.with_name("link.safetensors")
+    link.symlink_to(file)
+    assert "plain file" in refusal(link)
