@@ -1,0 +1,31 @@
+"""Evaluation: runs policies, records episodes, and computes figures from the records alone.
+
+It trains nothing and prints nothing.
+"""
+
+from innerattn.evaluate.dispatch import SCRIPTED, scripted_policy
+from innerattn.evaluate.episodes import Policy, Record, View, run_episodes
+from innerattn.evaluate.measure import Evaluation, evaluate_policy, evaluate_run
+from innerattn.evaluate.records import read_records, write_records
+from innerattn.evaluate.statistics import Interval
+from innerattn.evaluate.summary import Figures, Summary
+from innerattn.evaluate.trained import TrainedPolicy, load_trained
+
+__all__ = [
+    "SCRIPTED",
+    "Evaluation",
+    "Figures",
+    "Interval",
+    "Policy",
+    "Record",
+    "Summary",
+    "TrainedPolicy",
+    "View",
+    "evaluate_policy",
+    "evaluate_run",
+    "load_trained",
+    "read_records",
+    "run_episodes",
+    "scripted_policy",
+    "write_records",
+]

@@ -1,0 +1,102 @@
+"""Scripted policies to measure trained ones against: `random`, `greedy` and `hungarian`.
+
+They see the true state of the worlds and plan for all worlds of a batch at once; none learns.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.config import Scenario
+from innerattn.errors import ConfigError
+from innerattn.evaluate.assignment import Needs, assign, pair_costs
+from innerattn.evaluate.episodes import Policy, View
+from innerattn.evaluate.steering import Steering
+
+
+class RandomPolicy:
+    """Every robot draws every action at random, all with the same chance."""
+
+    name = "random"
+
+    def __init__(self, scenario: Scenario, seed: int = 0) -> None:
+        """Take the kind of actions from ``scenario``; ``seed`` fixes the draws."""
+        self._continuous = scenario.actions == "continuous"
+        self._rng = np.random.default_rng(seed)
+
+    def act(self, view: View) -> NDArray[Any]:
+        """See `Policy.act`."""
+        shape = view.positions.shape
+        if self._continuous:
+            return self._rng.uniform(-1.0, 1.0, shape).astype(np.float32)
+        return self._rng.integers(0, 5, shape[:2])
+
+
+class _Dispatcher(ABC):
+    """What both dispatching policies share: every step, targets first and then actions."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Take the team and the tasks from ``scenario``."""
+        self.needs = Needs(scenario)
+        self.steering = Steering(scenario)
+
+    def act(self, view: View) -> NDArray[Any]:
+        """See `Policy.act`; robots without a victim are drawn to the centre."""
+        places = np.stack([view.victims["x"], view.victims["y"]], -1).astype(np.float64)
+        chosen = self.choose(view, places)
+        targets = np.take_along_axis(places, np.maximum(chosen, 0)[..., None], 1)
+        targets = np.where(chosen[..., None] >= 0, targets, 0.0)
+        return self.steering.actions(view.positions, view.velocities, targets)
+
+    @abstractmethod
+    def choose(self, view: View, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The victim slot that each robot goes to (E, R), -1 for none; ``places`` are (E, V, 2)."""
+
+
+class GreedyPolicy(_Dispatcher):
+    """Every robot goes to the nearest victim that it can help, whatever the others do."""
+
+    name = "greedy"
+
+    def choose(self, view: View, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        """See `_Dispatcher.choose`."""
+        helpful = self.needs.permitted(view.victims["present"], view.victims["task"]).any(-1)
+        way = places[:, None] - view.positions[:, :, None]
+        distance = np.where(helpful, (way * way).sum(-1), np.inf)
+        return np.where(helpful.any(-1), distance.argmin(-1), -1)
+
+
+class HungarianPolicy(_Dispatcher):
+    """Robots are assigned to needs at the least total cost in arrival times, anew every step."""
+
+    name = "hungarian"
+
+    def choose(self, view: View, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        """See `_Dispatcher.choose`."""
+        permitted = self.needs.permitted(view.victims["present"], view.victims["task"])
+        times = self.steering.arrival_times(view.positions, view.velocities, places)
+        need = assign(pair_costs(times, permitted))
+        return np.where(need >= 0, need // permitted.shape[-1], -1)
+
+
+SCRIPTED = ("random", "greedy", "hungarian")
+"""Names of the scripted policies."""
+
+
+def scripted_policy(name: str, scenario: Scenario, seed: int = 0) -> Policy:
+    """The scripted policy ``name`` for the team and tasks of ``scenario``.
+
+    Raises:
+        ConfigError: no such policy; the message names the known ones.
+    """
+    if name == "random":
+        return RandomPolicy(scenario, seed)
+    if name == "greedy":
+        return GreedyPolicy(scenario)
+    if name == "hungarian":
+        return HungarianPolicy(scenario)
+    raise ConfigError(f"unknown policy {name!r}: known are {', '.join(SCRIPTED)}")

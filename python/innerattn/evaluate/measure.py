@@ -1,0 +1,134 @@
+"""A whole evaluation: which policies run in which worlds, and what is kept of it.
+
+What the figures mean is computed in `summary`, from the records alone.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from innerattn.config import EvaluateConfig, Scenario
+from innerattn.config.files import write_whole
+from innerattn.evaluate.dispatch import SCRIPTED, scripted_policy
+from innerattn.evaluate.episodes import FIELDS, Policy, Record, run_episodes
+from innerattn.evaluate.records import write_records
+from innerattn.evaluate.summary import Summary, summarise
+from innerattn.evaluate.trained import load_trained
+from innerattn.train.build import thread_count, torch_threads
+
+ProgressCall = Callable[[int, int], None]
+"""Called with the episodes done and the episodes to do."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The figures of an evaluation and the records they come from."""
+
+    summary: Summary
+    records: tuple[Record, ...]
+
+    def write(self, folder: str | Path) -> None:
+        """Write ``summary.json`` and the records into ``folder``, which is made if needed.
+
+        Raises:
+            OSError: the files cannot be written.
+        """
+        write_records(self.records, Path(folder))
+        text = json.dumps(self.summary.to_json(), indent=1, allow_nan=False)
+        write_whole(Path(folder) / "summary.json", f"{text}\n".encode())
+
+
+def evaluate_policy(
+    policy: Policy,
+    scenario: Scenario,
+    settings: EvaluateConfig,
+    *,
+    label: str | None = None,
+    num_threads: int | None = None,
+    progress: ProgressCall | None = None,
+) -> Evaluation:
+    """Measure a policy against the scripted ones, all in the same worlds.
+
+    The first `settings.episodes` of the scored episodes are recorded step by step.
+
+    Args:
+        policy: what is measured.
+        scenario: the worlds.
+        settings: how many episodes, how long, and the seed.
+        label: what the policy was asked for as; none: its name.
+        num_threads: threads that step the worlds; none: all cores.
+        progress: called each time some episodes are done.
+    """
+    names = dict.fromkeys((policy.name, *SCRIPTED))
+    scored = max(settings.score_episodes, settings.episodes)
+    total = (scored + settings.long_episodes) * len(names)
+    done = 0
+
+    def count(episodes: int) -> None:
+        nonlocal done
+        done += episodes
+        if progress is not None:
+            progress(done, total)
+
+    def run(
+        chosen: Policy, worlds: Scenario, episodes: int, first: int, record: tuple[str, ...]
+    ) -> Record:
+        return run_episodes(
+            chosen,
+            worlds,
+            episodes,
+            settings.seed,
+            first_episode=first,
+            record=record,
+            num_threads=num_threads,
+            progress=count,
+        )
+
+    long_worlds = scenario.replace(episode_steps=settings.long_episode_steps)
+    recorded = run(policy, scenario, settings.episodes, 0, FIELDS)
+    standard, long = {policy.name: [recorded]}, {}
+    if scored > settings.episodes:
+        rest = run(policy, scenario, scored - settings.episodes, settings.episodes, ())
+        standard[policy.name].append(rest)
+    for name in names:
+        chosen = policy if name == policy.name else scripted_policy(name, scenario, settings.seed)
+        if chosen is not policy:
+            standard[name] = [run(chosen, scenario, scored, 0, ())]
+        long[name] = [run(chosen, long_worlds, settings.long_episodes, 0, ())]
+    parts = [record for group in (standard, long) for all_ in group.values() for record in all_]
+    return Evaluation(summarise(label or policy.name, recorded, standard, long), tuple(parts))
+
+
+def evaluate_run(
+    run: str | Path,
+    *,
+    scenario: Scenario | None = None,
+    settings: EvaluateConfig | None = None,
+    progress: ProgressCall | None = None,
+) -> Evaluation:
+    """Measure a run's policy.
+
+    Args:
+        run: the run folder; nothing is written into it.
+        scenario: the worlds; none: those of training.
+        settings: how to measure; none: as the run's configuration says.
+        progress: called each time some episodes are done.
+
+    Raises:
+        RunError: there is no readable run at ``run``, or its policy does not fit ``scenario``.
+        ConfigError: its configuration is not valid.
+    """
+    greedy = settings.greedy_actions if settings else None
+    config, policy = load_trained(run, scenario, greedy=greedy)
+    with torch_threads(thread_count(config)):
+        return evaluate_policy(
+            policy,
+            scenario or config.scenario,
+            settings or config.evaluate,
+            label=Path(run).resolve().name,
+            num_threads=config.train.threads,
+            progress=progress,
+        )

@@ -1,0 +1,107 @@
+"""Means with intervals, by a bootstrap over whole episodes; it knows nothing of what is averaged.
+
+Rescues within an episode depend on each other, episodes do not, so episodes are what is resampled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_RESAMPLES = 4000
+_CHUNK = 2**21  # indices drawn at once, 16 MB
+_LOW, _HIGH = 2.5, 97.5
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A mean, or a ratio of means, and its 95 % percentile-bootstrap interval."""
+
+    mean: float
+    low: float
+    high: float
+
+
+def mean_interval(values: ArrayLike, seed: int) -> Interval:
+    """The mean over episodes.
+
+    Args:
+        values: (n,) one value per episode, n >= 1.
+        seed: seed of the resampling.
+
+    Raises:
+        ValueError: there are no values.
+    """
+    columns = _columns(values)
+    means = resampled_means(columns, seed)[:, 0]
+    return _interval(columns[:, 0].mean(), means)
+
+
+def score_interval(
+    method: ArrayLike, random: ArrayLike, hungarian: ArrayLike, seed: int
+) -> Interval | None:
+    """How far a method is from random play (0) to scripted dispatch (1).
+
+    ``(mean(method) - mean(random)) / (mean(hungarian) - mean(random))``; the three are paired:
+    value e of each comes from the same world, and a resample takes the same worlds for all.
+
+    Args:
+        method: (n,) rescues by episode.
+        random: (n,) rescues by episode of the random policy.
+        hungarian: (n,) rescues by episode of the hungarian policy.
+        seed: seed of the resampling.
+
+    Returns:
+        The score; None where dispatch is not above random play in every resample, since the ratio
+        then means nothing.
+
+    Raises:
+        ValueError: there are no values, or their numbers differ.
+    """
+    columns = _columns(method, random, hungarian)
+    resampled = resampled_means(columns, seed)
+    numerator = resampled[:, 0] - resampled[:, 1]
+    denominator = resampled[:, 2] - resampled[:, 1]
+    m, r, h = columns.mean(0)
+    if h <= r or denominator.min() <= 0.0:
+        return None
+    return _interval((m - r) / (h - r), numerator / denominator)
+
+
+def resampled_means(
+    columns: NDArray[np.float64], seed: int, resamples: int = _RESAMPLES
+) -> NDArray[np.float64]:
+    """Means of resampled rows; a row is drawn as a whole, so columns stay paired.
+
+    Args:
+        columns: (n, C) one row per episode.
+        seed: seed of the resampling.
+        resamples: how many.
+
+    Returns:
+        (resamples, C) float64.
+    """
+    n = len(columns)
+    rng = np.random.default_rng(seed)
+    means = np.empty((resamples, columns.shape[1]))
+    step = max(1, _CHUNK // n)
+    for start in range(0, resamples, step):
+        rows = rng.integers(0, n, (min(step, resamples - start), n))
+        for column, values in enumerate(columns.T):
+            means[start : start + step, column] = values[rows].mean(1)
+    return means
+
+
+def _columns(*values: ArrayLike) -> NDArray[np.float64]:
+    arrays = [np.asarray(value, np.float64) for value in values]
+    shapes = {array.shape for array in arrays}
+    if len(shapes) != 1 or arrays[0].ndim != 1 or not arrays[0].size:
+        raise ValueError(f"values of shapes {sorted(shapes)}: must be (n,) for one n >= 1")
+    return np.stack(arrays, 1)
+
+
+def _interval(mean: float, resampled: NDArray[np.float64]) -> Interval:
+    low, high = np.percentile(resampled, (_LOW, _HIGH))
+    return Interval(float(mean), float(low), float(high))

@@ -1,0 +1,99 @@
+"""How a robot moves: when it can be somewhere, and which action brings it there.
+
+It follows the world's law of motion without contacts: each control period starts with
+v <- clip((1 - damping) v + F/m dt u, max_speed), and then p <- p + v dt.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.config import Scenario
+
+Array = NDArray[np.float64]
+
+NEVER_S = 1e4
+"""Arrival time of a robot that cannot move [s]; longer than any episode takes."""
+
+_DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], dtype=np.float64)
+_ENOUGH_PERIODS = 200  # by then a robot drives at its final speed, or the lag no longer matters
+
+
+class Steering:
+    """The motion of one team.
+
+    Attributes:
+        speed: (R,) float64 final speed at full drive [m/s].
+        lag: (R,) float64 time that a start from rest costs against that speed [s].
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Take speeds, masses and forces from ``scenario``."""
+        robots = scenario.robots
+        self._dt = scenario.dt_s
+        self._keep = 1.0 - scenario.damping
+        self._radius = scenario.rescue_radius_m
+        self._limit = np.array([robot.max_speed_mps for robot in robots])
+        self._push = np.array([robot.drive_force_n / robot.mass_kg for robot in robots]) * self._dt
+        self._continuous = scenario.actions == "continuous"
+        speeds = np.zeros((_ENOUGH_PERIODS, len(robots)))
+        for period in range(1, _ENOUGH_PERIODS + 1):
+            before = speeds[period - 2] if period > 1 else 0.0
+            speeds[period - 1] = np.minimum(self._keep * before + self._push, self._limit)
+        self.speed: Array = speeds[-1]
+        shortfall = 1.0 - speeds / np.maximum(self.speed, 1e-12)
+        self.lag: Array = np.where(self.speed > 0.0, shortfall.sum(0) * self._dt, 0.0)
+
+    def arrival_times(self, positions: Any, velocities: Any, places: Any) -> Array:
+        """Estimated time until each robot is within the rescue radius of each place.
+
+        The way at final speed, and the part of the lag that the present velocity has not made up
+        for already.
+
+        Args:
+            positions: (E, R, 2) [m].
+            velocities: (E, R, 2) [m/s].
+            places: (E, V, 2) [m].
+
+        Returns:
+            (E, R, V) float64 [s]; 0 for a robot that is there, at most `NEVER_S`.
+        """
+        way = np.asarray(places, np.float64)[:, None] - np.asarray(positions)[:, :, None]
+        distance = np.sqrt((way * way).sum(-1))
+        gap = np.maximum(distance - self._radius, 0.0)
+        towards = (way * np.asarray(velocities)[:, :, None]).sum(-1) / np.maximum(distance, 1e-9)
+        speed = np.maximum(self.speed, 1e-9)[:, None]
+        times = gap / speed + np.maximum(self.lag[:, None] * (1.0 - towards / speed), 0.0)
+        return np.where(gap > 0.0, np.minimum(times, NEVER_S), 0.0)
+
+    def actions(self, positions: Any, velocities: Any, targets: Any) -> NDArray[Any]:
+        """Drive every robot to its target and let it come to rest there.
+
+        The action chosen is the one after which, coasting for one period more, the robot is
+        nearest to its target. Looking so little ahead it drives at full speed until the target is
+        two periods away; looking further it would brake where braking is not needed.
+
+        Args:
+            positions: (E, R, 2) [m].
+            velocities: (E, R, 2) [m/s].
+            targets: (E, R, 2) [m].
+
+        Returns:
+            (E, R) int64, or (E, R, 2) float32 in [-1, 1] where actions are continuous.
+        """
+        way = np.asarray(targets, np.float64) - positions
+        kept = self._keep * np.asarray(velocities, np.float64)
+        reach = self._dt * (1.0 + self._keep)
+        if self._continuous:
+            wish = (way / reach - kept) / np.maximum(self._push, 1e-12)[:, None]
+            length = np.sqrt((wish * wish).sum(-1, keepdims=True))
+            return np.asarray(wish / np.maximum(length, 1.0), np.float32)
+        drives = _DIRECTIONS[:, None] * self._push[:, None]
+        after = kept[:, :, None] + drives.transpose(1, 0, 2)
+        speed = np.sqrt((after * after).sum(-1, keepdims=True))
+        after *= np.minimum(1.0, self._limit[:, None, None] / np.maximum(speed, 1e-12))
+        miss = way[:, :, None] - reach * after
+        return np.asarray((miss * miss).sum(-1).argmin(-1))

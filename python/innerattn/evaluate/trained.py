@@ -1,0 +1,70 @@
+"""A trained run as a policy that can be evaluated; it trains nothing."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from innerattn.config import RunConfig, Scenario
+from innerattn.envs import BatchEnv
+from innerattn.errors import RunError
+from innerattn.evaluate.episodes import View
+from innerattn.learn.types import Learner
+from innerattn.train import load_policy
+
+
+class TrainedPolicy:
+    """Acts as a learner does, by drawing actions or by taking the likeliest."""
+
+    def __init__(self, learner: Learner, name: str, *, greedy: bool = False) -> None:
+        """Wrap ``learner``; ``greedy`` takes the likeliest actions."""
+        self.name = name
+        self._learner = learner
+        self._greedy = greedy
+
+    def act(self, view: View) -> NDArray[Any]:
+        """See `Policy.act`."""
+        actions = self._learner.act(torch.tensor(view.obs), greedy=self._greedy)
+        return np.asarray(actions.numpy())
+
+    def attention(self, view: View, actions: NDArray[Any]) -> NDArray[np.float32]:
+        """See `Attentive.attention`."""
+        weights = self._learner.attention(torch.tensor(view.obs), torch.tensor(actions))
+        return np.asarray(weights.numpy())
+
+
+def load_trained(
+    run: str | Path, scenario: Scenario | None = None, *, greedy: bool | None = None
+) -> tuple[RunConfig, TrainedPolicy]:
+    """The configuration of a run and its policy with the newest weights.
+
+    Args:
+        run: the run folder.
+        scenario: the worlds it is to act in; none: those it was trained in.
+        greedy: take the likeliest actions; none: as the configuration says.
+
+    Raises:
+        RunError: there is no readable run at ``run``, or its robots do not see in ``scenario`` what
+            they saw in training.
+        ConfigError: its configuration is not valid.
+    """
+    config, learner = load_policy(run)
+    if scenario is not None and _seen(scenario) != _seen(config.scenario):
+        raise RunError(
+            f"{run}: was trained for other observations than these worlds give "
+            f"(another team, other tasks or another number of victims; "
+            f"situation {config.scenario.situation!r} there, {scenario.situation!r} here)"
+        )
+    greedy = config.evaluate.greedy_actions if greedy is None else greedy
+    return config, TrainedPolicy(learner, config.train.method, greedy=greedy)
+
+
+def _seen(scenario: Scenario) -> tuple[int, int, list[str]]:
+    """Number of robots, number of actions and the columns of an observation."""
+    with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
+        return env.num_robots, env.num_actions, env.observation_names()

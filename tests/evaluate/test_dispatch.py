@@ -1,0 +1,114 @@
+"""Scripted policies: by hand in worlds of one's own making, and by their success in real ones."""
+
+import numpy as np
+import pytest
+from innerattn.config import Scenario
+from innerattn.errors import ConfigError
+from innerattn.evaluate.dispatch import (
+    SCRIPTED,
+    GreedyPolicy,
+    HungarianPolicy,
+    RandomPolicy,
+    scripted_policy,
+)
+from innerattn.evaluate.episodes import View, run_episodes
+
+VICTIM = np.dtype([("present", "?"), ("task", "i8"), ("x", "f4"), ("y", "f4")])
+
+
+def view(positions: list, victims: list) -> View:
+    """One world at rest; a victim is (task, x, y), or None for an empty slot."""
+    table = np.array([(v and (True, *v)) or (False, 0, 0, 0) for v in victims], VICTIM)[None]
+    places = np.asarray([positions], np.float32)
+    return View(np.zeros((1, 4, 1), np.float32), places, np.zeros_like(places), table)
+
+
+def chosen(policy: GreedyPolicy | HungarianPolicy, seen: View) -> list[int]:
+    places = np.stack([seen.victims["x"], seen.victims["y"]], -1).astype(np.float64)
+    return policy.choose(seen, places)[0].tolist()
+
+
+DOUBLE = Scenario.preset("double")
+NEAR_THE_FIRST = view([(0, 0), (-0.1, 0), (0.8, 0), (0.5, 0.5)], [(0, 0.3, 0), (1, 0.9, 0)])
+
+
+def test_greedy_sends_both_food_robots_to_the_nearest() -> None:
+    assert chosen(GreedyPolicy(DOUBLE), NEAR_THE_FIRST) == [0, 0, 1, 0]
+
+
+def test_hungarian_shares_the_work() -> None:
+    assert chosen(HungarianPolicy(DOUBLE), NEAR_THE_FIRST) == [1, 0, 1, 0]
+
+
+def test_the_later_arrival_decides() -> None:
+    # food_0 is nearest to victim 0, but its medic is far away: food_1 is there in time as well.
+    seen = view([(0, 0), (-0.3, 0), (0.9, 0), (-0.9, -0.9)], [(0, -0.05, 0), (1, 0.8, 0)])
+    assert chosen(HungarianPolicy(DOUBLE), seen) == [1, 0, 1, 0]
+
+
+def test_nobody_goes_where_nobody_is() -> None:
+    mixed = Scenario.preset("mixed")
+    seen = view([(0.5, 0.5), (-0.5, 0), (0.5, -0.5), (0, 0.5)], [None, (0, -0.5, 0.5)])
+    assert chosen(HungarianPolicy(mixed), seen) == [-1, 1, -1, 1]
+    assert chosen(GreedyPolicy(mixed), seen) == [1, 1, -1, 1]
+    # navigation_0 stands at (0.5, -0.5) and is drawn to the centre: -x or +y.
+    for policy in (HungarianPolicy(mixed), GreedyPolicy(mixed)):
+        assert policy.act(seen)[0, 2] in (2, 3)
+
+
+def test_random_actions_are_even_and_seeded() -> None:
+    seen = view([(0, 0)] * 4, [(0, 0, 0)])
+    seen = View(*(np.repeat(part, 5000, 0) for part in seen))
+    actions = RandomPolicy(DOUBLE, seed=1).act(seen)
+    assert actions.shape == (5000, 4)
+    counts = np.bincount(actions.ravel(), minlength=5)
+    assert np.all(np.abs(counts - 4000) < 5 * np.sqrt(4000))
+    np.testing.assert_array_equal(actions, RandomPolicy(DOUBLE, seed=1).act(seen))
+    assert not np.array_equal(actions, RandomPolicy(DOUBLE, seed=2).act(seen))
+
+
+def test_an_unknown_name_is_refused() -> None:
+    with pytest.raises(ConfigError, match="'oracle': known are random, greedy, hungarian"):
+        scripted_policy("oracle", DOUBLE)
+
+
+@pytest.mark.parametrize(
+    ("situation", "greedy", "hungarian"),
+    [("single", 2.1, 2.5), ("double", 3.5, 4.3), ("mixed", 2.3, 2.95)],
+)
+def test_dispatch_is_strong(situation: str, greedy: float, hungarian: float) -> None:
+    scenario = Scenario.preset(situation)
+    rescues = {}
+    for name in SCRIPTED:
+        policy = scripted_policy(name, scenario)
+        assert policy.name == name
+        record = run_episodes(policy, scenario, 400, seed=5, num_threads=1)
+        rescues[name] = record.rescue_counts().mean()
+    assert rescues["random"] < 0.1
+    assert greedy < rescues["greedy"] < rescues["hungarian"]
+    assert rescues["hungarian"] > hungarian
+
+
+def test_continuous_worlds_are_served_as_well() -> None:
+    scenario = Scenario.preset("double").replace(actions="continuous")
+    rescues = [
+        run_episodes(scripted_policy(name, scenario), scenario, 100, 5).rescue_counts().mean()
+        for name in SCRIPTED
+    ]
+    assert rescues[0] < 0.3
+    assert rescues[0] < 3 < rescues[1] < rescues[2]
+
+
+def test_a_large_team_is_served_world_by_world() -> None:
+    small = Scenario.preset("mixed")
+    robots = [
+        {**robot.model_dump(), "name": f"{robot.name}_{k}", "radius_m": 0.02}
+        for k in range(3)
+        for robot in small.robots
+    ]
+    scenario = small.replace(robots=robots, max_victims=6)
+    few, many = (
+        run_episodes(HungarianPolicy(worlds), worlds, 20, 5).rescue_counts().mean()
+        for worlds in (small, scenario)
+    )
+    assert many > 2 * few

@@ -1,0 +1,81 @@
+"""Intervals against the whole bootstrap distribution, a plain loop and the normal limit."""
+
+import itertools
+
+import numpy as np
+import pytest
+from innerattn.evaluate.statistics import mean_interval, resampled_means, score_interval
+
+
+def test_resampling_against_every_possible_resample() -> None:
+    values = np.array([0.0, 1.0, 5.0, 2.0])
+    every = np.array([np.mean(rows) for rows in itertools.product(values, repeat=4)])
+    drawn = resampled_means(values[:, None], seed=0, resamples=200_000)[:, 0]
+    assert drawn.mean() == pytest.approx(every.mean(), abs=0.01)
+    assert drawn.std() == pytest.approx(every.std(), rel=0.01)
+    grid = np.unique(every)
+    for value in grid:  # the distribution functions agree to the Monte-Carlo error
+        assert np.mean(drawn <= value + 1e-9) == pytest.approx(
+            np.mean(every <= value + 1e-9), abs=0.006
+        )
+
+
+def test_interval_of_a_large_sample_is_the_normal_one() -> None:
+    values = np.random.default_rng(0).poisson(3, 4000)
+    interval = mean_interval(values, seed=1)
+    half = 1.96 * values.std() / np.sqrt(len(values))
+    assert interval.mean == pytest.approx(values.mean())
+    assert interval.low == pytest.approx(values.mean() - half, abs=0.1 * half)
+    assert interval.high == pytest.approx(values.mean() + half, abs=0.1 * half)
+
+
+def test_columns_stay_paired() -> None:
+    columns = np.random.default_rng(0).normal(size=(50, 1)) * [1.0, -2.0] + [0.0, 3.0]
+    means = resampled_means(columns, seed=0)
+    np.testing.assert_allclose(means[:, 1], 3.0 - 2.0 * means[:, 0], atol=1e-12)
+
+
+def test_score_against_a_plain_loop() -> None:
+    rng = np.random.default_rng(2)
+    method, random, hungarian = rng.poisson([[2.0], [0.2], [3.0]], (3, 300)).astype(float)
+    score = score_interval(method, random, hungarian, seed=3)
+    assert score is not None
+    assert score.mean == pytest.approx(
+        (method.mean() - random.mean()) / (hungarian.mean() - random.mean())
+    )
+    ratios = []
+    for _ in range(3000):
+        rows = rng.integers(0, 300, 300)
+        m, r, h = method[rows].mean(), random[rows].mean(), hungarian[rows].mean()
+        ratios.append((m - r) / (h - r))
+    low, high = np.percentile(ratios, [2.5, 97.5])
+    assert score.low == pytest.approx(low, abs=0.1 * (high - low))
+    assert score.high == pytest.approx(high, abs=0.1 * (high - low))
+
+
+def test_score_of_the_scripted_policies_is_exact() -> None:
+    rng = np.random.default_rng(4)
+    random, hungarian = rng.poisson([[0.2], [3.0]], (2, 200))
+    for method, value in ((random, 0.0), (hungarian, 1.0)):
+        score = score_interval(method, random, hungarian, seed=0)
+        assert score is not None
+        assert (score.mean, score.low, score.high) == (value, value, value)
+
+
+def test_no_score_where_dispatch_is_no_better_than_chance() -> None:
+    assert score_interval([1, 2], [1, 1], [1, 1], seed=0) is None
+    assert score_interval([1, 2, 0], [0, 0, 0], [0, 0, 1], seed=0) is None
+
+
+def test_seeds() -> None:
+    values = np.arange(30.0)
+    assert mean_interval(values, 1) == mean_interval(values, 1)
+    assert mean_interval(values, 1) != mean_interval(values, 2)
+
+
+@pytest.mark.parametrize("values", [[], [[1.0]], 3.0])
+def test_what_is_not_a_sample_is_refused(values: object) -> None:
+    with pytest.raises(ValueError, match="must be"):
+        mean_interval(values, 0)
+    with pytest.raises(ValueError, match="must be"):
+        score_interval([1.0], [1.0, 2.0], [1.0], 0)
