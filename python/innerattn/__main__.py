@@ -1,0 +1,7 @@
+"""`python -m innerattn`: the same as the command `innerattn`."""
+
+import sys
+
+from innerattn.cli.main import main
+
+sys.exit(main())

@@ -1,0 +1,100 @@
+"""`innerattn evaluate`: measures a trained or scripted policy and shows or writes the figures."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+from rich.console import Console
+
+from innerattn.cli.options import Command
+from innerattn.cli.progress import Evaluating
+from innerattn.cli.tables import print_summary
+from innerattn.config import EvaluateConfig, Scenario, read_toml
+from innerattn.config.files import write_whole
+from innerattn.errors import RunError
+
+if TYPE_CHECKING:
+    from innerattn.evaluate import Evaluation
+
+
+@dataclass(kw_only=True)
+class Evaluate(Command):
+    """Measure a trained or scripted policy."""
+
+    policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
+    """A run's folder, or one of random, greedy, hungarian."""
+    situation: Literal["single", "double", "mixed"] | None = None
+    """Situation to measure in; None: that of the run, or mixed."""
+    episode_steps: int | None = None
+    """Length of an episode [control steps]; None: that of the run, or 25."""
+    episodes: int | None = None
+    """Episodes that cooperation and attention are taken from; None: as the run says, or 80."""
+    score_episodes: int | None = None
+    """Episodes that rescues are averaged over, at least --episodes; None: as the run says, or
+    1000."""
+    long_episodes: int | None = None
+    """Episodes of the second length, 100 control steps; None: as the run says, or 200."""
+    seed: int | None = None
+    """Seed of the worlds; None: as the run says, or 12345."""
+    json: Path | None = None
+    """Write the figures to this file too; - for standard output, and nothing else there."""
+
+    def run(self) -> None:
+        """Measure, print, write.
+
+        Raises:
+            InnerattnError: no such run or policy, or wrong options.
+            OSError: the figures cannot be written.
+        """
+        if self.json is not None and not self.json.parent.is_dir():
+            raise RunError(f"{self.json.parent}: no such folder")
+        evaluation = self._measure()
+        document = json.dumps(evaluation.summary.to_json(), indent=1, allow_nan=False)
+        if self.json == Path("-"):
+            print(document)
+            return
+        print_summary(
+            Console(markup=False, highlight=False),
+            evaluation.summary,
+            evaluation.records[0].scenario,
+        )
+        if self.json is not None:
+            write_whole(self.json, f"{document}\n".encode())
+
+    def _measure(self) -> Evaluation:
+        from innerattn.evaluate import SCRIPTED, evaluate_policy, evaluate_run, scripted_policy
+        from innerattn.train import read_info
+
+        if self.policy in SCRIPTED:
+            scenario = self._worlds(Scenario.preset("mixed"))
+            settings = self._settings(EvaluateConfig())
+            chosen = scripted_policy(self.policy, scenario, settings.seed)
+            with Evaluating() as progress:
+                return evaluate_policy(chosen, scenario, settings, progress=progress)
+        if not Path(self.policy).exists():
+            raise RunError(
+                f"{self.policy}: neither a run's folder nor one of {', '.join(SCRIPTED)}"
+            )
+        read_info(self.policy)
+        config = read_toml(Path(self.policy) / "config.toml")
+        scenario, settings = self._worlds(config.scenario), self._settings(config.evaluate)
+        with Evaluating() as progress:
+            return evaluate_run(
+                self.policy, scenario=scenario, settings=settings, progress=progress
+            )
+
+    def _worlds(self, scenario: Scenario) -> Scenario:
+        return scenario.replace(**self._given("situation", "episode_steps"))
+
+    def _settings(self, settings: EvaluateConfig) -> EvaluateConfig:
+        names = ("episodes", "score_episodes", "long_episodes", "seed")
+        return settings.replace(**self._given(*names))
+
+    def _given(self, *names: str) -> dict[str, object]:
+        """The options among ``names`` that were given."""
+        values = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in values.items() if value is not None}

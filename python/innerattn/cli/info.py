@@ -1,0 +1,62 @@
+"""`innerattn info`: what is installed, and whether a scenario file is valid."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import tomli_w
+
+from innerattn.cli.options import Command
+from innerattn.config import BUDGETS, SCENARIOS, Scenario
+
+_PACKAGES = ("torch", "numpy", "pydantic", "pettingzoo")
+
+
+@dataclass(kw_only=True)
+class Info(Command):
+    """Show versions, threads, device and presets, or check a scenario file."""
+
+    scenario: Path | None = None
+    """TOML file with a scenario: check it and print it with all defaults."""
+
+    def run(self) -> None:
+        """Print the answer.
+
+        Raises:
+            ConfigError: the scenario file is not valid.
+        """
+        if self.scenario is not None:
+            scenario = Scenario.from_toml(self.scenario)
+            print(tomli_w.dumps(scenario.model_dump(exclude_none=True)), end="")
+            return
+        rows = {"innerattn": _version("innerattn"), "python": platform.python_version()}
+        rows |= {name: _version(name) for name in _PACKAGES}
+        rows["threads"] = str(len(os.sched_getaffinity(0)))
+        rows["device"] = _device()
+        rows["presets"] = ", ".join(SCENARIOS)
+        rows["budgets"] = ", ".join(BUDGETS)
+        for name, value in rows.items():
+            print(f"{name:<11}{value}")
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def _device() -> str:
+    """The fastest device; torch, slow to load, is asked only where there is a CUDA driver."""
+    try:
+        ctypes.CDLL("libcuda.so.1")
+    except OSError:
+        return "cpu"
+    import torch
+
+    return f"cuda ({torch.cuda.get_device_name()})" if torch.cuda.is_available() else "cpu"

@@ -1,0 +1,76 @@
+"""From the configuration's models to command-line options, one option per key.
+
+It checks no value: the models do, when the options are put back into a configuration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, make_dataclass
+from typing import Annotated, Any
+
+import tyro
+from pydantic import BaseModel
+
+from innerattn.config import RunConfig
+
+_SHORT = ("method", "seed", "device")
+"""Keys of the section `train` that are options by their last word too."""
+
+_FILE_ONLY = frozenset({"scenario.robots", "scenario.tasks", "scenario.obstacles"})
+"""Keys that hold lists of tables, which only a TOML file can say well."""
+
+OptionField = tuple[str, Any, Any]
+"""Name, type and default, as `dataclasses.make_dataclass` takes them."""
+
+
+@dataclass(kw_only=True)
+class Command:
+    """What every command has."""
+
+    debug: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Show where in the program an error arose."""
+
+
+def short_option(name: str, default: object) -> OptionField:
+    """An option for key ``name`` of the section `train`."""
+    info = type(RunConfig().train).model_fields[name]
+    note = tyro.conf.arg(aliases=[f"--train.{name}"], help=info.description)
+    return name, Annotated[info.annotation, note], field(default=default)
+
+
+def run_options(defaults: RunConfig) -> list[OptionField]:
+    """Options for every key of a run, with ``defaults``, as fields of a dataclass for tyro."""
+    options = [short_option(name, getattr(defaults.train, name)) for name in _SHORT]
+    for section in RunConfig.model_fields:
+        kind: Any = _section_type(section, getattr(defaults, section))
+        options.append((section, kind, field(default_factory=kind)))
+    return options
+
+
+def changed(command: object, defaults: RunConfig) -> dict[str, object]:
+    """The values of a parsed command that differ from ``defaults``, by dotted key."""
+    values = {f"train.{name}": getattr(command, name) for name in _SHORT}
+    for section in RunConfig.model_fields:
+        given = vars(getattr(command, section))
+        values |= {f"{section}.{name}": value for name, value in given.items()}
+    before = defaults.model_dump()
+    return {
+        key: value
+        for key, value in values.items()
+        if value != before[key.split(".")[0]][key.split(".")[1]]
+    }
+
+
+def _section_type(section: str, defaults: BaseModel) -> type:
+    options: list[OptionField] = [
+        (
+            name,
+            Annotated[info.annotation, tyro.conf.arg(help=info.description)],
+            field(default=getattr(defaults, name)),
+        )
+        for name, info in type(defaults).model_fields.items()
+        if f"{section}.{name}" not in _FILE_ONLY and not (section == "train" and name in _SHORT)
+    ]
+    kind = make_dataclass(f"{section.title()}Options", options, kw_only=True)
+    kind.__doc__ = (type(defaults).__doc__ or "").split("\n")[0]
+    return kind

@@ -1,0 +1,121 @@
+"""The tables that an evaluation is shown as; every figure comes from its summary."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from innerattn.config import Scenario
+    from innerattn.evaluate import Figures, Interval, Summary
+
+_KEY = """\
+  random: any action, each with the same chance
+  greedy: each robot to the nearest victim it can help
+  hungarian: robots assigned to victims by arrival time
+  score: 0 plays like random, 1 like hungarian; ± is half the 95 % interval
+"""
+
+
+def print_summary(console: Console, summary: Summary, scenario: Scenario) -> None:
+    """Print what an evaluation found, for a reader who knows the task but not the program.
+
+    Args:
+        console: where to.
+        summary: the figures.
+        scenario: the worlds they were measured in.
+    """
+    console.print(f"\nRescues per episode, situation {summary.situation}", style="bold")
+    console.print(_rescues(summary))
+    console.print(_KEY)
+    if any(summary.cooperation.values()):
+        console.print(
+            f"Who helped where several robots could: rescues in {summary.episodes:,} episodes "
+            f"of {summary.standard.episode_steps} steps",
+            style="bold",
+        )
+        console.print(_cooperation(summary, scenario))
+    if summary.attention_entropy:
+        console.print("Attention entropy of each robot's critic, in nats", style="bold")
+        console.print(_attention(summary))
+        if scenario.num_robots > 2:
+            others = scenario.num_robots - 1
+            console.print(
+                f"  100% is ln {others} = {math.log(others):.2f}: even attention over "
+                f"{others} teammates; less is more selective\n"
+            )
+
+
+def _rescues(summary: Summary) -> Table:
+    lengths = (summary.standard, summary.long)
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("policy")
+    for figures in lengths:
+        table.add_column(f"{figures.episode_steps} steps", justify="right")
+        table.add_column("score", justify="right")
+    for name in summary.standard.scripted:
+        if name != summary.method:
+            cells = [cell for figures in lengths for cell in _scripted_cells(figures, name)]
+            table.add_row(name, *cells)
+    own = [
+        cell
+        for figures in lengths
+        for cell in (_plus_minus(figures.rescues_per_episode), _plus_minus(figures.score))
+    ]
+    scripted = summary.method in summary.standard.scripted
+    table.add_row(summary.method if scripted else f"{summary.method} (trained)", *own, style="bold")
+    table.add_section()
+    table.add_row("episodes", *(cell for f in lengths for cell in (f"{f.episodes:,}", "")))
+    return table
+
+
+def _scripted_cells(figures: Figures, name: str) -> tuple[str, str]:
+    means = {policy: interval.mean for policy, interval in figures.scripted.items()}
+    span = means["hungarian"] - means["random"]
+    score = f"{(means[name] - means['random']) / span:.2f}" if figures.score else "-"
+    return _plus_minus(figures.scripted[name]), score
+
+
+def _plus_minus(interval: Interval | None) -> str:
+    if interval is None:
+        return "-"
+    return f"{interval.mean:.2f} ± {(interval.high - interval.low) / 2:.2f}"
+
+
+def _cooperation(summary: Summary, scenario: Scenario) -> Table:
+    counts = summary.cooperation
+    robots = list(dict.fromkeys(name for of_task in counts.values() for name in of_task))
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("task")
+    for robot in robots:
+        table.add_column(robot, justify="right")
+    for task in scenario.tasks:
+        of_task = counts[task.name]
+        total = sum(of_task.values())
+        cells = [_with_share(of_task[robot], total) if robot in of_task else "" for robot in robots]
+        table.add_row(f"{task.name} ({' + '.join(task.needs)})", *cells)
+    return table
+
+
+def _with_share(count: int, total: int) -> str:
+    return f"{count:,} ({count / total:.0%})" if total else "0"
+
+
+def _attention(summary: Summary) -> Table:
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("robot")
+    heads = len(next(iter(summary.attention_entropy.values())))
+    for head in range(heads):
+        table.add_column(f"head {head + 1}", justify="right")
+    for robot, nats in summary.attention_entropy.items():
+        shares = summary.attention_entropy_share[robot]
+        cells = [
+            f"{value:.2f}" + ("" if share is None else f" ({share:.0%})")
+            for value, share in zip(nats, shares, strict=True)
+        ]
+        table.add_row(robot, *cells)
+    return table

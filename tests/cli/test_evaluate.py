@@ -1,0 +1,95 @@
+"""`innerattn evaluate`: the document, the tables, and what is refused."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from innerattn.cli.main import main
+
+FEW = ["--episodes", "4", "--score-episodes", "6", "--long-episodes", "2"]
+
+
+def document(capsys: pytest.CaptureFixture[str], *options: str) -> dict[str, Any]:
+    """What ``--json -`` prints: the document and nothing else."""
+    assert main(["evaluate", *options, "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert isinstance(found, dict)
+    return found
+
+
+def check_interval(value: dict[str, float]) -> None:
+    assert value.keys() == {"mean", "low", "high"}
+    assert value["low"] <= value["mean"] <= value["high"]
+
+
+@pytest.mark.parametrize("policy", ["random", "greedy", "hungarian"])
+def test_scripted_policies(policy: str, capsys: pytest.CaptureFixture[str]) -> None:
+    found = document(capsys, policy, *FEW, "--situation", "double", "--seed", "5")
+    assert found["schema_version"] == 1
+    assert found["policy"] == found["method"] == policy
+    assert (found["situation"], found["seed"]) == ("double", 5)
+    assert (found["episodes"], found["episode_steps"]) == (4, 25)
+    check_interval(found["rescues_per_episode"])
+    check_interval(found["score"])
+    assert found["cooperation"].keys() == {"task_1", "task_2"}
+    assert all(robots.keys() == {"food_0", "food_1"} for robots in found["cooperation"].values())
+    assert found["attention_entropy"] == {}
+
+
+def test_scripted_policies_frame_the_score(capsys: pytest.CaptureFixture[str]) -> None:
+    assert document(capsys, "random", *FEW)["score"]["mean"] == 0.0
+    assert document(capsys, "hungarian", *FEW)["score"]["mean"] == 1.0
+
+
+def test_a_run_is_measured_as_after_training(
+    run_dir: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = document(capsys, str(run_dir))
+    assert found == json.loads((run_dir / "evaluation" / "summary.json").read_text())
+    assert (found["policy"], found["method"]) == (run_dir.name, "td-inner")
+    assert list(found["attention_entropy"]) == ["food_0", "food_1", "navigation_0", "medical_0"]
+    for heads in found["attention_entropy"].values():
+        assert len(heads) == 2
+        assert all(0.0 <= nats <= math.log(3) + 1e-6 for nats in heads)
+
+
+def test_options_win_over_the_run(run_dir: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--episodes", "3", "--score-episodes", "3", "--episode-steps", "10", "--seed", "1"]
+    found = document(capsys, str(run_dir), *options, "--situation", "double")
+    assert (found["episodes"], found["score_episodes"]) == (3, 3)
+    assert (found["episode_steps"], found["seed"]) == (10, 1)
+    assert found["situation"] == "double"
+    assert found["long"]["episodes"] == 2
+
+
+def test_tables_and_file(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "out.json"
+    assert main(["evaluate", str(run_dir), "--json", str(file)]) == 0
+    printed = capsys.readouterr().out
+    written = json.loads(file.read_text())
+    assert f"{written['scripted']['greedy']['mean']:.2f} ± " in printed
+    assert "td-inner (trained)" in printed
+    assert "task_1 (food + medicine)" in printed
+    assert max(map(len, printed.splitlines())) <= 80
+
+
+def test_wrong_values(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "empty").mkdir()
+    cases = [
+        (["nobody"], "nobody: neither a run's folder nor one of random, greedy, hungarian"),
+        ([str(tmp_path / "empty")], f"{tmp_path / 'empty' / 'run.json'}: missing"),
+        (["random", "--episodes", "0"], "evaluate.episodes = 0: must be greater"),
+        (["random", "--episode-steps", "0"], "scenario.episode_steps = 0: must be"),
+        ([str(run_dir), "--situation", "single"], f"{run_dir}: was trained for other"),
+        (
+            ["random", *FEW, "--json", str(tmp_path / "no" / "x.json")],
+            f"{tmp_path / 'no'}: no such folder",
+        ),
+    ]
+    for options, message in cases:
+        assert main(["evaluate", *options]) == 1
+        err = capsys.readouterr().err
+        assert err.startswith(f"innerattn: error: {message}")
+        assert err.count("\n") == 1

@@ -1,0 +1,58 @@
+"""The bar on a terminal, plain lines elsewhere."""
+
+import io
+
+from innerattn.cli.progress import Evaluating, Training
+from innerattn.train import Progress
+from rich.console import Console
+
+
+def progress(seconds: float, env_steps: int, rescues: float | None = 1.5) -> Progress:
+    return Progress(
+        env_steps=env_steps,
+        total_env_steps=1000,
+        updates=env_steps // 10,
+        seconds=seconds,
+        metrics={"rescues_per_episode": rescues},
+    )
+
+
+def shown(*, terminal: bool, steps: list[Progress]) -> str:
+    """What is shown where the clock is the progress's own."""
+    out = io.StringIO()
+    console = Console(file=out, force_terminal=terminal, width=80, color_system=None)
+    seconds = iter([0.0, *(step.seconds for step in steps)])
+    with Training(console, clock=lambda: next(seconds)) as show:
+        for step in steps:
+            show(step)
+    return out.getvalue()
+
+
+def test_plain_lines_every_ten_seconds() -> None:
+    steps = [progress(float(second), 40 * second) for second in range(1, 26)]
+    assert shown(terminal=False, steps=steps).splitlines() == [
+        "training  40% | 0:15 left | 1.50 rescues/episode | 40 env-steps/s | 4.0 updates/s",
+        "training  80% | 0:05 left | 1.50 rescues/episode | 40 env-steps/s | 4.0 updates/s",
+    ]
+
+
+def test_a_last_batch_may_pass_the_end() -> None:
+    (line,) = shown(terminal=False, steps=[progress(100.0, 1010, None)]).splitlines()
+    assert line.startswith("training 100% | 0:00 left | no episode yet")
+
+
+def test_terminal_shows_a_bar() -> None:
+    text = shown(terminal=True, steps=[progress(90.0, 500)])
+    assert "━" in text
+    assert "50%" in text
+    assert "1:30 left" in text
+    assert "0.6 updates/s" in text  # the whole line fits
+
+
+def test_evaluation_counts_episodes() -> None:
+    out = io.StringIO()
+    seconds = iter([0.0, 5.0, 10.0])
+    with Evaluating(Console(file=out, width=120), clock=lambda: next(seconds)) as show:
+        show(10, 2000)
+        show(500, 2000)
+    assert out.getvalue() == "evaluating  25% | 0:30 left | 500 of 2,000 episodes\n"

@@ -1,0 +1,175 @@
+"""`innerattn train`: options become the run's configuration, and a run ends with its evaluation."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from innerattn.cli.main import main
+from innerattn.cli.progress import Training
+from innerattn.config import RunConfig, load_run_config, read_toml
+from innerattn.errors import RunError
+
+
+def test_a_run_is_complete(run_dir: Path) -> None:
+    assert json.loads((run_dir / "run.json").read_text())["state"] == "done"
+    names = {file.name for file in (run_dir / "evaluation").iterdir()}
+    assert names == {"episodes.parquet", "rescues.parquet", "summary.json"}
+    lines = [json.loads(line) for line in (run_dir / "metrics.jsonl").read_text().splitlines()]
+    assert [line["env_steps"] for line in lines] == [104, 200, 304, 400]
+
+
+def test_options_reach_the_run(run_dir: Path) -> None:
+    config = read_toml(run_dir / "config.toml")
+    expected = load_run_config(
+        overrides={
+            "train.seed": 3,
+            "train.env_steps": 400,
+            "train.num_envs": 8,
+            "train.threads": 1,
+            "train.log_every_env_steps": 100,
+            "td.warmup_env_steps": 64,
+            "td.batch_size": 32,
+            "network.hidden_width": 16,
+            "network.attention_heads": 2,
+            "evaluate.episodes": 4,
+            "evaluate.score_episodes": 6,
+            "evaluate.long_episodes": 2,
+            "evaluate.long_episode_steps": 30,
+        }
+    )
+    assert config == expected
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[RunConfig, Path]]:
+    """What training was asked for; it is noted, and not done."""
+    calls: list[tuple[RunConfig, Path]] = []
+
+    def note(config: RunConfig, run_dir: Path, **_: object) -> None:
+        calls.append((config, run_dir))
+        raise RunError("not done")
+
+    monkeypatch.setattr("innerattn.train.train", note)
+    return calls
+
+
+def config_of(asked: list[tuple[RunConfig, Path]], *options: str) -> tuple[RunConfig, Path]:
+    assert main(["train", *options]) == 1
+    return asked.pop()
+
+
+def test_defaults(asked: list[tuple[RunConfig, Path]]) -> None:
+    config, run_dir = config_of(asked)
+    assert config == load_run_config("mixed", "td-inner", "quick")
+    assert re.fullmatch(r"runs/mixed-td-inner-quick-s0-\d{8}-\d{6}", run_dir.as_posix())
+
+
+def test_sources_and_their_order(asked: list[tuple[RunConfig, Path]], tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        "[train]\nmethod = 'td-uniform'\nseed = 4\n[td]\ngamma = 0.5\nbatch_size = 9\n"
+        "[[scenario.tasks]]\nname = 'only'\nneeds = ['food', 'food']\n"
+    )
+    options = ["--preset", "double", "--budget", "paper", "--config", str(file)]
+    config, run_dir = config_of(asked, *options, "--td.batch_size", "10", "--seed", "5")
+    assert (config.td.learning_rate, config.td.gamma, config.td.batch_size) == (0.001, 0.5, 10)
+    assert (config.train.method, config.network.attention) == ("td-uniform", "uniform")
+    assert [task.name for task in config.scenario.tasks] == ["only"]
+    assert run_dir.name.startswith("double-td-uniform-paper-s5-")
+    config, _ = config_of(asked, *options, "--method", "td-inner")
+    assert (config.train.method, config.network.attention) == ("td-inner", "inner")
+
+
+@pytest.mark.parametrize(
+    ("options", "key", "value"),
+    [
+        (["--train.method", "td-uniform"], "train.method", "td-uniform"),
+        (["--train.seed", "7"], "train.seed", 7),
+        (["--train.device", "cuda:1"], "train.device", "cuda:1"),
+        (["--train.threads", "2"], "train.threads", 2),
+        (["--train.threads", "None"], "train.threads", None),
+        (["--scenario.end-when-rescued", "2"], "scenario.end_when_rescued", 2),
+        (["--scenario.rescue-credit", "team"], "scenario.rescue_credit", "team"),
+        (["--network.mask-unavailable"], "network.mask_unavailable", True),
+        (["--td.learning_rate=1e-4"], "td.learning_rate", 1e-4),
+        (["--evaluate.greedy-actions"], "evaluate.greedy_actions", True),
+    ],
+)
+def test_single_options(
+    asked: list[tuple[RunConfig, Path]], options: list[str], key: str, value: object
+) -> None:
+    config, _ = config_of(asked, *options)
+    section, name = key.split(".")
+    assert getattr(getattr(config, section), name) == value
+
+
+def test_every_key_is_an_option(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["train", "--help"])
+    text = capsys.readouterr().out.replace("_", "-")
+    in_a_file = {"scenario.robots", "scenario.tasks", "scenario.obstacles"}
+    for section, table in load_run_config().model_dump().items():
+        for key in table:
+            offered = f"--{section}.{key.replace('_', '-')} " in text.replace(",", " ")
+            assert offered != (f"{section}.{key}" in in_a_file), f"{section}.{key}"
+
+
+def test_help_shows_the_chosen_defaults(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["train", "--budget", "paper", "--help"])
+    assert "(default: 625000)" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--td.gamma", "2"], "td.gamma = 2.0: must be less than or equal to 1"),
+        (["--network.attention", "uniform"], "network.attention = 'uniform': train.method"),
+        (["--scenario.episode-steps", "0"], "scenario.episode_steps = 0: must be"),
+        (["--config", "none.toml"], "cannot read none.toml"),
+        (["--device", "abacus"], "train.device = 'abacus': not usable here"),
+        (["--scenario.actions", "continuous"], "scenario.actions = 'continuous'"),
+    ],
+)
+def test_what_cannot_be_run_is_one_line(
+    options: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["train", *options]) == 1
+    err = capsys.readouterr().err
+    assert err.startswith(f"innerattn: error: {message}")
+    assert err.count("\n") == 1
+    assert list(tmp_path.glob("runs/*")) == []
+
+
+def test_existing_folder_is_refused(
+    run_dir: Path, tiny: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = {file: file.stat().st_mtime_ns for file in run_dir.rglob("*")}
+    assert main(["train", "--run-dir", str(run_dir), *tiny]) == 1
+    assert f"innerattn: error: {run_dir}: exists already" in capsys.readouterr().err
+    assert {file: file.stat().st_mtime_ns for file in run_dir.rglob("*")} == before
+
+
+def test_interruption_keeps_the_weights(
+    tmp_path: Path,
+    tiny: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Training, "__call__", stop)
+    path = tmp_path / "run"
+    assert main(["train", "--run-dir", str(path), *tiny]) == 130
+    assert str(path) in capsys.readouterr().err
+    assert json.loads((path / "run.json").read_text())["state"] == "interrupted"
+    assert (path / "checkpoints" / "8" / "weights.safetensors").exists()
+    assert tomllib.loads((path / "config.toml").read_text())["train"]["num_envs"] == 8
