@@ -1,0 +1,7 @@
+"""Learners: they act, take in transitions and improve; they know no environment and no file."""
+
+from innerattn.learn.replay import Replay
+from innerattn.learn.td import TD
+from innerattn.learn.types import Learner, Team, Transitions
+
+__all__ = ["TD", "Learner", "Replay", "Team", "Transitions"]

@@ -1,0 +1,82 @@
+"""Targets and losses of the off-policy learner, as pure functions of tensors.
+
+Batches lie last, (R, A, B) or (R, B). A critic's loss and a policy's are means over the batch and
+sums over robots: each robot's own parameters get the gradient of its own loss, whatever the size of
+the team. Source: Iqbal & Sha 2019, sections 3.1-3.3, and their code ("MAAC").
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+
+def taken(x: Tensor, actions: Tensor) -> Tensor:
+    """Pick the (R, B) entries of (R, A, B) that belong to actions (R, B) int64."""
+    return x.gather(1, actions.unsqueeze(1)).squeeze(1)
+
+
+def consistent_target(
+    reward: Tensor, value: Tensor, entropy_term: Tensor, discount: Tensor
+) -> Tensor:
+    """The soft Bellman target y = r + discount (Q' - tau log pi').
+
+    Args:
+        reward: (R, B).
+        value: (R, B) target critic's value of the next action.
+        entropy_term: (R, B) tau log pi of the next action; tau is the temperature.
+        discount: (B,) gamma, or 0 where the episode terminated.
+    """
+    return reward + discount * (value - entropy_term)
+
+
+def maac_target(reward: Tensor, value: Tensor, entropy_term: Tensor, discount: Tensor) -> Tensor:
+    """The target of MAAC's code: y = r + discount Q' - tau log pi', entropy outside the discount.
+
+    Arguments as in `consistent_target`.
+    """
+    return reward + discount * value - entropy_term
+
+
+def critic_loss(q_taken: Tensor, target: Tensor) -> Tensor:
+    """Squared error of the values (R, B) of the actions taken against the target (R, B)."""
+    return (q_taken - target).square().mean(dim=1).sum()
+
+
+def attention_logit_penalty(scores: Tensor, visible: Tensor) -> Tensor:
+    """Mean square of a robot's raw scores over batch and teammates, summed over heads and robots.
+
+    Args:
+        scores: (B, H, R, R) raw scores q_i . k_j.
+        visible: (1 or B, R, R) bool, the pairs that count.
+    """
+    batch, _, robots, _ = scores.shape
+    squares = scores.square() * visible.unsqueeze(1)
+    return squares.sum() / (batch * max(robots - 1, 1))
+
+
+def expected_policy_loss(
+    log_prob: Tensor, q: Tensor, actions: Tensor, temperature: float
+) -> Tensor:
+    """sum_a pi(a) (tau log pi(a) - Q(a)): the exact expectation over the own action.
+
+    Args:
+        log_prob: (R, A, B) log-probabilities of the current policy.
+        q: (R, A, B) values of every own action, without gradient.
+        actions: (R, B) int64 actions drawn from the policy; not needed by this form.
+        temperature: tau.
+    """
+    del actions
+    return (log_prob.exp() * (temperature * log_prob - q)).sum(dim=1).mean(dim=1).sum()
+
+
+def sampled_policy_loss(log_prob: Tensor, q: Tensor, actions: Tensor, temperature: float) -> Tensor:
+    """The loss log pi(a) [tau log pi(a) - (Q(a) - b)] for the drawn a, the bracket constant.
+
+    b = sum_a pi(a) Q(a) is the counterfactual baseline. Arguments as in `expected_policy_loss`.
+    """
+    drawn = taken(log_prob, actions)
+    with torch.no_grad():
+        advantage = taken(q, actions) - (log_prob.exp() * q).sum(dim=1)
+        cost = temperature * drawn - advantage
+    return (drawn * cost).mean(dim=1).sum()

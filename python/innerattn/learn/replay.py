@@ -1,0 +1,122 @@
+"""A ring of past transitions, one contiguous row each, and statistics of the rewards it holds.
+
+It stores and draws; it normalises nothing.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from innerattn.learn.types import Team, Transitions
+
+
+class Replay:
+    """The last `capacity` transitions, drawn uniformly with replacement.
+
+    A row is obs, next_obs, actions, reward, terminated, all float32 (actions are small integers,
+    which float32 holds exactly), so that a batch is one gather of whole rows.
+    """
+
+    def __init__(
+        self, capacity: int, team: Team, seed: int, device: torch.device | None = None
+    ) -> None:
+        """Reserve the memory.
+
+        Args:
+            capacity: Transitions held at most; older ones are overwritten.
+            team: Sizes of the team.
+            seed: Seed of the draws.
+            device: Where rows are held; None: the CPU.
+
+        Raises:
+            ValueError: The capacity is less than 1.
+        """
+        if capacity < 1:
+            raise ValueError(f"capacity = {capacity}: must be at least 1 transition")
+        robots, width = team.num_robots, team.num_robots * team.obs_width
+        self._team = team
+        self._splits = [width, width, robots, robots, 1]
+        self._rows = torch.empty(capacity, sum(self._splits), dtype=torch.float32, device=device)
+        self._reward = slice(2 * width + robots, 2 * width + 2 * robots)
+        self._generator = torch.Generator(self._rows.device).manual_seed(seed)
+        self._start = 0  # where the next row goes
+        self._size = 0
+        self._sum = torch.zeros(robots, dtype=torch.float64, device=device)
+        self._sum_of_squares = torch.zeros_like(self._sum)
+
+    def __len__(self) -> int:
+        """Transitions held."""
+        return self._size
+
+    @property
+    def capacity(self) -> int:
+        """Transitions held at most."""
+        return self._rows.shape[0]
+
+    @property
+    def reward_mean(self) -> Tensor:
+        """(R,) float64, mean reward of each robot over the transitions held; 0 when empty."""
+        return self._sum / max(self._size, 1)
+
+    @property
+    def reward_std(self) -> Tensor:
+        """(R,) float64, its population standard deviation; 0 when empty."""
+        mean_of_squares = self._sum_of_squares / max(self._size, 1)
+        return (mean_of_squares - self.reward_mean.square()).clamp_min(0.0).sqrt()
+
+    def add(self, batch: Transitions) -> None:
+        """Take in transitions, oldest first; of more than `capacity` only the last are kept.
+
+        Raises:
+            ValueError: The batch is of another team.
+        """
+        expected = (self._team.num_robots, self._team.obs_width)
+        if tuple(batch.obs.shape[1:]) != expected:
+            raise ValueError(
+                f"obs of shape {tuple(batch.obs.shape)}: must be (B, R, D) with R, D = {expected}"
+            )
+        terminated = batch.terminated.unsqueeze(1)
+        parts = (batch.obs, batch.next_obs, batch.actions, batch.reward, terminated)
+        rows = torch.cat([part.flatten(1).to(self._rows) for part in parts], dim=1)
+        rows = rows[-self.capacity :]
+        fits = min(len(rows), self.capacity - self._start)
+        self._write(self._start, rows[:fits])
+        self._write(0, rows[fits:])
+        self._start = (self._start + len(rows)) % self.capacity
+
+    def sample(self, batch_size: int) -> Transitions:
+        """Draw transitions, each with equal chance; the same one may come twice.
+
+        Args:
+            batch_size: B.
+
+        Raises:
+            ValueError: Nothing is held.
+        """
+        if not self._size:
+            raise ValueError("replay is empty: add transitions before sampling")
+        device = self._rows.device
+        index = torch.randint(self._size, (batch_size,), generator=self._generator, device=device)
+        rows = self._rows.index_select(0, index)
+        obs, next_obs, actions, reward, terminated = torch.split_with_sizes(
+            rows, self._splits, dim=1
+        )
+        shape = (batch_size, self._team.num_robots, self._team.obs_width)
+        return Transitions(
+            obs.view(shape),
+            actions.to(torch.int64),
+            reward,
+            next_obs.view(shape),
+            terminated.squeeze(1) > 0.5,
+        )
+
+    def _write(self, start: int, rows: Tensor) -> None:
+        """Put rows at `start`, where they fit, and keep the statistics true to what is held."""
+        place = self._rows[start : start + len(rows)]
+        replaced = place[: max(0, self._size - start), self._reward].double()
+        added = rows[:, self._reward].double()
+        self._sum += added.sum(0) - replaced.sum(0)
+        self._sum_of_squares += added.square().sum(0) - replaced.square().sum(0)
+        place.copy_(rows)
+        self._size = max(self._size, start + len(rows))

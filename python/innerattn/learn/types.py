@@ -1,0 +1,94 @@
+"""The data that a learner exchanges with whatever drives it, and the contract it keeps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+from torch import Tensor
+
+
+class Team(NamedTuple):
+    """Sizes of a team.
+
+    Attributes:
+        num_robots: R.
+        obs_width: D, columns of one robot's observation.
+        num_actions: A, discrete actions of one robot.
+    """
+
+    num_robots: int
+    obs_width: int
+    num_actions: int
+
+
+class Transitions(NamedTuple):
+    """B transitions of the whole team.
+
+    Attributes:
+        obs: (B, R, D) float32.
+        actions: (B, R) int64.
+        reward: (B, R) float32.
+        next_obs: (B, R, D) float32, the observation after the step, before any reset.
+        terminated: (B,) bool; a time limit is not a termination.
+    """
+
+    obs: Tensor
+    actions: Tensor
+    reward: Tensor
+    next_obs: Tensor
+    terminated: Tensor
+
+
+class Learner(Protocol):
+    """A policy that improves from what it is shown."""
+
+    def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
+        """Choose actions.
+
+        Args:
+            obs: (E, R, D) float32.
+            greedy: Take the likeliest action instead of drawing one.
+
+        Returns:
+            (E, R) int64, on the device of `obs`.
+        """
+
+    def observe(self, batch: Transitions, truncated: Tensor) -> None:
+        """Take in one control step of E worlds.
+
+        Args:
+            batch: The E transitions.
+            truncated: (E,) bool, episodes that a time limit ended.
+        """
+
+    def learn(self) -> dict[str, float] | None:
+        """Do the updates that are due.
+
+        Returns:
+            Means over these updates, by name; None when none was due.
+        """
+
+    @property
+    def updates(self) -> int:
+        """Number of updates done so far."""
+
+    def attention(self, obs: Tensor, actions: Tensor) -> Tensor:
+        """Attention weights of the critic.
+
+        Args:
+            obs: (B, R, D) float32.
+            actions: (B, R) int64.
+
+        Returns:
+            (B, H, R, R): row i holds robot i's weights over its teammates; the diagonal is 0.
+        """
+
+    def state(self) -> dict[str, Tensor]:
+        """Everything learnt, as copies under flat names."""
+
+    def load(self, state: dict[str, Tensor]) -> None:
+        """Take over what `state` returned.
+
+        Raises:
+            ValueError: A name, shape or dtype is wrong; the learner is left unchanged.
+        """

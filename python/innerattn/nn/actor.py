@@ -1,0 +1,61 @@
+"""The actors: each robot's policy over its own actions from its own observation.
+
+It computes logits and draws actions from them; losses belong to the learner.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from innerattn.nn.linear import PerRobotLinear
+
+
+class Actor(nn.Module):
+    """Policies of all robots, two hidden layers each; nothing is shared between robots."""
+
+    def __init__(
+        self,
+        num_robots: int,
+        obs_width: int,
+        num_actions: int,
+        hidden_width: int,
+        generator: torch.Generator,
+    ) -> None:
+        """Draw the parameters.
+
+        Args:
+            num_robots: R.
+            obs_width: D.
+            num_actions: A.
+            hidden_width: Width of both hidden layers.
+            generator: Source of the initial parameters, on the CPU.
+        """
+        super().__init__()
+        self.first = PerRobotLinear(num_robots, obs_width, hidden_width, generator)
+        self.second = PerRobotLinear(num_robots, hidden_width, hidden_width, generator)
+        self.output = PerRobotLinear(num_robots, hidden_width, num_actions, generator)
+
+    def forward(self, obs: Tensor) -> Tensor:
+        """Map observations (R, B, D) to action logits (R, A, B)."""
+        hidden = functional.leaky_relu_(self.first(obs))
+        hidden = functional.leaky_relu_(self.second(hidden))
+        return self.output.batch_last(hidden)
+
+
+def sample_actions(logits: Tensor, generator: torch.Generator) -> Tensor:
+    """Draw an action of every robot from softmax(logits), by the Gumbel-max trick.
+
+    Args:
+        logits: (R, A, B), normalised or not.
+        generator: Source of the draw, on the same device.
+
+    Returns:
+        (R, B) int64.
+    """
+    noise = torch.empty_like(logits).uniform_(generator=generator)
+    # -log(u) is exponential, and never exactly 0 because u never is 1; an infinite Gumbel would
+    # override even an impossible action. (`exponential_` can return 0, and is slower.)
+    noise.clamp_min_(torch.finfo(noise.dtype).tiny).log_().neg_().log_()
+    return (logits.detach() - noise).max(dim=1).indices  # argmax is many times slower here

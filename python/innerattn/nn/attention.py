@@ -1,0 +1,140 @@
+"""Attention of each robot over its teammates, learnt or uniform, with the same parameters.
+
+Sources: eqs. 2-4 of the paper, read as in Iqbal & Sha 2019, section 3.2: the softmax runs over
+teammates j != i, and the query comes from an encoding without the robot's own action.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from innerattn.nn.linear import uniform_parameter
+
+
+class Attended(NamedTuple):
+    """What attention hands on.
+
+    Attributes:
+        mixed: (R, B, W) x_i, the weighted values of the teammates, heads side by side; zeros for a
+            robot that sees no teammate.
+        weights: (B, H, R, R) weight of robot i (row) on teammate j; rows sum to 1, or to 0 where no
+            teammate is seen; the diagonal is 0.
+        scores: (B, H, R, R) raw scores q_i . k_j, also of pairs that do not see each other; None
+            if nothing is scored.
+        visible: (1 or B, R, R) bool, whether robot i sees teammate j.
+    """
+
+    mixed: Tensor
+    weights: Tensor
+    scores: Tensor | None
+    visible: Tensor
+
+
+def visible_teammates(like: Tensor, available: Tensor | None) -> Tensor:
+    """Which teammates each robot sees: the others, as far as they are available.
+
+    Args:
+        like: (R, B, ...) a tensor whose number of robots and device are taken.
+        available: (B, R) bool, or None where all are.
+
+    Returns:
+        (1 or B, R, R) bool, row i, column j.
+    """
+    num_robots = like.shape[0]
+    others = ~torch.eye(num_robots, dtype=torch.bool, device=like.device).unsqueeze(0)
+    return others if available is None else others & available.unsqueeze(1)
+
+
+class _TeammateAttention(nn.Module):
+    """The parameters that both kinds of attention hold; all are shared by the robots.
+
+    Attributes:
+        query: (W, W), rows h*d..(h+1)*d belong to head h; likewise `key` and `value`.
+        value_bias: (W,).
+    """
+
+    def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
+        """Draw the parameters.
+
+        Args:
+            width: W, width of the encodings and of the mixed values.
+            heads: H, a divisor of the width.
+            generator: Source of the initial parameters, on the CPU.
+
+        Raises:
+            ValueError: The width is not a multiple of the number of heads.
+        """
+        super().__init__()
+        if width % heads:
+            raise ValueError(f"width = {width}: must be a multiple of the {heads} attention heads")
+        self.heads = heads
+        self.query = uniform_parameter((width, width), width, generator)
+        self.key = uniform_parameter((width, width), width, generator)
+        self.value = uniform_parameter((width, width), width, generator)
+        self.value_bias = uniform_parameter((width,), width, generator)
+
+    def _values(self, others: Tensor) -> Tensor:
+        return functional.leaky_relu_(functional.linear(others, self.value, self.value_bias))
+
+
+class InnerAttention(_TeammateAttention):
+    """Learnt attention: alpha_ij = softmax over j != i of q_i . k_j / sqrt(d), per head."""
+
+    def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
+        """Attend to teammates.
+
+        Args:
+            own: (R, B, W) state-only encodings, the source of queries.
+            others: (R, B, W) state-action encodings, the source of keys and values.
+            available: (B, R) bool; an unavailable robot is attended to by none. None: all are.
+        """
+        robots, batch, width = own.shape
+        queries = self._by_head(functional.linear(own, self.query))
+        keys = self._by_head(functional.linear(others, self.key))
+        values = self._by_head(self._values(others))
+        # Teammates before robots: a softmax along the middle dimension of such small matrices is
+        # much faster than one along the last, and no product below needs a copy of its operands.
+        shape = (batch, self.heads, robots, robots)
+        scores = torch.bmm(keys, queries.transpose(1, 2)).view(shape)
+        visible = visible_teammates(own, available)
+        seen = visible.transpose(1, 2).unsqueeze(1)
+        # The least finite number instead of -inf keeps a robot without teammates free of NaN.
+        lowest = torch.finfo(scores.dtype).min
+        hidden = torch.zeros_like(seen, dtype=scores.dtype).masked_fill_(~seen, lowest)
+        weights = torch.add(hidden, scores, alpha=(width // self.heads) ** -0.5).softmax(dim=2)
+        if robots == 1 or available is not None:
+            weights = weights * seen  # where nobody is seen, the softmax found equal weights
+        mixed = torch.bmm(weights.flatten(0, 1).transpose(1, 2), values)
+        return Attended(
+            mixed.transpose(0, 1).reshape(robots, batch, width),
+            weights.transpose(2, 3),
+            scores.transpose(2, 3),
+            visible,
+        )
+
+    def _by_head(self, x: Tensor) -> Tensor:
+        """View (R, B, W) as (B*H, R, d) without a copy."""
+        robots, batch, width = x.shape
+        return x.view(robots, batch * self.heads, width // self.heads).transpose(0, 1)
+
+
+class UniformAttention(_TeammateAttention):
+    """The baseline: alpha_ij = 1/(N-1) for every teammate seen; query and key go unused."""
+
+    def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
+        """Average over teammates; arguments as in `InnerAttention.forward`."""
+        values = self._values(others)
+        visible = visible_teammates(own, available)
+        weights = visible.to(values.dtype)
+        weights = weights / weights.sum(dim=2, keepdim=True).clamp_min(1.0)
+        mixed = torch.bmm(weights.expand(own.shape[1], -1, -1), values.transpose(0, 1))
+        return Attended(
+            mixed.transpose(0, 1).contiguous(),
+            weights.unsqueeze(1).expand(own.shape[1], self.heads, -1, -1),
+            None,
+            visible,
+        )

@@ -1,0 +1,78 @@
+"""The centralised critic: Q of every own action of every robot, teammates seen by attention.
+
+It computes values; targets and losses belong to the learner. Structure: eqs. 2-4 of the paper and
+Iqbal & Sha 2019, section 3.2.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from innerattn.nn.attention import Attended, InnerAttention, UniformAttention
+from innerattn.nn.linear import PerRobotLinear
+
+
+class CriticOutput(NamedTuple):
+    """What the critic says of a batch.
+
+    Attributes:
+        q: (R, A, B) Q_i(o, a, a_-i) for every own action a; robot i's own action is not an input
+            of its own values.
+        attended: What the attention made of the teammates.
+    """
+
+    q: Tensor
+    attended: Attended
+
+
+class Critic(nn.Module):
+    """Critics of all robots; encoders and heads are each robot's own, the attention is shared."""
+
+    def __init__(
+        self,
+        num_robots: int,
+        obs_width: int,
+        num_actions: int,
+        attention: InnerAttention | UniformAttention,
+        generator: torch.Generator,
+    ) -> None:
+        """Draw the parameters.
+
+        Args:
+            num_robots: R.
+            obs_width: D.
+            num_actions: A.
+            attention: The attention over teammates; its width is the width of every layer.
+            generator: Source of the initial parameters, on the CPU.
+        """
+        super().__init__()
+        width = attention.query.shape[0]
+        self.num_actions = num_actions
+        self.state_encoder = PerRobotLinear(num_robots, obs_width, width, generator)
+        self.action_encoder = PerRobotLinear(num_robots, obs_width + num_actions, width, generator)
+        self.attention = attention
+        self.hidden = PerRobotLinear(num_robots, 2 * width, width, generator)
+        self.output = PerRobotLinear(num_robots, width, num_actions, generator)
+
+    def forward(
+        self, obs: Tensor, actions: Tensor, available: Tensor | None = None
+    ) -> CriticOutput:
+        """Value every own action.
+
+        Args:
+            obs: (R, B, D) observations.
+            actions: (R, B) int64 actions; robot i's own is seen by its teammates only.
+            available: (B, R) bool; unavailable robots are masked out of the attention. None: all
+                are available.
+        """
+        chosen = obs.new_zeros(*actions.shape, self.num_actions)
+        chosen.scatter_(2, actions.unsqueeze(2), 1.0)
+        own = functional.leaky_relu_(self.state_encoder(obs))
+        others = functional.leaky_relu_(self.action_encoder(torch.cat([obs, chosen], dim=2)))
+        attended = self.attention(own, others, available)
+        hidden = functional.leaky_relu_(self.hidden.side_by_side(own, attended.mixed))
+        return CriticOutput(self.output.batch_last(hidden), attended)
