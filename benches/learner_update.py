@@ -11,9 +11,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import torch
+from torch import Tensor
+
 from innerattn.config import NetworkConfig, TDConfig
 from innerattn.learn import TD, Team, Transitions
-from torch import Tensor
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "learn"))
 from reference import PlainTD

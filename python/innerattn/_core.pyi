@@ -5,6 +5,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["Batch", "__version__", "check_scenario"]
+
 __version__: str
 
 def check_scenario(json: str) -> str:
@@ -19,8 +21,8 @@ class Batch:
     """Many rescue worlds of one scenario. E envs, R robots, D columns, V victim slots, O obstacles.
 
     Arrays returned by `reset`, `step`, `observe` and `reward_components` are read-only and valid
-    until the step after next. Not to be used from two threads at once (RuntimeError), nor in a child
-    process after a fork (RuntimeError).
+    until the step after next. Not to be used from two threads at once (RuntimeError), nor in a
+    child process after a fork (RuntimeError).
     """
 
     def __new__(
@@ -72,8 +74,8 @@ class Batch:
 
         Raises:
             TypeError: wrong dtype.
-            ValueError: wrong shape, an action out of range or not a number (named by env and robot),
-                or a world whose episode is over. Nothing has moved then.
+            ValueError: wrong shape, an action out of range or not a number (env and robot are
+                named), or a world whose episode is over. Nothing has moved then.
         """
 
     def reward_components(self) -> NDArray[np.float32]:
@@ -107,4 +109,4 @@ class Batch:
         """Image of all worlds, with a checksum."""
 
     def restore(self, image: bytes) -> None:
-        """Put all worlds back into an image's state; ValueError, and no change, if it is refused."""
+        """Put all worlds back into an image's state; ValueError, and no change, if refused."""

@@ -6,7 +6,7 @@ class InnerattnError(Exception):
 
 
 class ConfigError(InnerattnError, ValueError):
-    """A configuration, preset or scenario is not valid; the message names the key and what is allowed."""
+    """A configuration, preset or scenario is not valid; the message names the key."""
 
 
 class RunError(InnerattnError):

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from innerattn.cli.main import main
 
 

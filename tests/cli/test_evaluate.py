@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from innerattn.cli.main import main
 
 FEW = ["--episodes", "4", "--score-episodes", "6", "--long-episodes", "2"]

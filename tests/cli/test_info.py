@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+
 from innerattn.cli.main import main
 from innerattn.config import BUDGETS, SCENARIOS, Scenario
 

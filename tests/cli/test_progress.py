@@ -2,9 +2,10 @@
 
 import io
 
+from rich.console import Console
+
 from innerattn.cli.progress import Evaluating, Training
 from innerattn.train import Progress
-from rich.console import Console
 
 
 def progress(seconds: float, env_steps: int, rescues: float | None = 1.5) -> Progress:

@@ -2,10 +2,11 @@
 
 import io
 
+from rich.console import Console
+
 from innerattn.cli.tables import print_summary
 from innerattn.config import Scenario
 from innerattn.evaluate import Figures, Interval, Summary
-from rich.console import Console
 
 SCORE = Interval(0.5, 0.4, 0.61)
 

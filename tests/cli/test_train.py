@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+
 from innerattn.cli.main import main
 from innerattn.cli.progress import Training
 from innerattn.config import RunConfig, load_run_config, read_toml

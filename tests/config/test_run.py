@@ -1,8 +1,9 @@
 """The run configuration: ranges, contradictions, and attention that follows from the method."""
 
 import pytest
-from innerattn.config import NetworkConfig, RunConfig, TDConfig, TrainConfig
 from pydantic import ValidationError
+
+from innerattn.config import NetworkConfig, RunConfig, TDConfig, TrainConfig
 
 
 @pytest.mark.parametrize(

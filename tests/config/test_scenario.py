@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 import tomli_w
+from pydantic import ValidationError
+
 from innerattn import _core
 from innerattn.config import SCENARIOS, Obstacle, Robot, Scenario, Task
 from innerattn.errors import ConfigError
-from pydantic import ValidationError
 
 
 def test_default_team_is_table_one() -> None:

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+
 from innerattn.config import Obstacle, Robot, Scenario
 from innerattn.envs import BatchEnv, parallel_env
 from innerattn.errors import ConfigError
-from pettingzoo.test import parallel_api_test, parallel_seed_test
 
 CROWDED = Scenario(
     situation="double",

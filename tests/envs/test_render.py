@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
+from matplotlib.colors import to_rgb
+from numpy.typing import NDArray
+
 from innerattn.config import Obstacle, Scenario
 from innerattn.envs import parallel_env
 from innerattn.envs.render import draw_world
-from matplotlib.colors import to_rgb
-from numpy.typing import NDArray
 
 VICTIM = np.dtype([("present", "i1"), ("task", "i1"), ("x", "f4"), ("y", "f4")])
 PLACES = np.array([[-0.7, -0.7], [0.7, -0.7], [-0.7, 0.7], [0.7, 0.7]], np.float32)

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linear_sum_assignment
+
 from innerattn.config import Robot, Scenario, Task
 from innerattn.evaluate import assignment
 from innerattn.evaluate.assignment import FORBIDDEN, Needs, assign, pair_costs
-from scipy.optimize import linear_sum_assignment
 
 
 def priced(cost: np.ndarray, chosen: np.ndarray) -> tuple[int, float]:

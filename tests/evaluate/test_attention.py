@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from innerattn.config import Scenario
 from innerattn.evaluate.attention import entropy_of
 from innerattn.evaluate.episodes import Record, rescue_dtype

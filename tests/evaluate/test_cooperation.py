@@ -3,6 +3,7 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+
 from innerattn.config import Robot, Scenario, Task
 from innerattn.evaluate.cooperation import (
     count_cooperation,

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from innerattn.config import Scenario
 from innerattn.errors import ConfigError
 from innerattn.evaluate.dispatch import (

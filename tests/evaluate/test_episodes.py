@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.evaluate import episodes

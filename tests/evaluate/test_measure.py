@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+
 from innerattn.config import EvaluateConfig, Scenario, load_run_config
 from innerattn.errors import RunError
 from innerattn.evaluate import (

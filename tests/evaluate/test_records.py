@@ -7,6 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+
 from innerattn.config import Scenario
 from innerattn.errors import RunError
 from innerattn.evaluate.dispatch import scripted_policy

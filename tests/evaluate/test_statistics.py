@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+
 from innerattn.evaluate.statistics import mean_interval, resampled_means, score_interval
 
 

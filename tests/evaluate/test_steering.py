@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from innerattn.config import Scenario
 from innerattn.evaluate.steering import NEVER_S, Steering
 

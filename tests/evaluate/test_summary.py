@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from innerattn.config import Scenario
 from innerattn.evaluate.episodes import Record, rescue_dtype
 from innerattn.evaluate.summary import summarise

@@ -4,6 +4,7 @@ import math
 
 import pytest
 import torch
+
 from innerattn.learn import losses
 
 HALF = math.log(0.5)

@@ -4,6 +4,7 @@ import hypothesis.strategies as st
 import pytest
 import torch
 from hypothesis import given, settings
+
 from innerattn.learn import Replay, Team, Transitions
 
 TEAM = Team(2, 3, 5)

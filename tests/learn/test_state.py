@@ -2,9 +2,10 @@
 
 import pytest
 import torch
+from torch import Tensor
+
 from innerattn.config import NetworkConfig, TDConfig
 from innerattn.learn import TD, Team, Transitions
-from torch import Tensor
 
 
 def make(attention: str = "inner", seed: int = 0) -> TD:

@@ -2,11 +2,12 @@
 
 import pytest
 import torch
-from innerattn.config import NetworkConfig, TDConfig
-from innerattn.learn import TD, Team, Transitions, td
 from reference import PlainTD, policy, values
 from scipy.stats import chi2_contingency, chisquare
 from torch import Tensor
+
+from innerattn.config import NetworkConfig, TDConfig
+from innerattn.learn import TD, Team, Transitions, td
 
 CPU = torch.device("cpu")
 OBS_WIDTH, NUM_ACTIONS, BATCH = 5, 3, 7

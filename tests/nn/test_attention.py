@@ -2,8 +2,9 @@
 
 import pytest
 import torch
-from innerattn.nn import InnerAttention, UniformAttention
 from torch import Tensor
+
+from innerattn.nn import InnerAttention, UniformAttention
 
 WIDTH, HEADS, BATCH = 8, 2, 5
 KINDS = [InnerAttention, UniformAttention]

@@ -2,6 +2,7 @@
 
 import pytest
 import torch
+
 from innerattn.nn import Actor, Critic, InnerAttention, PerRobotLinear, sample_actions
 
 R, B, D, A, W = 3, 6, 4, 5, 8

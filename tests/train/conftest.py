@@ -2,6 +2,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
 from innerattn.config import RunConfig, load_run_config
 from innerattn.train import train
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import torch
+
 from innerattn.config import RunConfig, read_toml
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError

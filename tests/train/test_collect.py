@@ -2,12 +2,13 @@
 
 import numpy as np
 import torch
+from torch import Tensor
+
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.evaluate.dispatch import scripted_policy
 from innerattn.evaluate.episodes import View
 from innerattn.train.collect import Collector
-from torch import Tensor
 
 
 class Scripted:

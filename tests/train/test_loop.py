@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import torch
+
 from innerattn.config import RunConfig
 from innerattn.errors import ConfigError, RunError
 from innerattn.learn import TD

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from innerattn.errors import RunError
 from innerattn.train.collect import Tally
 from innerattn.train.metrics import Interval, MetricsFile, attention_entropy

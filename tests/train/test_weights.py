@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 import torch
+from safetensors.torch import load, save, save_file
+
 from innerattn.errors import RunError
 from innerattn.train.weights import FORMAT, SCHEMA_VERSION, read_weights, write_weights
-from safetensors.torch import load, save, save_file
 
 TENSORS = {
     "actor.weight": torch.arange(12, dtype=torch.float32).reshape(3, 4).t(),  # not contiguous

@@ -1,4 +1,4 @@
-"""Rescue worlds for Python: batches, and the view of other libraries on them. Never imports torch."""
+"""Rescue worlds for Python: batches, and a view for PettingZoo. Never imports torch."""
 
 from innerattn.envs.batch import BatchEnv, Step
 from innerattn.envs.parallel import parallel_env

@@ -1,4 +1,4 @@
-"""`BatchEnv`: many rescue worlds stepped together, over numpy arrays. Knows no rule of the worlds."""
+"""`BatchEnv`: many rescue worlds stepped together over numpy arrays. It knows no rule of theirs."""
 
 from __future__ import annotations
 
@@ -48,9 +48,10 @@ class Step(NamedTuple):
 class BatchEnv:
     """E rescue worlds of one scenario, stepped together by compiled code on several threads.
 
-    Autoreset is Gymnasium's SAME_STEP: on an episode's last step `obs` is already the next episode's
-    first and `final_obs` holds the last of the old one. Arrays are C-contiguous read-only views of
-    buffers owned by the environment, valid until the step after next; `copy=True` gives fresh ones.
+    Autoreset is Gymnasium's SAME_STEP: on an episode's last step `obs` is the next episode's
+    first already and `final_obs` holds the last of the old one. Arrays are C-contiguous
+    read-only views of buffers owned by the environment, valid until the step after next;
+    `copy=True` gives fresh ones.
     World i depends on scenario, seed, `first_env + i` and its actions alone, whatever the number of
     threads or worlds.
 
@@ -103,9 +104,7 @@ class BatchEnv:
         self._rescue_dtype = np.dtype([(name, "i8") for name in (*_RESCUE_FIELDS, *helpers)])
         self._copy = copy
 
-    def reset(
-        self, seed: int | None = None, mask: ArrayLike | None = None
-    ) -> NDArray[np.float32]:
+    def reset(self, seed: int | None = None, mask: ArrayLike | None = None) -> NDArray[np.float32]:
         """Start new episodes.
 
         Args:
@@ -133,13 +132,14 @@ class BatchEnv:
         """Do one control step in every world.
 
         Args:
-            actions: (E, R) integers (0 stay, 1 +x, 2 -x, 3 +y, 4 -y), or (E, R, 2) floats in [-1, 1]
-                when the scenario's actions are continuous.
+            actions: (E, R) integers (0 stay, 1 +x, 2 -x, 3 +y, 4 -y), or (E, R, 2) floats in
+                [-1, 1] when the scenario's actions are continuous.
 
         Raises:
             TypeError: wrong dtype.
-            ValueError: wrong shape, an action out of range or not a number (named by env and robot),
-                or a world whose episode is over (autoreset disabled). Nothing has moved then.
+            ValueError: wrong shape, an action out of range or not a number (env and robot are
+                named), or a world whose episode is over (autoreset disabled). Nothing has moved
+                then.
         """
         obs, reward, terminated, truncated, final_obs, rescues = self._core.step(
             np.asarray(actions)
@@ -162,7 +162,7 @@ class BatchEnv:
         return self._lend(self._core.observe())
 
     def reward_components(self) -> NDArray[np.float32]:
-        """Rewards of the last step by component, (E, R, 4) float32; see `reward_component_names`."""
+        """Rewards of the last step, (E, R, 4) float32, columns `reward_component_names`."""
         return self._lend(self._core.reward_components())
 
     def positions(self) -> NDArray[np.float32]:
@@ -213,7 +213,7 @@ class BatchEnv:
         return self._core.snapshot()
 
     def restore(self, image: bytes) -> None:
-        """Put all worlds back into the state of an image, made by any batch of this size and scenario.
+        """Put all worlds back into an image's state, made by any batch of this size and scenario.
 
         Raises:
             ValueError: truncated, altered or foreign bytes; nothing has changed then.

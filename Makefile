@@ -1,0 +1,58 @@
+# The only list of commands. `make train` and `make test` do all set-up themselves.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUST := Cargo.toml Cargo.lock $(shell find rust_env -name '*.rs' -o -name Cargo.toml)
+TRAIN ?= --preset mixed --method td-inner --budget quick
+export VIRTUAL_ENV := $(CURDIR)/$(VENV)
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+
+.PHONY: train test test-slow lint format bench setup clean
+
+train: setup ## train TD-innerATT on mixed rescue worlds, then evaluate it
+	@innerattn train $(TRAIN)
+
+test: setup lint ## every check but the slow ones
+	cargo test --quiet
+	pytest -m "not slow"
+
+test-slow: setup ## the long checks: ten million env-steps of contacts, longer learning
+	INNERATTN_SLOW=1 cargo test --quiet
+	pytest -m slow
+
+lint: setup ## formatting, lints, types, stub, import floors
+	cargo fmt --check
+	cargo clippy --quiet --all-targets -- -D warnings
+	ruff check
+	ruff format --check
+	mypy
+	python -m mypy.stubtest innerattn._core --mypy-config-file pyproject.toml
+	lint-imports --no-cache
+
+format: setup ## format all code
+	cargo fmt
+	ruff check --fix
+	ruff format
+
+bench: setup ## speed of worlds and learner on this machine
+	cargo bench --quiet
+	python benches/batch_step.py
+	python benches/learner_update.py
+
+setup: $(VENV)/.built ## environment and compiled module
+
+$(VENV)/.installed: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "innerattn needs Python 3.11 or later; set PYTHON=... to choose one")'
+	@echo "Setting up $(VENV): a few minutes, most of it the download of PyTorch."
+	$(PYTHON) -m venv $(VENV)
+	pip install --quiet --disable-pip-version-check 'maturin>=1.10,<2'
+	@touch $@
+
+$(VENV)/.built: $(VENV)/.installed $(RUST)
+	@echo "Compiling the worlds."
+	maturin develop --release --quiet --extras dev
+	@touch $@
+
+clean: ## remove everything that was built
+	rm -rf $(VENV) target python/innerattn/_core*.so
