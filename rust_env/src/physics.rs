@@ -17,8 +17,11 @@ use crate::scenario::Scenario;
 
 /// How far ahead contacts are prepared, as a share of what the fastest pair closes in a substep.
 const PREDICTION: f64 = 1.4;
-/// Contact stiffness between robots and against fixed things, Hz.
-const STIFFNESS_HZ: (f32, f32) = (60.0, 120.0);
+/// Solver iterations of a substep: twice the team, which bounds the length of a chain of contacts, in
+/// this range. Four leave a crowd of 16 unlike robots 15 % of a radius deep in each other.
+const ITERATIONS: std::ops::RangeInclusive<usize> = 8..=16;
+/// Contact stiffness for each solver iteration, Hz: as stiff as an iteration's short time allows.
+const STIFFNESS_HZ: f32 = 15.0;
 
 /// A world of the engine, whole: what a period starts from is a copy of it.
 #[derive(Clone)]
@@ -262,17 +265,19 @@ fn walls(arena: f32) -> [(Vec2, Vec2); 4] {
 fn quality(scenario: &Scenario) -> IntegrationParameters {
     let substep = scenario.dt_s / f64::from(scenario.substeps);
     let fastest = scenario.robots.iter().map(|robot| robot.max_speed_mps).fold(0.0, f64::max);
+    let iterations = (2 * scenario.robots.len()).clamp(*ITERATIONS.start(), *ITERATIONS.end());
     let mut parameters = IntegrationParameters {
         dt: substep as f32,
         normalized_prediction_distance: (PREDICTION * 2.0 * fastest * substep) as f32,
-        num_solver_iterations: 4,
+        num_solver_iterations: iterations,
         num_internal_pgs_iterations: 2,
         num_internal_stabilization_iterations: 2,
         max_ccd_substeps: 0,
         contact_recycling: false,
         ..IntegrationParameters::default()
     };
-    parameters.contact_softness.natural_frequency = STIFFNESS_HZ.0;
-    parameters.static_contact_softness.natural_frequency = STIFFNESS_HZ.1;
+    let stiffness = STIFFNESS_HZ * iterations as f32;
+    parameters.contact_softness.natural_frequency = stiffness;
+    parameters.static_contact_softness.natural_frequency = 2.0 * stiffness;
     parameters
 }

@@ -30,6 +30,7 @@ PAPER = {
     "td.polyak": 0.001,
     "td.reward_scale": 100.0,
     "td.learning_rate": 0.001,
+    "td.final_learning_rate_share": 1.0,
     "td.batch_size": 1024,
     "td.update_every_env_steps": 100 // 4,
     "td.replay_capacity": 1_000_000,

@@ -203,6 +203,19 @@ def test_updates_come_due_by_env_steps_after_the_warm_up() -> None:
     assert set(metrics) == set(td._METRICS)
 
 
+@pytest.mark.parametrize(("share", "rate"), [(0.0, 0.01), (0.5, 0.006), (1.0, 0.002)])
+def test_the_step_size_falls_evenly(share: float, rate: float) -> None:
+    """Adam's first step is as long as the step size, whatever the gradient."""
+    numbers = {"learning_rate": 0.01, "final_learning_rate_share": 0.2}
+    learner = make(2, numbers=numbers)
+    before = learner.state()
+    learner.reach(share)
+    learner.update(transitions(2, seed=1))
+    after = learner.state()
+    moved = (after["critic.output.bias"] - before["critic.output.bias"]).abs()
+    assert moved.max().item() == pytest.approx(rate, rel=1e-3)
+
+
 def test_actions_follow_the_policy() -> None:
     learner = make(3, dtype=torch.float32)
     obs = transitions(3, seed=2, batch=1).obs

@@ -57,9 +57,15 @@ class TDConfig(Model):
         0.02, gt=0.0, le=1.0, description="step of the target networks towards the trained ones"
     )
     reward_scale: float = Field(
-        30.0, gt=0.0, description="1/temperature: higher rewards less randomness"
+        10.0, gt=0.0, description="1/temperature: higher rewards less randomness"
     )
     learning_rate: float = Field(0.002, gt=0.0, le=1.0, description="step size of Adam")
+    final_learning_rate_share: float = Field(
+        0.05,
+        ge=0.0,
+        le=1.0,
+        description="share of the step size left at the end of training; it falls evenly",
+    )
     batch_size: int = Field(256, ge=1, description="transitions per update")
     update_every_env_steps: int = Field(
         50, ge=1, description="one update per so many steps, all worlds counted [env-steps]"
@@ -132,7 +138,7 @@ class EvaluateConfig(Model):
         100, ge=1, le=100_000, description="second episode length [control steps]"
     )
     greedy_actions: bool = Field(
-        False, description="take the likeliest action instead of drawing one"
+        True, description="take the likeliest action instead of drawing one"
     )
     seed: int = Field(12_345, ge=0, lt=2**63, description="seed of the evaluation's worlds")
 

@@ -123,6 +123,14 @@ class TD:
         if len(self.replay) >= min(self._config.warmup_env_steps, self.replay.capacity):
             self._unpaid_env_steps += len(batch.obs)
 
+    def reach(self, share: float) -> None:
+        """Let the step size fall evenly from its first to its final value; see `Learner.reach`."""
+        config = self._config
+        left = 1.0 - (1.0 - config.final_learning_rate_share) * share
+        for adam in (self._actor_adam, self._critic_adam):
+            for group in adam.param_groups:
+                group["lr"] = left * config.learning_rate
+
     def learn(self) -> dict[str, float] | None:
         """Do one update for every `update_every_env_steps` env-steps since the warm-up.
 

@@ -61,6 +61,13 @@ class Learner(Protocol):
             truncated: (E,) bool, episodes that a time limit ended.
         """
 
+    def reach(self, share: float) -> None:
+        """Take note of how far training is; whatever changes over a run follows it.
+
+        Args:
+            share: Part of the run that is done, 0 to 1.
+        """
+
     def learn(self) -> dict[str, float] | None:
         """Do the updates that are due.
 

@@ -121,6 +121,7 @@ class _Loop:
     def _step(self) -> None:
         transitions, truncated = self._collector.step()
         self._learner.observe(transitions, truncated)
+        self._learner.reach(min(self._env_steps / self._config.env_steps, 1.0))
         self._interval.add_losses(self._learner.learn())
         before = self._env_steps
         self._env_steps += self._config.num_envs
