@@ -20,7 +20,8 @@ unsafe impl<T: Send, D> Send for Lent<T, D> {}
 unsafe impl<T: Sync, D> Sync for Lent<T, D> {}
 
 impl<T: Element, D: numpy::ndarray::Dimension> Lent<T, D> {
-    fn zeros<S: numpy::ndarray::IntoDimension<Dim = D>>(py: Python, shape: S) -> PyResult<Self> {
+    /// An array of zeros of this shape.
+    pub fn zeros<S: numpy::ndarray::IntoDimension<Dim = D>>(py: Python, shape: S) -> PyResult<Self> {
         let array = PyArray::<T, D>::zeros(py, shape, false);
         let (start, length) = (array.data(), array.len());
         array.getattr("flags")?.setattr("writeable", false)?;

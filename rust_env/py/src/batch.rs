@@ -7,14 +7,14 @@ use innerattn_env::scenario::{Actions, Scenario};
 use innerattn_env::task::Rescue;
 use innerattn_env::world::World;
 use numpy::{
-    IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2,
+    IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2,
     PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::arrays::Arrays;
+use crate::arrays::{Arrays, Lent};
 use crate::value_error;
 
 type Stepped = (
@@ -30,8 +30,12 @@ type Stepped = (
 #[pyclass(module = "innerattn._core")]
 pub struct Batch {
     worlds: Worlds,
+    /// What steps write, in turn.
     sets: [Arrays; 2],
     latest: usize,
+    /// What looks without a step (reset, observe) write, in turn: no view of a step is touched.
+    looks: [Lent<f32, Ix3>; 2],
+    latest_look: usize,
     process: u32,
 }
 
@@ -55,7 +59,15 @@ impl Batch {
             .map_err(|error| value_error(&error))?;
         let (robots, width) = (worlds.rules().team.len(), worlds.rules().layout.width());
         let set = || Arrays::new(py, num_envs, robots, width);
-        Ok(Self { sets: [set()?, set()?], worlds, latest: 0, process: std::process::id() })
+        let look = || Lent::zeros(py, [num_envs, robots, width]);
+        Ok(Self {
+            sets: [set()?, set()?],
+            looks: [look()?, look()?],
+            worlds,
+            latest: 0,
+            latest_look: 0,
+            process: std::process::id(),
+        })
     }
 
     #[getter]
@@ -87,22 +99,21 @@ impl Batch {
         &mut self,
         py: Python,
         seed: Option<u64>,
-        mask: Option<PyReadonlyArray1<bool>>,
+        mask: Option<Bound<PyArray1<bool>>>,
     ) -> PyResult<Py<PyArray3<f32>>> {
         self.check_process()?;
-        let mask = match &mask {
-            Some(mask) if mask.len() != self.worlds.num_envs() => {
-                let (found, wanted) = (mask.len(), self.worlds.num_envs());
-                return Err(PyValueError::new_err(format!("mask has shape ({found},): must be ({wanted},)")));
-            }
-            Some(mask) => Some(mask.as_array().to_vec()),
-            None => None,
-        };
-        self.latest = 1 - self.latest;
-        let obs = self.sets[self.latest].obs.memory();
-        let worlds = &mut self.worlds;
+        let mask = mask.map(|mask| mask.to_vec()).transpose()?;
+        if let Some(found) = mask.as_ref().map(Vec::len)
+            && found != self.worlds.num_envs()
+        {
+            let wanted = self.worlds.num_envs();
+            return Err(PyValueError::new_err(format!("mask has shape ({found},): must be ({wanted},)")));
+        }
+        self.latest_look = 1 - self.latest_look;
+        let look = &mut self.looks[self.latest_look];
+        let (worlds, obs) = (&mut self.worlds, look.memory());
         py.detach(|| worlds.reset(seed, mask.as_deref(), obs));
-        Ok(self.sets[self.latest].obs.lend(py))
+        Ok(look.lend(py))
     }
 
     fn step(&mut self, py: Python, actions: &Bound<PyUntypedArray>) -> PyResult<Stepped> {
@@ -110,12 +121,12 @@ impl Batch {
         let rescues = match self.worlds.rules().scenario.actions {
             Actions::Discrete => {
                 let array = self.discrete(actions)?;
-                let values = contiguous(array.as_array());
+                let values = contiguous(&array.as_array());
                 self.advance(py, Commands::Discrete(&values))?
             }
             Actions::Continuous => {
                 let array = self.continuous(actions)?;
-                let values = contiguous(array.as_array());
+                let values = contiguous(&array.as_array());
                 self.advance(py, Commands::Continuous(&values))?
             }
         };
@@ -136,9 +147,10 @@ impl Batch {
 
     fn observe(&mut self, py: Python) -> PyResult<Py<PyArray3<f32>>> {
         self.check_process()?;
-        self.latest = 1 - self.latest;
-        self.worlds.observe(self.sets[self.latest].obs.memory());
-        Ok(self.sets[self.latest].obs.lend(py))
+        self.latest_look = 1 - self.latest_look;
+        let look = &mut self.looks[self.latest_look];
+        self.worlds.observe(look.memory());
+        Ok(look.lend(py))
     }
 
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
@@ -166,15 +178,12 @@ impl Batch {
         let mut numbers = Vec::with_capacity(envs * slots * 4);
         let mut places = Vec::with_capacity(envs * slots * 2);
         for victim in self.worlds.worlds().flat_map(|world| &world.victims) {
-            match victim {
-                Some(victim) => {
-                    numbers.extend([1, victim.task, victim.id, victim.appeared_step].map(i64::from));
-                    places.extend([victim.position.x, victim.position.y]);
-                }
-                None => {
-                    numbers.extend([0, -1, -1, -1]);
-                    places.extend([0.0, 0.0]);
-                }
+            if let Some(victim) = victim {
+                numbers.extend([1, victim.task, victim.id, victim.appeared_step].map(i64::from));
+                places.extend([victim.position.x, victim.position.y]);
+            } else {
+                numbers.extend([0, -1, -1, -1]);
+                places.extend([0.0, 0.0]);
             }
         }
         Ok((shaped(py, numbers, [envs, slots, 4])?, shaped(py, places, [envs, slots, 2])?))
@@ -190,8 +199,8 @@ impl Batch {
 
     fn set_motion(
         &mut self,
-        positions: PyReadonlyArray3<f32>,
-        velocities: PyReadonlyArray3<f32>,
+        positions: &Bound<PyArray3<f32>>,
+        velocities: &Bound<PyArray3<f32>>,
     ) -> PyResult<()> {
         self.check_process()?;
         let wanted = [self.worlds.num_envs(), self.worlds.rules().team.len(), 2];
@@ -200,7 +209,8 @@ impl Batch {
                 return Err(PyValueError::new_err(format!("{name} has shape {shape:?}: must be {wanted:?}")));
             }
         }
-        let (positions, velocities) = (contiguous(positions.as_array()), contiguous(velocities.as_array()));
+        let (positions, velocities) = (positions.readonly(), velocities.readonly());
+        let (positions, velocities) = (contiguous(&positions.as_array()), contiguous(&velocities.as_array()));
         self.worlds.set_motion(&positions, &velocities).map_err(|error| value_error(&error))
     }
 
@@ -253,7 +263,7 @@ impl Batch {
             return Err(wrong_shape(actions, &format!("({envs}, {robots})")));
         }
         // Numbers past int64 wrap to negative ones, which the range check refuses.
-        Ok(actions.call_method1("astype", ("int64",))?.extract()?)
+        actions.call_method1("astype", ("int64",))?.extract()
     }
 
     /// The actions as `(E, R, 2)` float32.
@@ -267,7 +277,7 @@ impl Batch {
         if actions.shape() != [envs, robots, 2] {
             return Err(wrong_shape(actions, &format!("({envs}, {robots}, 2)")));
         }
-        Ok(actions.call_method1("astype", ("float32",))?.extract()?)
+        actions.call_method1("astype", ("float32",))?.extract()
     }
 
     fn vectors<'py>(
@@ -297,9 +307,9 @@ fn wrong_shape(actions: &Bound<PyUntypedArray>, wanted: &str) -> PyErr {
     PyValueError::new_err(format!("actions has shape {:?}: must be {wanted}", actions.shape()))
 }
 
-fn contiguous<T: Clone, D: numpy::ndarray::Dimension>(
-    array: numpy::ndarray::ArrayView<T, D>,
-) -> std::borrow::Cow<'_, [T]> {
+fn contiguous<'a, T: Clone, D: numpy::ndarray::Dimension>(
+    array: &numpy::ndarray::ArrayView<'a, T, D>,
+) -> std::borrow::Cow<'a, [T]> {
     match array.to_slice() {
         Some(values) => std::borrow::Cow::Borrowed(values),
         None => std::borrow::Cow::Owned(array.iter().cloned().collect()),
@@ -315,6 +325,5 @@ where
     [usize; N]: numpy::ndarray::IntoDimension<Dim = numpy::ndarray::Dim<[usize; N]>>,
     numpy::ndarray::Dim<[usize; N]>: numpy::ndarray::Dimension,
 {
-    use numpy::PyArrayMethods;
     values.into_pyarray(py).reshape(shape)
 }

@@ -1,0 +1,150 @@
+"""The two descriptions of a scenario, pydantic's and the compiled one, name the same things."""
+
+import json
+from typing import Literal, get_args, get_origin
+
+import pytest
+from pydantic import BaseModel, ValidationError
+
+from innerattn import _core
+from innerattn.config import Obstacle, Robot, Scenario, Task
+
+ROBOT = {"name": "one", "kind": "any", "abilities": [], "max_speed_mps": 1.0, "mass_kg": 1.0}
+OBSTACLE = {"shape": "disc", "radius_m": 0.1}
+TASK = {"name": "task", "needs": ["food"]}
+TEAM = Scenario().model_dump(mode="json")["robots"]
+NESTED = {"robots": (Robot, ROBOT), "tasks": (Task, TASK), "obstacles": (Obstacle, OBSTACLE)}
+CHOICES = [
+    (name, get_args(field.annotation))
+    for name, field in Scenario.model_fields.items()
+    if get_origin(field.annotation) is Literal
+]
+
+
+def compiled(table: dict) -> dict:
+    return json.loads(_core.check_scenario(json.dumps(table)))
+
+
+def within(key: str, item: dict) -> dict:
+    """A scenario with `item` in the list `key`; the default team stays so that tasks are served."""
+    return {key: [*TEAM, item] if key == "robots" else [item]}
+
+
+def test_defaults_agree_for_every_key_both_ways() -> None:
+    ours, theirs = Scenario().model_dump(mode="json"), compiled({})
+    assert ours.keys() == theirs.keys() == Scenario.model_fields.keys()
+    for key, value in ours.items():
+        assert (key, theirs[key]) == (key, value)
+
+
+@pytest.mark.parametrize("key", NESTED)
+def test_nested_keys_and_defaults_agree(key: str) -> None:
+    model, item = NESTED[key]
+    ours, theirs = model(**item).model_dump(mode="json"), compiled(within(key, item))[key][-1]
+    assert ours == theirs
+    assert ours.keys() == model.model_fields.keys()
+
+
+@pytest.mark.parametrize("key", NESTED)
+def test_required_keys_are_required_by_both(key: str) -> None:
+    model, item = NESTED[key]
+    required = {name for name, field in model.model_fields.items() if field.is_required()}
+    for name in model.model_fields:
+        if name == "radius_m" and key == "obstacles":
+            continue  # a disc needs it, by a rule between values
+        short = within(key, {k: v for k, v in item.items() if k != name})
+        if name in required:
+            with pytest.raises(ValueError, match=name):
+                compiled(short)
+            with pytest.raises(ValidationError, match=name):
+                Scenario.model_validate(short)
+        else:
+            assert compiled(short) == Scenario.model_validate(short).model_dump(mode="json")
+
+
+def test_choices_are_found() -> None:
+    assert {name for name, _ in CHOICES} == {
+        *("situation", "engine", "actions", "rescue_credit", "shaping", "victim_order")
+    }
+
+
+@pytest.mark.parametrize(("key", "values"), CHOICES)
+def test_choices_agree(key: str, values: tuple[str, ...]) -> None:
+    for value in values:
+        assert compiled({key: value})[key] == value
+    with pytest.raises(ValueError, match="unknown variant") as error:
+        compiled({key: "another"})
+    listed = set(str(error.value).split("`")[3::2])  # the compiled side lists what it knows
+    assert listed == {*values}
+    for wrong in (values[0].capitalize(), "", None, 0):
+        with pytest.raises(ValueError, match="scenario"):
+            compiled({key: wrong})
+        with pytest.raises(ValidationError, match=key):
+            Scenario.model_validate({key: wrong})
+
+
+def test_shapes_agree() -> None:
+    shapes = {"disc": {"radius_m": 0.1}, "box": {"half_extents_m": [0.1, 0.2]}}
+    assert {*get_args(Obstacle.model_fields["shape"].annotation)} == shapes.keys()
+    for shape, size in shapes.items():
+        table = {"obstacles": [{"shape": shape, **size}]}
+        assert compiled(table) == Scenario.model_validate(table).model_dump(mode="json")
+    with pytest.raises(ValueError, match="expected `disc` or `box`"):
+        compiled({"obstacles": [{"shape": "ring", "radius_m": 0.1}]})
+
+
+@pytest.mark.parametrize("place", ["", *NESTED])
+def test_an_unknown_key_is_refused_by_both(place: str) -> None:
+    item = {**NESTED[place][1], "colour": 1} if place else {}
+    table = within(place, item) if place else {"colour": 1}
+    with pytest.raises(ValueError, match="unknown field `colour`") as error:
+        compiled(table)
+    assert "\n" not in str(error.value)
+    with pytest.raises(ValidationError, match="colour"):
+        Scenario.model_validate(table)
+
+
+def test_every_value_survives_the_way_there_and_back() -> None:
+    """Values that are no default: a key read under another name, or not at all, would differ."""
+    changed = {
+        "situation": "double",
+        "robots": [*TEAM[1:], {**TEAM[0], "radius_m": 0.04, "drive_force_n": 3.5}],
+        "tasks": [TASK],
+        "max_victims": 7,
+        "obstacles": [{"shape": "box", "half_extents_m": [0.1, 0.2], "position_m": [0.3, 0.4]}],
+        "arena_half_width_m": 2.0,
+        "rescue_radius_m": 0.25,
+        "spawn_clearance_m": 0.125,
+        "wall_clearance_m": 0.0625,
+        "episode_steps": 99,
+        "end_when_rescued": 4,
+        "dt_s": 0.05,
+        "substeps": 9,
+        "damping": 0.5,
+        "friction": 0.75,
+        "actions": "continuous",
+        "rescue_credit": "team",
+        "rescue_reward": 3.0,
+        "shaping": "potential",
+        "shaping_weight": 0.5,
+        "shaping_discount": 0.875,
+        "contact_cost": 0.1,
+        "action_cost": 0.2,
+        "victim_order": "slot",
+    }
+    assert changed.keys() == Scenario.model_fields.keys() - {"engine"}
+    scenario = Scenario.model_validate(changed)
+    default = Scenario()
+    for key in changed:
+        assert getattr(scenario, key) != getattr(default, key)
+    assert json.loads(_core.check_scenario(json.dumps(changed))) == scenario.model_dump(mode="json")
+
+
+def test_models_are_all_mirrored() -> None:
+    inner = {
+        argument
+        for field in Scenario.model_fields.values()
+        for argument in get_args(field.annotation)
+        if isinstance(argument, type) and issubclass(argument, BaseModel)
+    }
+    assert inner == {model for model, _ in NESTED.values()}
