@@ -152,3 +152,70 @@ impl Row<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::bodies;
+
+    /// Two robots (food, medicine) and two slots; what robot 1 sees in each order of victims.
+    fn seen_by_medical(order: VictimOrder) -> (Vec<String>, Vec<f32>) {
+        let mut scenario = Scenario { victim_order: order, ..Scenario::default() };
+        scenario.robots = vec![scenario.robots[0].clone(), scenario.robots[3].clone()];
+        scenario.tasks[1].needs = vec!["food".into()];
+        let (team, tasks) = (bodies(&scenario), Needs::of_tasks(&scenario));
+        let layout = Layout::new(&scenario, &tasks);
+        let victim = |task, x| Some(Victim { id: 0, task, appeared_step: 0, position: Vec2::new(x, 0.0) });
+        // The near one needs food alone; the far one food and medicine.
+        let victims = [victim(1, 0.5), victim(0, -0.5)];
+        let (at, moving) =
+            ([Vec2::new(0.1, 0.2), Vec2::new(0.4, 0.0)], [Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0)]);
+        let mut rows = vec![f32::NAN; 2 * layout.width()];
+        layout.write(&team, &tasks, &at, &moving, &victims, &mut rows);
+        (layout.names(), rows.split_off(layout.width()))
+    }
+
+    #[test]
+    fn a_row_is_own_then_teammates_then_victims() {
+        let (names, row) = seen_by_medical(VictimOrder::Slot);
+        let expected = [
+            ("own.position.x", 0.4),
+            ("own.position.y", 0.0),
+            ("own.velocity.x", 0.0),
+            ("own.velocity.y", 1.0),
+            ("own.ability.food", 0.0),
+            ("own.ability.medicine", 1.0),
+            ("own.available", 1.0),
+            ("teammate_0.relative_position.x", -0.3),
+            ("teammate_0.relative_position.y", 0.2),
+            ("teammate_0.relative_velocity.x", 1.0),
+            ("teammate_0.relative_velocity.y", -1.0),
+            ("teammate_0.ability.food", 1.0),
+            ("teammate_0.ability.medicine", 0.0),
+            ("teammate_0.available", 1.0),
+            ("victim_0.present", 1.0),
+            ("victim_0.need.food", 1.0),
+            ("victim_0.need.medicine", 0.0),
+            ("victim_0.relative_position.x", 0.1),
+            ("victim_0.relative_position.y", 0.0),
+            ("victim_1.present", 1.0),
+            ("victim_1.need.food", 1.0),
+            ("victim_1.need.medicine", 1.0),
+            ("victim_1.relative_position.x", -0.9),
+            ("victim_1.relative_position.y", 0.0),
+        ];
+        assert_eq!(names, expected.map(|(name, _)| name));
+        for ((name, wanted), value) in expected.iter().zip(&row) {
+            assert!((wanted - value).abs() < 1e-6, "{name} = {value}");
+        }
+    }
+
+    #[test]
+    fn victims_it_can_help_come_first() {
+        let (_, by_slot) = seen_by_medical(VictimOrder::Slot);
+        let (_, relevant) = seen_by_medical(VictimOrder::Relevant);
+        assert_eq!(relevant[14..19], by_slot[19..24]);
+        assert_eq!(relevant[19..24], by_slot[14..19]);
+        assert_eq!(relevant[..14], by_slot[..14]);
+    }
+}

@@ -111,3 +111,56 @@ impl Placing {
 fn smallest(rooms: impl Iterator<Item = f32>) -> f32 {
     rooms.fold(f32::INFINITY, f32::min)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Purpose;
+    use crate::robot::bodies;
+
+    #[test]
+    fn places_keep_their_distances() {
+        let scenario = Scenario::default();
+        let placing = Placing::new(&scenario).expect("a valid scenario");
+        let team = bodies(&scenario);
+        let mut stream = Stream::new(0, 0, 0, Purpose::Start);
+        let solids = [Solid::Disc(0.3), Solid::Box(Vec2::new(0.2, 0.05))];
+        for _ in 0..300 {
+            let centre = placing.obstacle(&mut stream, &solids[1], &[(&solids[0], Vec2::zeros())]);
+            assert!(centre.clear && solids[0].distance(centre.at) >= solids[1].reach());
+            let placed = [(&solids[0], Vec2::zeros()), (&solids[1], centre.at)];
+            let mut robots: Vec<(&Body, Vec2)> = vec![];
+            for body in &team {
+                let place = placing.robot(&mut stream, body, &robots, &placed);
+                assert!(place.clear && place.at.amax() + body.radius <= 1.0);
+                assert!(robots.iter().all(|(other, at)| (at - place.at).norm() > other.radius + body.radius));
+                assert!(placed.iter().all(|(solid, at)| solid.distance(place.at - at) > body.radius));
+                robots.push((body, place.at));
+            }
+            let robots: Vec<Vec2> = robots.iter().map(|(_, at)| *at).collect();
+            let victim = placing.victim(&mut stream, &robots, &placed);
+            assert!(victim.clear && victim.at.amax() <= 0.9);
+            assert!(robots.iter().all(|robot| (robot - victim.at).norm() >= 0.2));
+            assert!(placed.iter().all(|(solid, at)| solid.distance(victim.at - at) >= 0.1));
+        }
+    }
+
+    #[test]
+    fn a_crowded_arena_is_told_and_the_roomiest_draw_taken() {
+        let scenario = Scenario { spawn_clearance_m: 9.0, ..Scenario::default() };
+        let placing = Placing::new(&scenario).expect("a valid scenario");
+        let mut stream = Stream::new(0, 0, 0, Purpose::Start);
+        let place = placing.victim(&mut stream, &[Vec2::new(-0.9, -0.9)], &[]);
+        assert!(!place.clear && place.at.x > 0.7 && place.at.y > 0.7, "{place:?}");
+    }
+
+    #[test]
+    fn what_cannot_fit_is_refused() {
+        let refused = |scenario: &Scenario| Placing::new(scenario).expect_err("no room").to_string();
+        let narrow = Scenario { wall_clearance_m: 1.0, ..Scenario::default() };
+        assert!(refused(&narrow).starts_with("scenario.wall_clearance_m = 1: must be below"));
+        let mut wide = Scenario::default();
+        wide.robots[3].radius_m = 0.5;
+        assert!(refused(&wide).starts_with("scenario.robots[3].radius_m = 0.5: must be below"));
+    }
+}

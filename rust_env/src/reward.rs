@@ -86,3 +86,63 @@ pub fn total_distance<'a>(
 ) -> f32 {
     victims.map(|victim| tasks[victim.task as usize].distance(victim.position, team, positions)).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::MAX_NEEDS;
+
+    /// One component of all robots, in thousandths.
+    fn column(rows: [[f32; NUM_COMPONENTS]; 4], component: usize) -> [i32; 4] {
+        rows.map(|row| (1000.0 * row[component]).round() as i32)
+    }
+
+    /// Components of a step of four robots in which the second and fourth rescued, the third was
+    /// touched and the sum of distances went from 2.0 to 1.5.
+    fn components(change: impl Fn(&mut Scenario)) -> [[f32; NUM_COMPONENTS]; 4] {
+        let mut scenario = Scenario {
+            rescue_reward: 10.0,
+            shaping_weight: 2.0,
+            shaping_discount: 0.5,
+            contact_cost: 3.0,
+            action_cost: 0.5,
+            ..Scenario::default()
+        };
+        change(&mut scenario);
+        let mut helpers = [None; MAX_NEEDS];
+        (helpers[0], helpers[1]) = (Some(1), Some(3));
+        let rescue = Rescue { env: 0, episode: 0, step: 0, slot: 0, victim: 0, task: 0, helpers };
+        let happened = Happened {
+            rescues: &[rescue],
+            distance_before: 2.0,
+            distance_after: 1.5,
+            touched: 0b0100,
+            effort: &[1.0, 0.25, 0.0, 0.0],
+        };
+        let (mut rows, mut reward) = ([[0.0; NUM_COMPONENTS]; 4], [0.0; 4]);
+        Weights::new(&scenario).write(&happened, rows.as_flattened_mut(), &mut reward);
+        for (row, reward) in rows.iter().zip(reward) {
+            assert!((row.iter().sum::<f32>() - reward).abs() < 1e-6);
+        }
+        rows
+    }
+
+    #[test]
+    fn each_component_goes_to_whom_it_should() {
+        let rows = components(|_| ());
+        assert_eq!(column(rows, 0), [0, 10_000, 0, 10_000]);
+        assert_eq!(column(rows, 1), [1000; 4]);
+        assert_eq!(column(rows, 2), [0, 0, -3000, 0]);
+        assert_eq!(column(rows, 3), [-500, -125, 0, 0]);
+    }
+
+    #[test]
+    fn credit_and_shaping_have_their_forms() {
+        let team = components(|scenario| scenario.rescue_credit = RescueCredit::Team);
+        assert_eq!(column(team, 0), [10_000; 4]);
+        let potential = components(|scenario| scenario.shaping = Shaping::Potential);
+        assert_eq!(column(potential, 1), [2500; 4], "2 (2 - 0.5 * 1.5)");
+        let sparse = components(|scenario| scenario.shaping = Shaping::None);
+        assert_eq!(column(sparse, 1), [0; 4]);
+    }
+}

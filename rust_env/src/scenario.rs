@@ -1,6 +1,8 @@
 //! `Scenario`: what a rescue world is made of, as plain data, and the rules a valid one obeys.
 //! Nothing here moves or draws anything.
 
+use std::fmt::Display;
+
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
@@ -15,6 +17,8 @@ pub const MAX_OBSTACLES: usize = 64;
 pub const MAX_ABILITIES: usize = 32;
 /// Most helpers that one victim may need.
 pub const MAX_NEEDS: usize = 8;
+/// Most that the heaviest robot may weigh, in weights of the lightest: contacts are true up to here.
+pub const MAX_MASS_RATIO: f64 = 100.0;
 
 /// When and how many victims appear (paper, section III).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -349,7 +353,19 @@ impl Scenario {
             within(&key("radius_m"), robot.radius_m, 0.005, 10.0, "m")?;
             within(&key("drive_force_n"), robot.drive_force_n, 0.0, 1e5, "N")?;
         }
+        let ratio = self.mass_ratio();
+        if ratio > MAX_MASS_RATIO {
+            let rule = format!("must be at most {MAX_MASS_RATIO}");
+            return broken("robots (heaviest to lightest mass_kg)", &ratio, &rule);
+        }
         counts("robots (their different abilities)", self.abilities().len(), 0, MAX_ABILITIES)
+    }
+
+    /// What the heaviest robot weighs, in weights of the lightest.
+    #[must_use]
+    pub fn mass_ratio(&self) -> f64 {
+        let masses = || self.robots.iter().map(|robot| robot.mass_kg);
+        masses().fold(0.0, f64::max) / masses().fold(f64::INFINITY, f64::min)
     }
 
     fn validate_tasks(&self) -> Result<()> {
@@ -408,10 +424,10 @@ impl Scenario {
                     within(&key("half_extents_m[1]"), half[1], 0.005, self.arena_half_width_m, "m")?;
                 }
                 (Shape::Disc, ..) => {
-                    return broken(&key("shape"), "disc", "a disc has radius_m and no half_extents_m");
+                    return broken(&key("shape"), &"disc", "a disc has radius_m and no half_extents_m");
                 }
                 (Shape::Box, ..) => {
-                    return broken(&key("shape"), "box", "a box has half_extents_m and no radius_m");
+                    return broken(&key("shape"), &"box", "a box has half_extents_m and no radius_m");
                 }
             }
             if let Some([x, y]) = obstacle.position_m {
@@ -423,22 +439,22 @@ impl Scenario {
     }
 }
 
-fn broken(key: &str, value: impl ToString, rule: impl ToString) -> Result<()> {
-    Err(Error::Scenario { key: format!("scenario.{key}"), value: value.to_string(), rule: rule.to_string() })
+fn broken(key: &str, value: &dyn Display, rule: &str) -> Result<()> {
+    Err(Error::Scenario { key: format!("scenario.{key}"), value: value.to_string(), rule: rule.into() })
 }
 
 fn within(key: &str, value: f64, low: f64, high: f64, unit: &str) -> Result<()> {
     if (low..=high).contains(&value) {
         return Ok(());
     }
-    broken(key, value, format!("must be in {low}..={high} {unit}").trim_end())
+    broken(key, &value, format!("must be in {low}..={high} {unit}").trim_end())
 }
 
 fn counts(key: &str, value: usize, low: usize, high: usize) -> Result<()> {
     if (low..=high).contains(&value) {
         return Ok(());
     }
-    broken(key, value, format!("must be in {low}..={high}"))
+    broken(key, &value, &format!("must be in {low}..={high}"))
 }
 
 fn named(key: &str, value: &str) -> Result<()> {
@@ -446,5 +462,113 @@ fn named(key: &str, value: &str) -> Result<()> {
     if !value.is_empty() && value.len() <= 64 && value.chars().all(allowed) {
         return Ok(());
     }
-    broken(key, format!("{value:?}"), "must be 1 to 64 letters, digits, '_' or '-'")
+    broken(key, &format!("{value:?}"), "must be 1 to 64 letters, digits, '_' or '-'")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The error's text when `change` is made to the default scenario.
+    fn refusal(change: impl Fn(&mut Scenario)) -> String {
+        let mut scenario = Scenario::default();
+        change(&mut scenario);
+        scenario.validate().expect_err("a bad scenario").to_string()
+    }
+
+    fn team_of(count: usize) -> Vec<Robot> {
+        let named = |index: usize| Robot {
+            name: format!("r{index}"),
+            ..Scenario::default().robots[index % 4].clone()
+        };
+        (0..count).map(named).collect()
+    }
+
+    #[test]
+    fn the_default_is_valid_and_survives_json() {
+        let scenario = Scenario::default();
+        assert_eq!(Scenario::from_json(&scenario.to_json()), Ok(scenario.clone()));
+        assert_eq!(Scenario::from_json("{}"), Ok(scenario));
+    }
+
+    #[test]
+    fn text_that_is_no_scenario_is_refused() {
+        for text in [
+            "",
+            "{\"colour\": 1}",
+            "{\"robots\": [{\"wheels\": 3}]}",
+            "{\"engine\": \"bullet\"}",
+            "{\"dt_s\": NaN}",
+        ] {
+            assert!(matches!(Scenario::from_json(text), Err(Error::ScenarioText(_))), "{text}");
+        }
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_named() {
+        let refused = refusal(|scenario| scenario.robots[2].mass_kg = -1.0);
+        assert_eq!(refused, "scenario.robots[2].mass_kg = -1: must be in 0.01..=1000 kg");
+        assert!(refusal(|scenario| scenario.dt_s = f64::NAN).starts_with("scenario.dt_s = NaN: must be"));
+        assert!(refusal(|scenario| scenario.damping = 1.01).contains("in 0..=1"));
+        assert!(
+            refusal(|scenario| scenario.substeps = 0).contains("scenario.substeps = 0: must be in 1..=1000")
+        );
+        assert!(refusal(|scenario| scenario.max_victims = 33).contains("must be in 1..=32"));
+        assert!(refusal(|scenario| scenario.end_when_rescued = Some(0)).contains("end_when_rescued = 0"));
+        assert!(
+            refusal(|scenario| scenario.robots[3].radius_m = f64::INFINITY)
+                .contains("robots[3].radius_m = inf")
+        );
+    }
+
+    #[test]
+    fn teams_have_their_limits() {
+        assert!(refusal(|scenario| scenario.robots.clear()).contains("robots (their number) = 0"));
+        assert!(refusal(|scenario| scenario.robots = team_of(65)).contains("= 65: must be in 1..=64"));
+        assert!(refusal(|scenario| scenario.robots[1].name = "food_0".into()).contains("names must differ"));
+        assert!(
+            refusal(|scenario| scenario.robots[0].kind = "a b".into()).contains("robots[0].kind = \"a b\"")
+        );
+        let heavy = refusal(|scenario| scenario.robots[0].mass_kg = 51.0);
+        assert_eq!(heavy, "scenario.robots (heaviest to lightest mass_kg) = 102: must be at most 100");
+        let scenario = Scenario { robots: team_of(64), ..Scenario::default() };
+        assert_eq!(scenario.validate(), Ok(()));
+    }
+
+    #[test]
+    fn a_task_needs_distinct_able_robots() {
+        let needs = |needs: &[&str]| {
+            let mut scenario = Scenario::default();
+            scenario.tasks[1].needs = needs.iter().map(ToString::to_string).collect();
+            scenario.validate()
+        };
+        assert_eq!(needs(&["food", "food", "medicine"]), Ok(()));
+        for bad in [&["food", "food", "food"][..], &["water"], &["medicine", "medicine"]] {
+            let error = needs(bad).expect_err("unservable").to_string();
+            assert!(error.starts_with("scenario.tasks[1].needs = "), "{error}");
+        }
+        assert!(needs(&[]).is_err() && needs(&["food"; 9]).is_err());
+        // One robot of two abilities cannot fill two needs, but may free another for one.
+        let mut scenario = Scenario::default();
+        scenario.robots[2].abilities = vec!["medicine".into(), "information".into()];
+        scenario.tasks[0].needs = vec!["medicine".into(), "information".into()];
+        assert_eq!(scenario.validate(), Ok(()));
+        scenario.tasks[0].needs.push("medicine".into());
+        assert!(scenario.validate().is_err());
+    }
+
+    #[test]
+    fn an_obstacle_has_the_measures_of_its_shape() {
+        let obstacle = |shape, radius_m, half_extents_m, position_m| {
+            let obstacles = vec![Obstacle { shape, radius_m, half_extents_m, position_m }];
+            Scenario { obstacles, ..Scenario::default() }.validate()
+        };
+        assert_eq!(obstacle(Shape::Disc, Some(0.1), None, Some([0.5, -0.5])), Ok(()));
+        assert_eq!(obstacle(Shape::Box, None, Some([0.1, 0.2]), None), Ok(()));
+        assert!(obstacle(Shape::Disc, Some(0.1), Some([0.1, 0.1]), None).is_err());
+        assert!(obstacle(Shape::Disc, None, None, None).is_err());
+        assert!(obstacle(Shape::Box, Some(0.1), None, None).is_err());
+        assert!(obstacle(Shape::Box, None, Some([0.0, 0.1]), None).is_err());
+        assert!(obstacle(Shape::Disc, Some(0.1), None, Some([1.5, 0.0])).is_err());
+    }
 }

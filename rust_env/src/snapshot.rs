@@ -78,3 +78,46 @@ fn fits(rules: &Rules, world: &World) -> bool {
             .chain(victims().map(|victim| victim.position))
             .all(|at| at.iter().all(|x| x.is_finite()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vec2;
+    use crate::scenario::Scenario;
+
+    fn rules() -> Rules {
+        Rules::new(Scenario::default()).expect("a valid scenario")
+    }
+
+    /// Why worlds are refused that are no worlds of these rules, though the checksum is right.
+    fn refusal(change: impl Fn(&mut World)) -> String {
+        let rules = rules();
+        let mut worlds = [World::new(&rules, 0, 0), World::new(&rules, 0, 1)];
+        assert_eq!(load(&rules, 2, &save(&rules, worlds.iter())), Ok(worlds.to_vec()));
+        change(&mut worlds[1]);
+        load(&rules, 2, &save(&rules, worlds.iter())).expect_err("a forged image").to_string()
+    }
+
+    #[test]
+    fn worlds_that_do_not_fit_are_refused() {
+        let wanted = "snapshot: env 1 does not fit the scenario";
+        assert_eq!(refusal(|world| world.positions[2].x = f32::NAN), wanted);
+        assert_eq!(refusal(|world| world.velocities[0].y = f32::INFINITY), wanted);
+        assert_eq!(refusal(|world| world.positions.push(Vec2::zeros())), wanted);
+        assert_eq!(refusal(|world| world.velocities.clear()), wanted);
+        assert_eq!(refusal(|world| world.obstacles.push(Vec2::zeros())), wanted);
+        assert_eq!(refusal(|world| world.victims.clear()), wanted);
+        assert_eq!(refusal(|world| world.victims[0].as_mut().expect("one is present").task = 2), wanted);
+    }
+
+    #[test]
+    fn another_version_is_refused() {
+        let rules = rules();
+        let worlds: Vec<World> = vec![];
+        let image = Image { version: VERSION + 1, scenario: rules.scenario.to_json(), worlds };
+        let mut bytes = postcard::to_extend(&image, MAGIC.to_vec()).expect("plain data serialises");
+        bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+        let error = load(&rules, 0, &bytes).expect_err("another version").to_string();
+        assert_eq!(error, "snapshot: version 2 was found; this version reads 1");
+    }
+}

@@ -93,7 +93,9 @@ impl Needs {
                 open &= !(1 << nearest);
                 let later = &mut candidates[need + 1..];
                 let before: [u64; MAX_NEEDS] = std::array::from_fn(|i| later.get(i).copied().unwrap_or(0));
-                later.iter_mut().for_each(|mask| *mask &= !(1 << nearest));
+                for mask in later.iter_mut() {
+                    *mask &= !(1 << nearest);
+                }
                 if fillable(later) {
                     helpers[need] = Some(nearest as u8);
                     break;
@@ -164,4 +166,54 @@ pub struct Rescue {
     pub task: u32,
     /// Helpers, one for each need.
     pub helpers: [Option<u8>; MAX_NEEDS],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::bodies;
+
+    /// The default team around a victim at the centre: food at 0.1 and 0.12, information at 0.05,
+    /// medicine at 0.14.
+    fn around() -> (Vec<Body>, Vec<Needs>, [Vec2; 4]) {
+        let scenario = Scenario::default();
+        let at = [Vec2::new(0.1, 0.0), Vec2::new(0.0, 0.12), Vec2::new(-0.05, 0.0), Vec2::new(0.0, -0.14)];
+        (bodies(&scenario), Needs::of_tasks(&scenario), at)
+    }
+
+    fn named(helpers: Option<[Option<u8>; MAX_NEEDS]>) -> Option<Vec<u8>> {
+        helpers.map(|helpers| helpers.iter().flatten().copied().collect())
+    }
+
+    #[test]
+    fn the_nearest_able_robots_help() {
+        let (team, tasks, at) = around();
+        let helpers =
+            |task: usize, radius, busy| named(tasks[task].helpers(Vec2::zeros(), &team, &at, radius, busy));
+        assert_eq!(helpers(0, 0.15, 0), Some(vec![0, 3]));
+        assert_eq!(helpers(1, 0.15, 0), Some(vec![0, 2]));
+        assert_eq!(helpers(0, 0.15, 0b0001), Some(vec![1, 3]), "food_0 is busy");
+        assert_eq!(helpers(0, 0.15, 0b1000), None, "medical_0 is busy");
+        assert_eq!(helpers(0, 0.13, 0), None, "medical_0 is too far");
+        assert_eq!(helpers(0, 0.14, 0), Some(vec![0, 3]), "at the very radius");
+    }
+
+    #[test]
+    fn a_robot_of_many_abilities_is_left_to_the_need_that_has_no_other() {
+        let (mut team, tasks, mut at) = around();
+        team[3].abilities |= team[0].abilities;
+        at[3] = Vec2::new(0.01, 0.0);
+        assert_eq!(named(tasks[0].helpers(Vec2::zeros(), &team, &at, 0.15, 0)), Some(vec![0, 3]));
+        assert_eq!(named(tasks[1].helpers(Vec2::zeros(), &team, &at, 0.15, 0)), Some(vec![3, 2]));
+    }
+
+    #[test]
+    fn distances_are_those_of_the_nearest_for_each_need() {
+        let (team, tasks, at) = around();
+        assert!((tasks[0].distance(Vec2::zeros(), &team, &at) - 0.24).abs() < 1e-6);
+        let mut twice = Scenario::default();
+        twice.tasks[0].needs = vec!["food".into(), "medicine".into(), "food".into()];
+        let twice = Needs::of_tasks(&twice).remove(0);
+        assert!((twice.distance(Vec2::zeros(), &team, &at) - 0.36).abs() < 1e-6);
+    }
 }

@@ -1,195 +1,210 @@
-"""The rescue world's rules once more, plainly and in float64, as the scenario reference tells them.
+"""A second, plain reading of the rescue world in float64, to hold the compiled one against.
 
-It knows no contacts: `may_touch` says where they cannot be ruled out. Where and of which task new
-victims are, the caller must say. Arrays have a leading axis of E worlds; rescues are settled for
-one world at a time, by trying every assignment of robots to needs.
+It covers motion without contacts, the rescue rule, rewards and observations. It draws nothing:
+starts, and the places of new victims, are taken from the world that is checked.
 """
 
+from __future__ import annotations
+
+from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 
-DIRECTIONS = np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)], float)
-NOTHING = 1e9
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], dtype=np.float64)
+
+
+@dataclass
+class State:
+    """E worlds: places and velocities (E, R, 2), obstacles (E, O, 2), victims (E, V) structured."""
+
+    positions: Array
+    velocities: Array
+    obstacles: Array
+    victims: NDArray[np.void]
+
+    @property
+    def present(self) -> Bools:
+        return np.asarray(self.victims["present"])
+
+    @property
+    def places(self) -> Array:
+        """Places of the victims, (E, V, 2)."""
+        return np.stack([self.victims["x"], self.victims["y"]], axis=-1).astype(np.float64)
 
 
 class Stepper:
+    """The rules of one scenario, for E worlds at once."""
+
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
-        team = scenario.robots
-        self.abilities = sorted({ability for robot in team for ability in robot.abilities})
-        self.able = np.array([[a in robot.abilities for a in self.abilities] for robot in team])
-        self.needs = [[self.abilities.index(a) for a in task.needs] for task in scenario.tasks]
-        self.counts = np.array(
-            [[task.count(a) for a in range(len(self.abilities))] for task in self.needs]
-        )
-        self.radius = np.array([robot.radius_m for robot in team])
-        self.push = np.array([robot.drive_force_n / robot.mass_kg for robot in team])
-        self.top = np.array([robot.max_speed_mps for robot in team])
+        robots, tasks = scenario.robots, scenario.tasks
+        self.radii = np.array([robot.radius_m for robot in robots])
+        self.max_speed = np.array([robot.max_speed_mps for robot in robots])
+        self.acceleration = np.array([robot.drive_force_n / robot.mass_kg for robot in robots])
+        self.abilities = sorted({ability for robot in robots for ability in robot.abilities})
+        self.able = np.array([[a in robot.abilities for a in self.abilities] for robot in robots])
+        self.able = self.able.reshape(len(robots), len(self.abilities))
+        self.counts = np.array([[task.needs.count(a) for a in self.abilities] for task in tasks])
+        self.helps = (self.able[:, None, :] & (self.counts > 0)).any(-1)  # (R, T)
+        everyone = range(len(robots))
+        self.others = np.array([[j for j in everyone if j != i] for i in everyone], dtype=int)
 
-    def drive(self, actions: np.ndarray) -> np.ndarray:
-        """The commanded vectors (E, R, 2), of length 1 at most."""
+    def drive(self, actions: NDArray[Any]) -> Array:
+        """Directions whose length is the share of full force, (E, R, 2)."""
         if self.scenario.actions == "discrete":
-            return DIRECTIONS[actions]
-        return shortened(actions.astype(float), 1.0)
+            return np.asarray(DIRECTIONS[actions])
+        length = np.linalg.norm(actions.astype(np.float64), axis=-1, keepdims=True)
+        return np.asarray(actions / np.maximum(length, 1.0))
 
-    def fly(self, positions: np.ndarray, velocities: np.ndarray, drive: np.ndarray) -> tuple:
+    def fly(self, state: State, drive: Array) -> tuple[Array, Array]:
+        """Places and velocities after a period in which nothing touches."""
         dt = self.scenario.dt_s
-        faster = (1 - self.scenario.damping) * velocities + self.push[:, None] * drive * dt
-        velocities = shortened(faster, self.top[:, None])
-        return positions + velocities * dt, velocities
+        velocities = (1 - self.scenario.damping) * state.velocities
+        velocities = velocities + self.acceleration[:, None] * dt * drive
+        speed = np.linalg.norm(velocities, axis=-1)
+        too_fast = speed > self.max_speed
+        factor = np.where(too_fast, self.max_speed / np.where(too_fast, speed, 1.0), 1.0)
+        velocities = velocities * factor[..., None]
+        return state.positions + velocities * dt, velocities
 
-    def may_touch(
-        self, before: np.ndarray, after: np.ndarray, obstacles: np.ndarray, margin: float
-    ) -> np.ndarray:
-        """(E,) whether anything comes within ``margin`` of touching on the straight way."""
-        start = before[:, :, None] - before[:, None]
-        way = (after - before)[:, :, None] - (after - before)[:, None]
-        gap = nearest(start, way) - self.radius[:, None] - self.radius
-        gap[:, np.arange(len(self.radius)), np.arange(len(self.radius))] = NOTHING
-        walls = self.scenario.arena_half_width_m - self.radius
-        reach = np.maximum(abs(before), abs(after)).max(-1)
-        close = (gap < margin).any((1, 2)) | (reach > walls - margin).any(1)
-        for number, obstacle in enumerate(self.scenario.obstacles):
-            size = obstacle.radius_m or np.hypot(*obstacle.half_extents_m)
-            start = before - obstacles[:, number, None]
-            room = nearest(start, after - before) - self.radius - size
-            close |= (room < margin).any(1)
-        return close
+    def may_touch(self, state: State, velocities: Array) -> Bools:
+        """Whether anything comes near anything in the period, (E,); errs towards yes."""
+        dt, at = self.scenario.dt_s, state.positions
+        end = at + velocities * dt
+        wall = self.scenario.arena_half_width_m - self.radii
+        near = (np.maximum(abs(at), abs(end)).max(-1) > wall - 1e-4).any(-1)
+        apart = at[:, :, None] - at[:, None]
+        closing = (velocities[:, :, None] - velocities[:, None]) * dt
+        reach = self.radii[:, None] + self.radii + 1e-4 - 10 * np.eye(len(self.radii))
+        near |= (closest(apart, closing) < reach).any((-1, -2))
+        for index, obstacle in enumerate(self.scenario.obstacles):
+            size = obstacle.radius_m or np.hypot(*(obstacle.half_extents_m or (0.0, 0.0)))
+            apart = at - state.obstacles[:, None, index]
+            near |= (closest(apart, velocities * dt) < self.radii + size + 0.05).any(-1)
+        return np.asarray(near)
 
-    def settle(self, distance: np.ndarray, tasks: np.ndarray) -> list[tuple[int, tuple]]:
-        """(slot, helpers) of a world's rescues; distance (V, R), tasks (V,), -1 where absent."""
-        rescues = []
-        busy: set[int] = set()
-        for slot, task in enumerate(tasks):
-            if task < 0:
-                continue
-            near = distance[slot] <= self.scenario.rescue_radius_m
-            candidates = [
-                [r for r in np.flatnonzero(near & self.able[:, need]) if r not in busy]
-                for need in self.needs[task]
-            ]
-            fitting = [chosen for chosen in product(*candidates) if len({*chosen}) == len(chosen)]
-            if fitting:
-                # Every need in turn wants the nearest robot, the first of equally near ones.
-                helpers = min(fitting, key=lambda them: [(distance[slot][r], r) for r in them])
-                busy |= {*helpers}
-                rescues.append((slot, tuple(int(robot) for robot in helpers)))
-        return rescues
+    def distances(self, state: State, positions: Array) -> Array:
+        """Distances of robots from victims, (E, V, R)."""
+        return np.linalg.norm(state.places[:, :, None] - positions[:, None], axis=-1)
 
-    def way_to_go(self, distance: np.ndarray, tasks: np.ndarray) -> np.ndarray:
-        """(E,) the distances of the nearest robots, summed over victims' needs; from (E, V, R)."""
-        total = np.zeros(len(distance))
+    def total_distance(self, state: State, positions: Array) -> Array:
+        """Σ over present victims and their needs of the nearest able robots' distances, (E,)."""
+        distances = self.distances(state, positions)
+        total = np.zeros(len(positions))
         for task, counts in enumerate(self.counts):
-            for ability in np.flatnonzero(counts):
-                of_able = np.sort(distance[:, :, self.able[:, ability]], axis=-1)
-                least = of_able[:, :, : counts[ability]].sum(-1)
-                total += np.where(tasks == task, least, 0.0).sum(-1)
+            mine = state.present & (state.victims["task"] == task)
+            for ability, count in enumerate(counts):
+                able = distances[..., self.able[:, ability]]
+                nearest = np.sort(able, axis=-1)[..., :count].sum(-1)
+                total += np.where(mine, nearest, 0.0).sum(-1)
         return total
 
-    def rewards(
+    def rescues(self, state: State, positions: Array) -> tuple[list[tuple[int, ...]], Bools]:
+        """(env, slot, helpers...) of all rescues; worlds in which rounding might decide, (E,)."""
+        radius = self.scenario.rescue_radius_m
+        distances = self.distances(state, positions)
+        close = abs(distances - radius) < 1e-5
+        in_order = np.sort(distances, axis=-1)
+        tied = (np.diff(in_order, axis=-1) < 1e-5) & (in_order[..., 1:] < radius)
+        unsure = (state.present & (close.any(-1) | tied.any(-1))).any(-1)
+        found: list[tuple[int, ...]] = []
+        near = distances <= radius
+        for env in np.flatnonzero((state.present & near.any(-1)).any(-1)):
+            busy: set[int] = set()
+            for slot in np.flatnonzero(state.present[env]):
+                free = [int(r) for r in np.flatnonzero(near[env, slot]) if r not in busy]
+                free.sort(key=lambda robot: (distances[env, slot, robot], robot))
+                needs = self.scenario.tasks[state.victims["task"][env, slot]].needs
+                helpers = self._first_team(needs, free)
+                if helpers:
+                    busy |= set(helpers)
+                    found.append((int(env), int(slot), *helpers))
+        return found, unsure
+
+    def _first_team(self, needs: tuple[str, ...], nearest_first: list[int]) -> tuple[int, ...]:
+        """The first of all teams in order of nearness, need by need, that fills every need."""
+        # Others take at most len(needs) - 1 robots, so nobody farther is ever needed.
+        able = [
+            [r for r in nearest_first if need in self.scenario.robots[r].abilities][: len(needs)]
+            for need in needs
+        ]
+        for team in product(*able):
+            if len(set(team)) == len(team):
+                return team
+        return ()
+
+    def reward_components(
         self,
-        drive: np.ndarray,
-        rescues: list[list[tuple[int, tuple]]],
-        ways: tuple[np.ndarray, np.ndarray, np.ndarray],
-        terminated: np.ndarray,
-    ) -> np.ndarray:
-        """(E, R, 4) by component where nothing touches.
-
-        ``ways`` are `way_to_go` before the step, after it for the same victims, and after it for
-        the victims who are there then.
-        """
+        before: State,
+        after: State,
+        drive: Array,
+        rescues: list[tuple[int, ...]],
+        terminated: Bools,
+    ) -> Array:
+        """Rewards by component without the contact's, (E, R, 4)."""
         scenario = self.scenario
-        parts = np.zeros((*drive.shape[:2], 4))
-        for world, events in enumerate(rescues):
-            for _, helpers in events:
-                credited = list(helpers) if scenario.rescue_credit == "helpers" else slice(None)
-                parts[world, credited, 0] += scenario.rescue_reward
-        before, same, after = ways
-        dense = {
-            "progress": before - same,
-            "potential": before - scenario.shaping_discount * np.where(terminated, 0.0, after),
-            "none": np.zeros_like(before),
-        }[scenario.shaping]
-        parts[:, :, 1] = scenario.shaping_weight * dense[:, None]
-        parts[:, :, 3] = -scenario.action_cost * (drive**2).sum(-1)
-        return parts
+        reward = np.zeros((*before.positions.shape[:2], 4))
+        for env, _slot, *helpers in rescues:
+            robots = helpers if scenario.rescue_credit == "helpers" else slice(None)
+            reward[env, robots, 0] += scenario.rescue_reward
+        start = self.total_distance(before, before.positions)
+        dense = np.zeros_like(start)
+        if scenario.shaping == "progress":
+            dense = start - self.total_distance(before, after.positions)
+        elif scenario.shaping == "potential":
+            end = np.where(terminated, 0.0, self.total_distance(after, after.positions))
+            dense = start - scenario.shaping_discount * end
+        reward[..., 1] = (scenario.shaping_weight * dense)[:, None]
+        reward[..., 3] = -scenario.action_cost * (drive**2).sum(-1)
+        return reward
 
-    def names(self) -> list[str]:
-        plane, ability = ("x", "y"), [f"ability.{a}" for a in self.abilities]
-        own = [f"own.{what}.{c}" for what in ("position", "velocity") for c in plane]
-        own += [f"own.{a}" for a in ability] + ["own.available"]
-        mates = [
-            f"teammate_{k}.{column}"
-            for k in range(len(self.radius) - 1)
-            for column in (
-                *(f"relative_{what}.{c}" for what in ("position", "velocity") for c in plane),
-                *ability,
-                "available",
-            )
-        ]
-        victims = [
-            f"victim_{k}.{column}"
-            for k in range(self.scenario.num_victims)
-            for column in (
-                "present",
-                *(f"need.{a}" for a in self.abilities),
-                *(f"relative_position.{c}" for c in plane),
-            )
-        ]
-        return own + mates + victims
+    def observations(self, state: State) -> tuple[Array, Bools]:
+        """Rows of all robots, (E, R, D); where rounding might order victims otherwise, (E, R)."""
+        envs, robots = state.positions.shape[:2]
+        able = self.able.astype(np.float64)
+        flags = np.concatenate([able, np.ones((robots, 1))], axis=-1)  # everyone is available
+        motion = np.concatenate([state.positions, state.velocities], axis=-1)
+        own = np.concatenate([motion, np.broadcast_to(flags, (envs, *flags.shape))], axis=-1)
+        blocks = [own]
+        if robots > 1:
+            relative = motion[:, self.others] - motion[:, :, None]
+            seen = np.broadcast_to(flags[self.others], (envs, *self.others.shape, flags.shape[-1]))
+            blocks.append(np.concatenate([relative, seen], axis=-1).reshape(envs, robots, -1))
+        victims, unsure = self._victims_seen(state)
+        return np.concatenate([*blocks, victims], axis=-1), unsure
 
-    def observations(
-        self, positions: np.ndarray, velocities: np.ndarray, places: np.ndarray, tasks: np.ndarray
-    ) -> np.ndarray:
-        """(E, R, D); victims at places (E, V, 2) of tasks (E, V), -1 where absent."""
-        envs, robots = positions.shape[:2]
-        here = np.ones((envs, 1))
-        rows = []
-        for robot in range(robots):
-            row = [positions[:, robot], velocities[:, robot], here * self.able[robot], here]
-            for mate in range(robots):
-                if mate != robot:
-                    row.append(positions[:, mate] - positions[:, robot])
-                    row.append(velocities[:, mate] - velocities[:, robot])
-                    row += [here * self.able[mate], here]
-            order = self.order(robot, positions[:, robot], places, tasks)
-            for slot in order.T:
-                task = np.take_along_axis(tasks, slot[:, None], 1)
-                place = np.take_along_axis(places, slot[:, None, None], 1)[:, 0]
-                there = task >= 0
-                row.append(there)
-                row.append(there * self.counts[task[:, 0]])
-                row.append(there * (place - positions[:, robot]))
-            rows.append(np.concatenate(row, 1))
-        return np.stack(rows, 1)
-
-    def order(
-        self, robot: int, position: np.ndarray, places: np.ndarray, tasks: np.ndarray
-    ) -> np.ndarray:
-        """(E, V) the slots in the order in which a robot sees them."""
-        slots = np.broadcast_to(np.arange(tasks.shape[1]), tasks.shape)
-        if self.scenario.victim_order == "slot":
-            return slots
-        helpful = ((self.counts > 0) & self.able[robot]).any(1)[tasks]
-        far = np.linalg.norm(places - position[:, None], axis=-1)
-        return np.lexsort((slots, far, ~helpful, tasks < 0), axis=-1)
+    def _victims_seen(self, state: State) -> tuple[Array, Bools]:
+        envs, robots = state.positions.shape[:2]
+        place = state.places[:, None] - state.positions[:, :, None]  # (E, R, V, 2)
+        distance = np.linalg.norm(place, axis=-1)
+        there = np.broadcast_to(state.present[:, None], distance.shape)
+        needs = self.counts[state.victims["task"]]  # absent ones are blanked below
+        needs = np.broadcast_to(needs[:, None], (*distance.shape, needs.shape[-1]))
+        blocks = np.concatenate([there[..., None], needs, place], axis=-1) * there[..., None]
+        unsure = np.zeros((envs, robots), dtype=bool)
+        if self.scenario.victim_order == "relevant":
+            helped = self.helps[:, state.victims["task"]].transpose(1, 0, 2)
+            rank = np.where(there, np.where(helped, 0, 1), 2)
+            key = np.where(there, distance, 0.0)
+            order = np.lexsort((key, rank), axis=-1)
+            blocks = np.take_along_axis(blocks, order[..., None], axis=-2)
+            sort = [np.take_along_axis(values, order, axis=-1) for values in (rank, key)]
+            tied = (np.diff(sort[0], axis=-1) == 0) & (np.diff(sort[1], axis=-1) < 1e-5)
+            unsure = (tied & (sort[0][..., 1:] < 2)).any(-1)
+        return blocks.reshape(envs, robots, -1), unsure
 
 
-def shortened(vectors: np.ndarray, most: np.ndarray | float) -> np.ndarray:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors * np.minimum(1.0, most / np.maximum(length, 1e-300))
-
-
-def distances(positions: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """(E, V, R) of robots (E, R, 2) and victims (E, V, 2)."""
-    return np.linalg.norm(positions[:, None] - places[:, :, None], axis=-1)
-
-
-def nearest(start: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """The least distance from the origin of points that move straight by ``way``."""
-    squared = np.maximum((way**2).sum(-1), 1e-300)
-    when = np.clip(-(start * way).sum(-1) / squared, 0.0, 1.0)
-    return np.linalg.norm(start + when[..., None] * way, axis=-1)
+def closest(apart: Array, motion: Array) -> Array:
+    """Least distance from the origin on the way from `apart` to `apart + motion`."""
+    length = (motion**2).sum(-1)
+    share = -(apart * motion).sum(-1) / np.where(length > 0, length, 1.0)
+    nearest = apart + np.clip(share, 0.0, 1.0)[..., None] * motion
+    return np.asarray(np.linalg.norm(nearest, axis=-1))

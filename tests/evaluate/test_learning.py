@@ -1,4 +1,4 @@
-"""Learning, small and sure: two robots, one victim at a time; both attentions beat random by far."""
+"""Learning, small and sure: two robots, one victim at a time; both attentions beat random."""
 
 from pathlib import Path
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -39,6 +41,19 @@ def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
 def thread_count(config: RunConfig) -> int:
     """Threads of worlds and networks: `train.threads`, or every core this process may use."""
     return config.train.threads or len(os.sched_getaffinity(0))
+
+
+def keep_heap_small() -> None:
+    """Give large buffers back to the system when they are freed (glibc only; elsewhere nothing).
+
+    An update makes and frees hundreds of aligned buffers. Left to itself the C library moves them
+    to its heap, finds no holes for them there, and grows by gigabytes in an hour.
+    """
+    mmap_threshold, least_bytes = -3, 4 * 1024 * 1024
+    if sys.platform == "linux":
+        mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+        if mallopt is not None:
+            mallopt(mmap_threshold, least_bytes)
 
 
 @contextmanager

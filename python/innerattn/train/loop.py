@@ -15,7 +15,12 @@ import torch
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.learn.types import Learner, Transitions
-from innerattn.train.build import build_learner, thread_count, torch_threads
+from innerattn.train.build import (
+    build_learner,
+    keep_heap_small,
+    thread_count,
+    torch_threads,
+)
 from innerattn.train.checkpoint import RunFolder, State, refuse_existing
 from innerattn.train.collect import Collector
 from innerattn.train.metrics import Interval, Metrics, MetricsFile, attention_entropy
@@ -60,6 +65,7 @@ def train(
     """
     path = Path(run_dir)
     refuse_existing(path)
+    keep_heap_small()
     threads = thread_count(config)
     with torch_threads(threads):
         env = BatchEnv(

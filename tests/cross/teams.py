@@ -1,0 +1,73 @@
+"""Random valid scenarios: teams of 1 to 64 robots, tasks they can serve, every option."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from innerattn.config import Obstacle, Robot, Scenario, Task
+
+SIZES = (1, 2, 3, 4, 4, 5, 8, 12, 20, 64)
+
+
+def random_scenario(rng: np.random.Generator) -> Scenario:
+    """A scenario whose arena grows with the team, so that most steps are free of contacts."""
+
+    def pick(*values: object) -> object:
+        return values[rng.integers(len(values))]
+
+    def between(low: float, high: float) -> float:
+        return float(rng.uniform(low, high))
+
+    size = int(pick(*SIZES))  # type: ignore[call-overload]
+    arena = 0.4 + 0.6 * size**0.5
+    names = ["water", "food", "rope", "light"][: rng.integers(1, 5)]
+    robots = [
+        Robot(
+            name=f"robot_{index}",
+            kind=f"kind_{index % 3}",
+            abilities=tuple(rng.permutation(names)[: rng.integers(1, len(names) + 1)].tolist()),
+            max_speed_mps=between(0.5, 2.0),
+            mass_kg=between(0.5, 2.0),
+            radius_m=between(0.03, 0.06),
+            drive_force_n=between(2.0, 10.0),
+        )
+        for index in range(size)
+    ]
+    tasks = []
+    for index in range(rng.integers(1, 4)):
+        # Distinct robots, one ability of each: a task that can be served.
+        team = rng.choice(size, size=rng.integers(1, min(size, 3) + 1), replace=False)
+        needs = tuple(str(rng.choice(robots[robot].abilities)) for robot in team)
+        tasks.append(Task(name=f"task_{index}", needs=needs))
+    obstacles = [
+        Obstacle(shape="disc", radius_m=between(0.03, 0.1)),
+        Obstacle(shape="box", half_extents_m=(between(0.03, 0.1), between(0.03, 0.1))),
+        Obstacle(shape="disc", radius_m=0.1, position_m=(between(-0.5, 0.5), 0.0)),
+    ]
+    return Scenario.model_validate(
+        {
+            "situation": pick("single", "double", "mixed"),
+            "robots": robots,
+            "tasks": tasks,
+            "max_victims": pick(1, 2, 3, 6, 32),
+            "obstacles": obstacles[: rng.integers(4)] if size <= 8 and rng.random() < 0.5 else [],
+            "arena_half_width_m": arena,
+            "rescue_radius_m": arena * between(0.1, 0.8),
+            "spawn_clearance_m": pick(0.0, 0.1, 0.2),
+            "wall_clearance_m": pick(0.0, 0.1),
+            "episode_steps": pick(1, 10, 25, 60),
+            "end_when_rescued": pick(None, None, 1, 4),
+            "dt_s": pick(0.05, 0.1, 0.15),
+            "substeps": pick(4, 6, 9),
+            "damping": pick(0.0, 0.1, 0.25, 1.0),
+            "actions": pick("discrete", "continuous"),
+            "rescue_credit": pick("helpers", "team"),
+            "rescue_reward": pick(1.0, 5.0),
+            "shaping": pick("progress", "potential", "none"),
+            "shaping_weight": pick(1.0, 0.3),
+            "shaping_discount": pick(0.95, 1.0),
+            "contact_cost": pick(0.0, 0.5),
+            "action_cost": pick(0.0, 0.1),
+            "victim_order": pick("relevant", "slot"),
+        }
+    )
