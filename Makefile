@@ -8,7 +8,7 @@ TRAIN ?= --preset mixed --method td-inner --budget quick
 export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train test test-slow lint format bench setup clean
+.PHONY: train test test-slow lint format bench docs setup clean
 
 train: setup ## train TD-innerATT on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -51,8 +51,11 @@ $(VENV)/.installed: pyproject.toml
 
 $(VENV)/.built: $(VENV)/.installed $(RUST)
 	@echo "Compiling the worlds."
-	maturin develop --release --quiet --extras dev
+	PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --release --quiet --extras dev
 	@touch $@
+
+docs: setup ## draw the pictures of the documentation
+	python docs/pictures.py
 
 clean: ## remove everything that was built
 	rm -rf $(VENV) target python/innerattn/_core*.so

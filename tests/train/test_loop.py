@@ -1,6 +1,7 @@
 """Whole runs: what they leave behind when they end, are interrupted, or cannot begin."""
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from innerattn.config import RunConfig
 from innerattn.errors import ConfigError, RunError
 from innerattn.learn import TD
 from innerattn.train import Progress, load_policy, read_info, train
+from innerattn.train.build import thread_count
 
 Configure = Callable[..., RunConfig]
 
@@ -138,3 +140,9 @@ def test_torch_threads_are_as_before(small_config: Configure, tmp_path: Path) ->
         assert (inside, torch.get_num_threads()) == ([1], 2)
     finally:
         torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize(("batch", "threads"), [(1, 1), (512, 1), (1024, 2)])
+def test_networks_get_a_thread_for_each_512_rows(batch: int, threads: int) -> None:
+    config = RunConfig.model_validate({"td": {"batch_size": batch}})
+    assert thread_count(config) == min(threads, len(os.sched_getaffinity(0)))

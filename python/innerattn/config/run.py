@@ -111,7 +111,10 @@ class TrainConfig(Model):
     seed: int = Field(0, ge=0, lt=2**63, description="seed of everything random")
     device: str = Field("cpu", description="where networks run: cpu, cuda, cuda:0, ...")
     threads: int | None = Field(
-        None, ge=1, le=256, description="threads of worlds and networks; None: all cores"
+        None,
+        ge=1,
+        le=256,
+        description="threads of worlds and networks; None: as many as are worth it",
     )
     num_envs: int = Field(64, ge=1, le=1_000_000, description="worlds stepped side by side")
     env_steps: int = Field(

@@ -38,9 +38,17 @@ def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
     )
 
 
+_ROWS_PER_THREAD = 512
+
+
 def thread_count(config: RunConfig) -> int:
-    """Threads of worlds and networks: `train.threads`, or every core this process may use."""
-    return config.train.threads or len(os.sched_getaffinity(0))
+    """Threads of the networks: `train.threads`, or one for every 512 rows of a batch.
+
+    A second thread gains little on small batches, and torch's threads wait for each other: where
+    another program takes one of the cores, two are many times slower than one.
+    """
+    worth = max(1, config.td.batch_size // _ROWS_PER_THREAD)
+    return config.train.threads or min(worth, len(os.sched_getaffinity(0)))
 
 
 def keep_heap_small() -> None:
