@@ -81,7 +81,7 @@ def test_the_same_evaluation_twice_is_the_same(run: Path) -> None:
 
 
 def test_greedy_actions_are_the_likeliest(run: Path) -> None:
-    config, drawing = load_trained(run)
+    config, drawing = load_trained(run, greedy=False)
     _, likeliest = load_trained(run, greedy=True)
     with torch.no_grad():
         settings = SETTINGS.model_copy(update={"score_episodes": 6, "long_episodes": 1})
