@@ -1,0 +1,120 @@
+//! What a batch refuses, and how episodes end and begin in it.
+
+use super::*;
+
+const ENVS: usize = 3;
+
+fn batch(scenario: Scenario, autoreset: Autoreset) -> Batch {
+    let options = Options { num_envs: ENVS, seed: 0, num_threads: Some(2), first_env: 0, autoreset };
+    Batch::new(scenario, options).expect("a valid scenario")
+}
+
+type Stepped = (Vec<f32>, Vec<f32>, Vec<bool>, Vec<bool>);
+
+/// Observations, final observations, terminated and truncated of a step.
+fn step(batch: &mut Batch, commands: Commands) -> Result<Stepped> {
+    let rows = ENVS * batch.rules().team.len();
+    let mut obs = vec![0.0; rows * batch.rules().layout.width()];
+    let (mut final_obs, mut reward) = (obs.clone(), vec![0.0; rows]);
+    let mut components = vec![0.0; rows * NUM_COMPONENTS];
+    let (mut terminated, mut truncated) = (vec![false; ENVS], vec![false; ENVS]);
+    let buffers = StepBuffers {
+        obs: &mut obs,
+        final_obs: &mut final_obs,
+        reward: &mut reward,
+        components: &mut components,
+        terminated: &mut terminated,
+        truncated: &mut truncated,
+    };
+    batch.step(commands, buffers)?;
+    Ok((obs, final_obs, terminated, truncated))
+}
+
+fn refusal(batch: &mut Batch, commands: Commands) -> String {
+    let before = batch.snapshot();
+    let error = step(batch, commands).expect_err("bad actions").to_string();
+    assert!(batch.snapshot() == before, "something moved: {error}");
+    error
+}
+
+#[test]
+fn bad_actions_are_named_and_nothing_moves() {
+    let mut discrete = batch(Scenario::default(), Autoreset::SameStep);
+    for (index, value) in [(6, 5), (6, -1), (6, i64::MAX)] {
+        let mut actions = [1; ENVS * 4];
+        actions[index] = value;
+        let wanted = format!("actions[env 1, robot 2] = {value}: must be an integer in 0..=4");
+        assert_eq!(refusal(&mut discrete, Commands::Discrete(&actions)), wanted);
+    }
+    assert!(refusal(&mut discrete, Commands::Discrete(&[0; 11])).starts_with("actions = 11 Discrete values"));
+    assert!(refusal(&mut discrete, Commands::Continuous(&[0.0; 24])).contains("must be 12 Discrete values"));
+    let scenario = Scenario { actions: Actions::Continuous, ..Scenario::default() };
+    let mut continuous = batch(scenario, Autoreset::SameStep);
+    for value in [f32::NAN, 1.001, f32::NEG_INFINITY] {
+        let mut actions = [0.5; ENVS * 8];
+        actions[23] = value;
+        let wanted = format!("actions[env 2, robot 3] = {value:?} on axis 1: must be a number in -1..=1");
+        assert_eq!(refusal(&mut continuous, Commands::Continuous(&actions)), wanted);
+    }
+}
+
+#[test]
+fn the_same_step_shows_the_end_and_the_next_beginning() {
+    let mut batch = batch(Scenario { episode_steps: 2, ..Scenario::default() }, Autoreset::SameStep);
+    let (obs, final_obs, _, truncated) = step(&mut batch, Commands::Discrete(&[1; 12])).expect("valid");
+    assert!(obs == final_obs && truncated == [false; 3]);
+    let (obs, final_obs, terminated, truncated) =
+        step(&mut batch, Commands::Discrete(&[1; 12])).expect("valid");
+    assert!(truncated == [true; 3] && terminated == [false; 3] && obs != final_obs);
+    assert!(batch.worlds().all(|world| world.episode == 1 && world.step == 0 && !world.over));
+    let mut now = vec![0.0; obs.len()];
+    batch.observe(&mut now);
+    assert!(obs == now);
+}
+
+#[test]
+fn without_autoreset_an_ended_world_waits() {
+    let mut batch = batch(Scenario { episode_steps: 1, ..Scenario::default() }, Autoreset::Disabled);
+    let (mut obs, final_obs, ..) = step(&mut batch, Commands::Discrete(&[1; 12])).expect("valid");
+    assert!(obs == final_obs);
+    batch.reset(None, Some(&[true, false, true]), &mut obs);
+    let error = refusal(&mut batch, Commands::Discrete(&[0; 12]));
+    assert!(error.starts_with("env 1: its episode is over"), "{error}");
+    batch.reset(None, Some(&[false, true, false]), &mut obs);
+    step(&mut batch, Commands::Discrete(&[0; 12])).expect("all were reset");
+}
+
+#[test]
+fn a_reset_goes_on_to_the_next_episode_or_starts_over() {
+    let mut batch = batch(Scenario::default(), Autoreset::SameStep);
+    let mut obs = vec![0.0; ENVS * 4 * batch.rules().layout.width()];
+    let episodes = |batch: &Batch| batch.worlds().map(|world| world.episode).collect::<Vec<_>>();
+    let made = batch.worlds().next().map(|world| world.positions.clone());
+    batch.reset(None, None, &mut obs);
+    assert_eq!(episodes(&batch), [0, 0, 0]);
+    let first = obs.clone();
+    batch.reset(None, Some(&[false, true, false]), &mut obs);
+    assert_eq!(episodes(&batch), [0, 1, 0]);
+    batch.reset(Some(0), None, &mut obs);
+    assert!(episodes(&batch) == [0, 0, 0] && obs == first);
+    assert_eq!(batch.worlds().next().map(|world| world.positions.clone()), made);
+    batch.reset(Some(1), None, &mut obs);
+    assert!(obs != first);
+}
+
+#[test]
+fn sizes_out_of_range_are_refused() {
+    let options = |num_envs, threads| Options {
+        num_envs,
+        seed: 0,
+        num_threads: Some(threads),
+        first_env: 0,
+        autoreset: Autoreset::SameStep,
+    };
+    let refused = |options| Batch::new(Scenario::default(), options).err().map(|error| error.to_string());
+    assert_eq!(refused(options(0, 1)).as_deref(), Some("num_envs = 0: must be in 1..=1048576"));
+    assert_eq!(refused(options(1, 257)).as_deref(), Some("num_threads = 257: must be in 1..=256"));
+    let crowded = Scenario { spawn_clearance_m: 3.0, ..Scenario::default() };
+    let error = Batch::new(crowded, options(1, 1)).err().map(|error| error.to_string());
+    assert!(error.is_some_and(|error| error.starts_with("scenario.spawn_clearance_m = 3: no place")));
+}

@@ -1,0 +1,99 @@
+//! What a scenario may be.
+
+use super::*;
+
+/// The error's text when `change` is made to the default scenario.
+fn refusal(change: impl Fn(&mut Scenario)) -> String {
+    let mut scenario = Scenario::default();
+    change(&mut scenario);
+    scenario.validate().expect_err("a bad scenario").to_string()
+}
+
+fn team_of(count: usize) -> Vec<Robot> {
+    let named =
+        |index: usize| Robot { name: format!("r{index}"), ..Scenario::default().robots[index % 4].clone() };
+    (0..count).map(named).collect()
+}
+
+#[test]
+fn the_default_is_valid_and_survives_json() {
+    let scenario = Scenario::default();
+    assert_eq!(Scenario::from_json(&scenario.to_json()), Ok(scenario.clone()));
+    assert_eq!(Scenario::from_json("{}"), Ok(scenario));
+}
+
+#[test]
+fn text_that_is_no_scenario_is_refused() {
+    for text in [
+        "",
+        "{\"colour\": 1}",
+        "{\"robots\": [{\"wheels\": 3}]}",
+        "{\"engine\": \"bullet\"}",
+        "{\"dt_s\": NaN}",
+    ] {
+        assert!(matches!(Scenario::from_json(text), Err(Error::ScenarioText(_))), "{text}");
+    }
+}
+
+#[test]
+fn numbers_out_of_range_are_named() {
+    let refused = refusal(|scenario| scenario.robots[2].mass_kg = -1.0);
+    assert_eq!(refused, "scenario.robots[2].mass_kg = -1: must be in 0.01..=1000 kg");
+    assert!(refusal(|scenario| scenario.dt_s = f64::NAN).starts_with("scenario.dt_s = NaN: must be"));
+    assert!(refusal(|scenario| scenario.damping = 1.01).contains("in 0..=1"));
+    assert!(refusal(|scenario| scenario.substeps = 0).contains("scenario.substeps = 0: must be in 1..=1000"));
+    assert!(refusal(|scenario| scenario.max_victims = 33).contains("must be in 1..=32"));
+    assert!(refusal(|scenario| scenario.end_when_rescued = Some(0)).contains("end_when_rescued = 0"));
+    assert!(
+        refusal(|scenario| scenario.robots[3].radius_m = f64::INFINITY).contains("robots[3].radius_m = inf")
+    );
+}
+
+#[test]
+fn teams_have_their_limits() {
+    assert!(refusal(|scenario| scenario.robots.clear()).contains("robots (their number) = 0"));
+    assert!(refusal(|scenario| scenario.robots = team_of(65)).contains("= 65: must be in 1..=64"));
+    assert!(refusal(|scenario| scenario.robots[1].name = "food_0".into()).contains("names must differ"));
+    assert!(refusal(|scenario| scenario.robots[0].kind = "a b".into()).contains("robots[0].kind = \"a b\""));
+    let heavy = refusal(|scenario| scenario.robots[0].mass_kg = 51.0);
+    assert_eq!(heavy, "scenario.robots (heaviest to lightest mass_kg) = 102: must be at most 100");
+    let scenario = Scenario { robots: team_of(64), ..Scenario::default() };
+    assert_eq!(scenario.validate(), Ok(()));
+}
+
+#[test]
+fn a_task_needs_distinct_able_robots() {
+    let needs = |needs: &[&str]| {
+        let mut scenario = Scenario::default();
+        scenario.tasks[1].needs = needs.iter().map(ToString::to_string).collect();
+        scenario.validate()
+    };
+    assert_eq!(needs(&["food", "food", "medicine"]), Ok(()));
+    for bad in [&["food", "food", "food"][..], &["water"], &["medicine", "medicine"]] {
+        let error = needs(bad).expect_err("unservable").to_string();
+        assert!(error.starts_with("scenario.tasks[1].needs = "), "{error}");
+    }
+    assert!(needs(&[]).is_err() && needs(&["food"; 9]).is_err());
+    // One robot of two abilities cannot fill two needs, but may free another for one.
+    let mut scenario = Scenario::default();
+    scenario.robots[2].abilities = vec!["medicine".into(), "information".into()];
+    scenario.tasks[0].needs = vec!["medicine".into(), "information".into()];
+    assert_eq!(scenario.validate(), Ok(()));
+    scenario.tasks[0].needs.push("medicine".into());
+    assert!(scenario.validate().is_err());
+}
+
+#[test]
+fn an_obstacle_has_the_measures_of_its_shape() {
+    let obstacle = |shape, radius_m, half_extents_m, position_m| {
+        let obstacles = vec![Obstacle { shape, radius_m, half_extents_m, position_m }];
+        Scenario { obstacles, ..Scenario::default() }.validate()
+    };
+    assert_eq!(obstacle(Shape::Disc, Some(0.1), None, Some([0.5, -0.5])), Ok(()));
+    assert_eq!(obstacle(Shape::Box, None, Some([0.1, 0.2]), None), Ok(()));
+    assert!(obstacle(Shape::Disc, Some(0.1), Some([0.1, 0.1]), None).is_err());
+    assert!(obstacle(Shape::Disc, None, None, None).is_err());
+    assert!(obstacle(Shape::Box, Some(0.1), None, None).is_err());
+    assert!(obstacle(Shape::Box, None, Some([0.0, 0.1]), None).is_err());
+    assert!(obstacle(Shape::Disc, Some(0.1), None, Some([1.5, 0.0])).is_err());
+}
