@@ -13,13 +13,12 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 train: setup ## train TD-innerATT on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
 
-test: setup lint ## every check but the slow ones
+test: setup lint ## every check but the long one
 	cargo test --quiet
-	pytest -m "not slow"
+	pytest
 
-test-slow: setup ## the long checks: ten million env-steps of contacts, longer learning
-	INNERATTN_SLOW=1 cargo test --quiet
-	pytest -m slow
+test-slow: setup ## the long check: ten million env-steps of contacts
+	INNERATTN_SLOW=1 cargo test --quiet --test containment
 
 lint: setup ## formatting, lints, types, stub, import floors
 	cargo fmt --check
