@@ -33,9 +33,26 @@ impl Solid {
     /// Distance from `point`, relative to the solid's centre, to its surface (0 inside), m.
     #[must_use]
     pub fn distance(&self, point: Vec2) -> f32 {
+        self.nearest(point).0.max(0.0)
+    }
+
+    /// Distance from `point`, relative to the solid's centre, to its surface (negative inside), m, and
+    /// the direction in which it grows fastest.
+    #[must_use]
+    pub fn nearest(&self, point: Vec2) -> (f32, Vec2) {
         match self {
-            Self::Disc(radius) => (point.norm() - radius).max(0.0),
-            Self::Box(half) => outside_box(point, *half).norm(),
+            Self::Disc(radius) => (point.norm() - radius, point.try_normalize(0.0).unwrap_or_else(Vec2::x)),
+            Self::Box(half) => {
+                let outside = point - point.zip_map(half, |p, h| p.clamp(-h, h));
+                if let Some(outward) = outside.try_normalize(0.0) {
+                    return (outside.norm(), outward);
+                }
+                let depth = half - point.abs();
+                let axis = usize::from(depth.y < depth.x);
+                let mut outward = Vec2::zeros();
+                outward[axis] = 1.0_f32.copysign(point[axis]);
+                (-depth[axis], outward)
+            }
         }
     }
 
@@ -47,114 +64,167 @@ impl Solid {
             Self::Box(half) => half.norm(),
         }
     }
-
-    /// Direction in which the distance from the solid grows fastest at `point` (zero deep inside).
-    fn outward(&self, point: Vec2) -> Vec2 {
-        match self {
-            Self::Disc(_) => point,
-            Self::Box(half) => outside_box(point, *half),
-        }
-        .try_normalize(0.0)
-        .unwrap_or_default()
-    }
 }
 
-fn outside_box(point: Vec2, half: Vec2) -> Vec2 {
-    point - point.zip_map(&half, |p, h| p.clamp(-h, h))
+/// What counts as a touch of things that move straight on.
+#[derive(Debug, Clone, Copy)]
+pub struct Touch {
+    /// Overlap that is not yet a touch, m.
+    pub slop: f32,
+    /// What overlaps touches at once, unless it parts at this speed or faster, m/s; if negative,
+    /// nothing that approaches more slowly than its amount touches at all.
+    pub parting: f32,
 }
 
-/// Depth below which an overlap is left alone: small beside any radius, large beside rounding, m.
-const SLOP_M: f32 = 5e-5;
-/// Overlapping things that part at this speed or faster need no help, m/s.
-const PARTING_MPS: f32 = 1e-2;
-
-/// When two discs with centres `apart` and relative velocity `closing` first touch, s; infinite if never.
-#[must_use]
-pub fn discs_touch(apart: Vec2, closing: Vec2, radii: f32) -> f32 {
-    let reach = radii - SLOP_M;
-    let approach = apart.dot(&closing);
-    let gap = apart.norm_squared() - reach * reach;
-    if gap <= 0.0 {
-        let parting = approach > PARTING_MPS * radii;
-        return if parting { f32::INFINITY } else { 0.0 };
-    }
-    if approach >= 0.0 {
-        return f32::INFINITY;
-    }
-    let speed = closing.norm_squared();
-    let discriminant = approach * approach - speed * gap;
-    if discriminant < 0.0 { f32::INFINITY } else { gap / (discriminant.sqrt() - approach) }
-}
-
-/// When a disc's centre at `place` on one axis first leaves ±`half`, the walls, s; infinite if never.
-#[must_use]
-pub fn walls_touch(place: f32, speed: f32, half: f32) -> f32 {
-    let limit = half + SLOP_M;
-    let gap = if speed >= 0.0 { limit - place } else { limit + place };
-    if gap > 0.0 {
-        return if speed == 0.0 { f32::INFINITY } else { gap / speed.abs() };
-    }
-    0.0
-}
-
-/// A time before which a disc at `place` (relative to the solid) does not touch it, s, at most
-/// `horizon`; infinite if it surely does not touch within `horizon`. By conservative advancement, which
-/// gives up early beside a surface passed closely.
-#[must_use]
-pub fn solid_touch(solid: &Solid, place: Vec2, velocity: Vec2, radius: f32, horizon: f32) -> f32 {
-    const NEAR_M: f32 = 1e-5;
-    let reach = radius - SLOP_M;
-    let speed = velocity.norm();
-    let mut time = 0.0;
-    for _ in 0..16 {
-        let here = place + velocity * time;
-        let gap = solid.distance(here) - reach;
-        if gap <= NEAR_M {
-            let parting = velocity.dot(&solid.outward(here)) > PARTING_MPS;
-            return if parting { f32::INFINITY } else { time };
-        }
-        if gap >= speed * (horizon - time) {
+impl Touch {
+    /// When two discs with centres `apart` and relative velocity `closing`, whose radii add up to
+    /// `radii`, first touch, s; infinite if never.
+    #[must_use]
+    pub fn discs(self, apart: Vec2, closing: Vec2, radii: f32) -> f32 {
+        let reach = radii - self.slop;
+        let approach = apart.dot(&closing);
+        let gap = apart.norm_squared() - reach * reach;
+        if approach >= self.parting_at(gap) * reach {
             return f32::INFINITY;
         }
-        time += gap / speed;
+        if gap <= 0.0 {
+            return 0.0;
+        }
+        let discriminant = approach * approach - closing.norm_squared() * gap;
+        if discriminant < 0.0 { f32::INFINITY } else { gap / (discriminant.sqrt() - approach) }
     }
-    time
+
+    /// When a disc's centre at `place` on one axis first leaves ±`half`, the walls, s; infinite if never.
+    #[must_use]
+    pub fn walls(self, place: f32, speed: f32, half: f32) -> f32 {
+        let limit = half + self.slop;
+        let side = if place.abs() > limit { place } else { speed };
+        let (place, speed) = (place * side.signum(), speed * side.signum());
+        let gap = limit - place;
+        if -speed >= self.parting_at(gap) {
+            return f32::INFINITY;
+        }
+        if gap <= 0.0 { 0.0 } else { gap / speed }
+    }
+
+    /// When a disc at `place`, relative to the solid, first touches it, s; infinite if never.
+    #[must_use]
+    pub fn solid(self, solid: &Solid, place: Vec2, velocity: Vec2, radius: f32) -> f32 {
+        let half = match solid {
+            Solid::Disc(other) => return self.discs(-place, -velocity, radius + other),
+            Solid::Box(half) => half,
+        };
+        let reach = radius - self.slop;
+        let (distance, outward) = solid.nearest(place);
+        let parts = velocity.dot(&outward) >= self.parting_at(distance - reach);
+        if distance <= reach {
+            return if parts { f32::INFINITY } else { 0.0 };
+        }
+        // The disc's centre meets the box grown by the reach: at a face, or at a corner's quarter circle.
+        let (mut enters, mut leaves, mut face) = (f32::NEG_INFINITY, f32::INFINITY, 0);
+        for axis in 0..2 {
+            let limit = half[axis] + reach;
+            if velocity[axis] == 0.0 {
+                if place[axis].abs() >= limit {
+                    return f32::INFINITY;
+                }
+                continue;
+            }
+            let to = |side: f32| (side * limit - place[axis]) / velocity[axis];
+            let near = to(-velocity[axis].signum());
+            if near > enters {
+                (enters, face) = (near, axis);
+            }
+            leaves = leaves.min(to(velocity[axis].signum()));
+        }
+        if enters > leaves || leaves < 0.0 {
+            return f32::INFINITY;
+        }
+        let here = place + velocity * enters.max(0.0);
+        if here.x.abs() > half.x && here.y.abs() > half.y {
+            let corner = half.zip_map(&here, f32::copysign);
+            return self.discs(corner - place, -velocity, radius);
+        }
+        if enters < 0.0 {
+            return if parts { f32::INFINITY } else { 0.0 }; // beside a face, but for rounding
+        }
+        if -velocity[face].abs() >= self.parting_at(1.0) { f32::INFINITY } else { enters }
+    }
+
+    /// The rate of change of a gap from which on there is no touch.
+    fn parting_at(self, gap: f32) -> f32 {
+        if gap <= 0.0 { self.parting } else { self.parting.min(0.0) }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// Overlaps are mended; nothing else is lenient.
+    const MENDING: Touch = Touch { slop: 5e-5, parting: 1e-2 };
+    /// The very surface, and only what approaches.
+    const EXACT: Touch = Touch { slop: 0.0, parting: -1e-5 };
+
     #[test]
     fn discs_meet_when_the_gap_is_used_up() {
-        let time = discs_touch(Vec2::new(1.0, 0.0), Vec2::new(-2.0, 0.0), 0.2);
-        assert!((time - 0.4).abs() < 1e-4, "{time}");
-        assert!(discs_touch(Vec2::new(1.0, 0.0), Vec2::new(2.0, 0.0), 0.2).is_infinite());
-        assert!(discs_touch(Vec2::new(1.0, 0.3), Vec2::new(-2.0, 0.0), 0.2).is_infinite());
+        let meet = |x: f32, y: f32, speed: f32| EXACT.discs(Vec2::new(x, y), Vec2::new(speed, 0.0), 0.2);
+        assert!((meet(1.0, 0.0, -2.0) - 0.4).abs() < 1e-6);
+        assert!((meet(1.0, 0.12, -2.0) - 0.42).abs() < 1e-6, "at 0.16 along, 0.12 across");
+        assert!(meet(1.0, 0.0, 2.0).is_infinite());
+        assert!(meet(1.0, 0.3, -2.0).is_infinite());
+        assert!(meet(0.2001, 0.0, -1e-6).is_infinite(), "all but still");
     }
 
     #[test]
     fn overlapping_discs_touch_now_unless_they_part() {
-        assert!(discs_touch(Vec2::new(0.1, 0.0), Vec2::zeros(), 0.2) <= 0.0);
-        assert!(discs_touch(Vec2::new(0.1, 0.0), Vec2::new(1.0, 0.0), 0.2).is_infinite());
+        let overlapping = |touch: Touch, speed| touch.discs(Vec2::new(0.1, 0.0), Vec2::new(speed, 0.0), 0.2);
+        assert!(overlapping(MENDING, 0.0) <= 0.0);
+        assert!(overlapping(MENDING, 1.0).is_infinite());
+        assert!(overlapping(EXACT, -0.1) <= 0.0);
+        assert!(overlapping(EXACT, 0.0).is_infinite());
     }
 
     #[test]
     fn a_wall_is_met_on_the_side_moved_to() {
-        assert!((walls_touch(0.5, 1.0, 0.95) - 0.45).abs() < 1e-3);
-        assert!((walls_touch(0.5, -1.0, 0.95) - 1.45).abs() < 1e-3);
-        assert!(walls_touch(0.5, 0.0, 0.95).is_infinite());
-        assert!(walls_touch(0.96, 0.0, 0.95) <= 0.0);
+        assert!((EXACT.walls(0.5, 1.0, 0.95) - 0.45).abs() < 1e-6);
+        assert!((EXACT.walls(0.5, -1.0, 0.95) - 1.45).abs() < 1e-6);
+        assert!(EXACT.walls(0.5, 0.0, 0.95).is_infinite());
+        assert!(EXACT.walls(-0.96, -0.1, 0.95) <= 0.0);
+        assert!(EXACT.walls(-0.96, 0.1, 0.95).is_infinite());
+        assert!(MENDING.walls(-0.96, 0.0, 0.95) <= 0.0);
     }
 
     #[test]
-    fn a_box_is_met_at_its_face_and_missed_past_its_corner() {
+    fn a_box_is_met_at_its_face_and_at_its_corner() {
         let solid = Solid::Box(Vec2::new(0.2, 0.1));
-        let time = solid_touch(&solid, Vec2::new(1.0, 0.0), Vec2::new(-1.0, 0.0), 0.05, 2.0);
-        assert!((time - 0.75).abs() < 1e-3, "{time}");
-        let past = solid_touch(&solid, Vec2::new(1.0, 0.3), Vec2::new(-1.0, 0.0), 0.05, 5.0);
-        assert!(past.is_infinite());
-        let late = solid_touch(&solid, Vec2::new(1.0, 0.0), Vec2::new(-1.0, 0.0), 0.05, 0.5);
-        assert!(late.is_infinite());
+        let meet = |x, y, speed: [f32; 2]| EXACT.solid(&solid, Vec2::new(x, y), speed.into(), 0.05);
+        assert!((meet(1.0, 0.0, [-1.0, 0.0]) - 0.75).abs() < 1e-6);
+        assert!((meet(0.1, -1.0, [0.0, 0.5]) - 1.7).abs() < 1e-6);
+        assert!((meet(1.0, 0.13, [-1.0, 0.0]) - 0.76).abs() < 1e-6, "0.04 before, 0.03 above the corner");
+        assert!(meet(1.0, 0.3, [-1.0, 0.0]).is_infinite());
+        assert!(meet(1.0, 0.1501, [-1.0, 0.0]).is_infinite());
+        assert!(meet(1.0, 0.0, [1.0, 0.0]).is_infinite());
+    }
+
+    #[test]
+    fn the_first_touch_is_where_the_distance_is_used_up() {
+        // Against small steps along the course, for both forms.
+        for index in 0..2000_u32 {
+            let number = |salt: u32| (index * 7919 + salt * 104_729) % 1009;
+            let unit = |salt| number(salt) as f32 / 1009.0 - 0.5;
+            let solid = if index % 2 == 0 { Solid::Disc(0.2) } else { Solid::Box(Vec2::new(0.3, 0.1)) };
+            let (place, velocity) = (Vec2::new(unit(1), unit(2)) * 2.0, Vec2::new(unit(3), unit(4)));
+            if solid.distance(place) <= 0.05 {
+                continue;
+            }
+            let touch = EXACT.solid(&solid, place, velocity, 0.05);
+            let room = |time: f32| solid.distance(place + velocity * time) - 0.05;
+            let until = touch.min(4.0);
+            for part in 0..200 {
+                assert!(room(until * part as f32 / 200.0) > -1e-5, "{solid:?} {place} {velocity} {touch}");
+            }
+            assert!(touch.is_infinite() || room(touch).abs() < 1e-5, "{solid:?} {place} {velocity} {touch}");
+        }
     }
 }

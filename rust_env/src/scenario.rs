@@ -81,6 +81,8 @@ pub enum VictimOrder {
 pub enum Engine {
     /// rapier's rigid bodies.
     Rapier,
+    /// Exact contacts of frictionless discs, walls and boxes.
+    Discs,
 }
 
 /// An obstacle's form.
@@ -327,6 +329,9 @@ impl Scenario {
         within("shaping_discount", self.shaping_discount, 0.0, 1.0, "")?;
         within("contact_cost", self.contact_cost, -1e6, 1e6, "")?;
         within("action_cost", self.action_cost, -1e6, 1e6, "")?;
+        if self.engine == Engine::Discs && self.friction != 0.0 {
+            return broken("friction", &self.friction, "must be 0 where engine = \"discs\"");
+        }
         counts("episode_steps", self.episode_steps as usize, 1, 1_000_000)?;
         counts("substeps", self.substeps as usize, 1, 1000)?;
         counts("max_victims", self.max_victims, 1, MAX_VICTIMS)?;

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Table, chance, mixed_team, options, random_drive, some_obstacles};
+use common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles};
 use innerattn_env::batch::Options;
 use innerattn_env::geometry::{Solid, Vec2};
 use innerattn_env::rng::Stream;
@@ -106,8 +106,9 @@ fn nearest_to_origin(from: Vec2, to: Vec2) -> f32 {
 fn play(name: &str, scenario: &Scenario, steps: usize) {
     let slow = std::env::var("INNERATTN_SLOW").is_ok_and(|value| value == "1");
     let steps = if slow { 10 * steps } else { steps };
-    for play in PLAYS {
-        let mut table = Table::new(scenario.clone(), Options { num_threads: Some(2), ..options(ENVS, 1) });
+    for (engine, play) in ENGINES.iter().flat_map(|engine| PLAYS.map(|play| (*engine, play))) {
+        let scenario = Scenario { engine, ..scenario.clone() };
+        let mut table = Table::new(scenario, Options { num_threads: Some(2), ..options(ENVS, 1) });
         let mut chance = chance(2);
         let mut overlaps = Vec::with_capacity(steps);
         while overlaps.len() < steps {
@@ -126,12 +127,12 @@ fn play(name: &str, scenario: &Scenario, steps: usize) {
         let most = overlaps[overlaps.len() - 1];
         let usual = overlaps[overlaps.len() * 999 / 1000];
         println!(
-            "{name}, {play:?}: overlap of a radius {:.2} % at p99.9, {:.2} % at most",
+            "{name}, {engine:?}, {play:?}: overlap of a radius {:.2} % at p99.9, {:.2} % at most",
             100.0 * usual,
             100.0 * most
         );
-        assert!(usual <= USUAL, "{name}, {play:?}: p99.9 is {usual}");
-        assert!(most <= MOST, "{name}, {play:?}: the most is {most}");
+        assert!(usual <= USUAL, "{name}, {engine:?}, {play:?}: p99.9 is {usual}");
+        assert!(most <= MOST, "{name}, {engine:?}, {play:?}: the most is {most}");
     }
 }
 

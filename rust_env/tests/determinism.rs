@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Table, chance, mixed_team, options, random_drive, some_obstacles};
+use common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles};
 use innerattn_env::batch::Options;
 use innerattn_env::scenario::{Actions, Scenario, Shaping, Situation};
 
@@ -12,7 +12,7 @@ const STEPS: usize = 150;
 /// Small arenas, so that most steps have contacts, in every situation and both kinds of actions.
 fn scenarios() -> Vec<Scenario> {
     let tight = Scenario { arena_half_width_m: 0.6, spawn_clearance_m: 0.1, ..Scenario::default() };
-    vec![
+    let scenarios = [
         tight.clone(),
         Scenario {
             situation: Situation::Double,
@@ -28,7 +28,9 @@ fn scenarios() -> Vec<Scenario> {
             end_when_rescued: Some(2),
             ..tight
         },
-    ]
+    ];
+    let by = |engine| scenarios.clone().map(|scenario| Scenario { engine, ..scenario });
+    ENGINES.into_iter().flat_map(by).collect()
 }
 
 /// Actions of every step, one row of robots for each env.

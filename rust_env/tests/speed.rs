@@ -4,7 +4,7 @@ mod common;
 
 use std::iter::zip;
 
-use common::{Table, chance, mixed_team, options, random_drive, some_obstacles};
+use common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles};
 use innerattn_env::geometry::Vec2;
 use innerattn_env::scenario::{Actions, Scenario};
 use innerattn_env::world::World;
@@ -50,7 +50,8 @@ fn caps_hold_and_what_touches_nothing_flies_as_it_should() {
     let slow = Scenario { contact_cost: 1.0, actions: Actions::Continuous, ..Scenario::default() };
     let crowd = Scenario { robots: mixed_team(12), spawn_clearance_m: 0.1, ..slow.clone() };
     let blocked = Scenario { obstacles: some_obstacles(), substeps: 4, damping: 0.1, ..slow.clone() };
-    for scenario in [slow, crowd, blocked] {
+    for (scenario, engine) in [slow, crowd, blocked].iter().flat_map(|s| ENGINES.map(|engine| (s, engine))) {
+        let scenario = Scenario { engine, ..scenario.clone() };
         let (dt, keep) = (scenario.dt_s as f32, 1.0 - scenario.damping as f32);
         let mut table = Table::new(scenario, options(ENVS, 2));
         let team = table.batch.rules().team.clone();

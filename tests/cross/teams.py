@@ -60,6 +60,7 @@ def random_scenario(rng: np.random.Generator) -> Scenario:
             "dt_s": pick(0.05, 0.1, 0.15),
             "substeps": pick(4, 6, 9),
             "damping": pick(0.0, 0.1, 0.25, 1.0),
+            "engine": pick("rapier", "discs"),
             "actions": pick("discrete", "continuous"),
             "rescue_credit": pick("helpers", "team"),
             "rescue_reward": pick(1.0, 5.0),

@@ -106,7 +106,10 @@ class Scenario(Model):
     substeps: Count = Field(6, description="physics steps per control period")
     damping: float = Field(0.25, description="share of speed lost per control period")
     friction: float = Field(0.0, description="friction coefficient at contacts")
-    engine: Literal["rapier"] = Field("rapier", description="physics engine for contacts")
+    engine: Literal["rapier", "discs"] = Field(
+        "rapier",
+        description="contacts; rapier: rigid bodies in substeps; discs: exact, without friction",
+    )
     actions: Literal["discrete", "continuous"] = Field(
         "discrete", description="discrete: stay, +x, -x, +y, -y; continuous: a force in the plane"
     )

@@ -6,8 +6,11 @@ use innerattn_env::error::Result;
 use innerattn_env::reward::NUM_COMPONENTS;
 use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
-use innerattn_env::scenario::{Actions, Obstacle, Robot, Scenario, Shape};
+use innerattn_env::scenario::{Actions, Engine, Obstacle, Robot, Scenario, Shape};
 use innerattn_env::task::Rescue;
+
+/// Every engine: each must keep every promise.
+pub const ENGINES: [Engine; 2] = [Engine::Rapier, Engine::Discs];
 
 /// Options of a batch that nothing else in a test depends on.
 pub fn options(num_envs: usize, seed: u64) -> Options {

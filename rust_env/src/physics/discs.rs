@@ -1,0 +1,210 @@
+//! Contacts of frictionless discs, walls and boxes, each at the instant it happens.
+//!
+//! Velocities change by contact alone, so everyone flies straight on until the first touch, whose time
+//! is the root of a quadratic. There, all that touch and approach are stopped along their normals at
+//! once, by the least impulses that do it: the inelastic law of Moreau, solved by Gauss-Seidel sweeps.
+//! What rapier tends to as its substeps grow short is computed here without any.
+
+use super::{Engine, Workspace, fly};
+use crate::geometry::{Solid, Touch, Vec2};
+use crate::robot::Body;
+use crate::scenario::Scenario;
+
+/// Things nearer than this touch, m: some ten units of rounding of a place in the arena, per metre.
+const TOUCHING: f32 = 2e-6;
+/// What approaches more slowly than this is left alone, m/s.
+const STILL_MPS: f32 = 1e-5;
+/// Sweeps over the contacts of one instant.
+const MOST_SWEEPS: usize = 200;
+/// Change of velocity in a sweep below which the impulses have settled, m/s.
+const SETTLED_MPS: f32 = 1e-6;
+/// Sweeps that push apart what rounding has left overlapping.
+const SEPARATING_SWEEPS: usize = 8;
+
+/// Two robots, or a robot and something that does not move, that touch now.
+struct Contact {
+    robot: usize,
+    /// The other robot; none for a wall or an obstacle.
+    other: Option<usize>,
+    /// From the robot towards the other.
+    normal: Vec2,
+    /// Impulse so far, N s.
+    impulse: f32,
+}
+
+#[derive(Default)]
+pub(super) struct Scratch(Vec<Contact>);
+
+pub(super) struct Discs {
+    radii: Vec<f32>,
+    /// 1 / mass, 1/kg.
+    lightness: Vec<f32>,
+    solids: Vec<Solid>,
+    arena: f32,
+    dt: f32,
+    touch: Touch,
+    /// Instants of contact in a period after which whoever still meets something waits for the next.
+    most_instants: usize,
+}
+
+impl Discs {
+    pub(super) fn new(scenario: &Scenario, team: &[Body], solids: &[Solid]) -> Self {
+        let arena = scenario.arena_half_width_m as f32;
+        Self {
+            radii: team.iter().map(|body| body.radius).collect(),
+            lightness: team.iter().map(|body| 1.0 / body.mass).collect(),
+            solids: solids.to_vec(),
+            arena,
+            dt: scenario.dt_s as f32,
+            touch: Touch { slop: 0.0, parting: -STILL_MPS },
+            most_instants: 8 + 4 * team.len(),
+        }
+    }
+
+    /// Time until anything would touch if all moved straight on, s; infinite if nothing ever would.
+    fn first_touch(&self, positions: &[Vec2], velocities: &[Vec2], obstacles: &[Vec2]) -> f32 {
+        let mut first = f32::INFINITY;
+        for (index, (at, velocity)) in positions.iter().zip(velocities).enumerate() {
+            let radius = self.radii[index];
+            first = first.min(self.touch.walls(at.x, velocity.x, self.arena - radius));
+            first = first.min(self.touch.walls(at.y, velocity.y, self.arena - radius));
+            for other in 0..index {
+                let reach = radius + self.radii[other];
+                first =
+                    first.min(self.touch.discs(positions[other] - at, velocities[other] - velocity, reach));
+            }
+            for (solid, centre) in self.solids.iter().zip(obstacles) {
+                first = first.min(self.touch.solid(solid, at - centre, *velocity, radius));
+            }
+        }
+        first
+    }
+
+    /// All that touch now, whether they approach or not: what is pushed may be pushed into a third.
+    fn find(&self, positions: &[Vec2], obstacles: &[Vec2], contacts: &mut Vec<Contact>) {
+        let near = TOUCHING * self.arena.max(1.0);
+        contacts.clear();
+        let mut add = |robot, other, normal| contacts.push(Contact { robot, other, normal, impulse: 0.0 });
+        for (index, at) in positions.iter().enumerate() {
+            let radius = self.radii[index];
+            for axis in 0..2 {
+                if at[axis].abs() + radius >= self.arena - near {
+                    let mut normal = Vec2::zeros();
+                    normal[axis] = at[axis].signum();
+                    add(index, None, normal);
+                }
+            }
+            for (other, place) in positions[..index].iter().enumerate() {
+                let apart = place - at;
+                let reach = radius + self.radii[other] + near;
+                if apart.norm_squared() <= reach * reach {
+                    add(index, Some(other), apart.try_normalize(0.0).unwrap_or_else(Vec2::x));
+                }
+            }
+            for (solid, centre) in self.solids.iter().zip(obstacles) {
+                let (depth, outward) = solid.nearest(at - centre);
+                if depth <= radius + near {
+                    add(index, None, -outward);
+                }
+            }
+        }
+    }
+
+    /// Stops all approaches between what touches. Returns who was pushed, as bits.
+    fn resolve(&self, contacts: &mut [Contact], velocities: &mut [Vec2]) -> u64 {
+        for _ in 0..MOST_SWEEPS {
+            let mut change = 0.0_f32;
+            for contact in contacts.iter_mut() {
+                let (robot, other) = (contact.robot, contact.other);
+                let others = other.map_or(Vec2::zeros(), |other| velocities[other]);
+                let give = self.lightness[robot] + other.map_or(0.0, |other| self.lightness[other]);
+                let approach = contact.normal.dot(&(velocities[robot] - others));
+                let impulse = (contact.impulse + approach / give).max(0.0);
+                let added = impulse - contact.impulse;
+                contact.impulse = impulse;
+                velocities[robot] -= contact.normal * (added * self.lightness[robot]);
+                if let Some(other) = other {
+                    velocities[other] += contact.normal * (added * self.lightness[other]);
+                }
+                change = change.max(added.abs() * give);
+            }
+            if change < SETTLED_MPS {
+                break;
+            }
+        }
+        let pushed = contacts.iter().filter(|contact| contact.impulse > 0.0);
+        pushed
+            .fold(0, |bits, contact| bits | 1 << contact.robot | contact.other.map_or(0, |other| 1 << other))
+    }
+
+    /// Pushes apart what overlaps, the lighter farther; walls and obstacles give way to nobody.
+    fn separate(&self, positions: &mut [Vec2], obstacles: &[Vec2]) {
+        for _ in 0..SEPARATING_SWEEPS {
+            let mut overlapped = false;
+            for index in 0..positions.len() {
+                for other in 0..index {
+                    let apart = positions[other] - positions[index];
+                    let reach = self.radii[index] + self.radii[other];
+                    if apart.norm_squared() >= reach * reach {
+                        continue;
+                    }
+                    overlapped = true;
+                    let distance = apart.norm();
+                    let normal = apart.try_normalize(0.0).unwrap_or_else(Vec2::x);
+                    let (own, others) = (self.lightness[index], self.lightness[other]);
+                    let share = (reach - distance) / (own + others);
+                    positions[index] -= normal * (share * own);
+                    positions[other] += normal * (share * others);
+                }
+            }
+            for (at, radius) in positions.iter_mut().zip(&self.radii) {
+                for (solid, centre) in self.solids.iter().zip(obstacles) {
+                    let (distance, outward) = solid.nearest(*at - centre);
+                    if distance < *radius {
+                        overlapped = true;
+                        *at += outward * (radius - distance);
+                    }
+                }
+                let limit = self.arena - radius;
+                *at = at.map(|place| place.clamp(-limit, limit));
+            }
+            if !overlapped {
+                break;
+            }
+        }
+    }
+}
+
+impl Engine for Discs {
+    fn advance(
+        &self,
+        workspace: &mut Workspace,
+        positions: &mut [Vec2],
+        velocities: &mut [Vec2],
+        obstacles: &[Vec2],
+    ) -> u64 {
+        let contacts = &mut workspace.discs.0;
+        let mut left = self.dt;
+        let mut touched = 0;
+        for instant in 0.. {
+            let first = self.first_touch(positions, velocities, obstacles);
+            if first >= left {
+                break;
+            }
+            fly(positions, velocities, first);
+            left -= first;
+            self.find(positions, obstacles, contacts);
+            touched |= self.resolve(contacts, velocities);
+            if instant >= self.most_instants {
+                // Whoever is in such a throng waits for the next period: it ends, and nobody overlaps.
+                for contact in contacts.iter() {
+                    velocities[contact.robot] = Vec2::zeros();
+                    contact.other.into_iter().for_each(|other| velocities[other] = Vec2::zeros());
+                }
+            }
+        }
+        fly(positions, velocities, left);
+        self.separate(positions, obstacles);
+        touched
+    }
+}
