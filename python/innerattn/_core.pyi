@@ -64,13 +64,14 @@ class Batch:
         NDArray[np.bool_],
         NDArray[np.bool_],
         NDArray[np.float32],
-        NDArray[np.int64],
+        NDArray[np.int64] | None,
     ]:
         """Do one control step; actions are (E, R) integers, or (E, R, 2) floats when continuous.
 
         Returns:
             obs (E, R, D), reward (E, R), terminated (E,), truncated (E,), final_obs (E, R, D), and
-            rescues (n, 6 + helpers): env, episode, step, slot, victim, task, helpers (-1 for none).
+            rescues (n, 6 + helpers): env, episode, step, slot, victim, task, helpers (-1 for none);
+            None in place of no rescues.
 
         Raises:
             TypeError: wrong dtype.

@@ -2,13 +2,12 @@
 //! split over threads changes when a world is stepped, never what happens in it.
 
 use std::iter::zip;
-
-use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::sync::{Mutex, PoisonError};
 
 use crate::error::{Error, Result};
 use crate::geometry::Vec2;
 use crate::physics::Workspace;
+use crate::pool::Pool;
 use crate::reward::NUM_COMPONENTS;
 use crate::robot::{Commands, NUM_ACTIONS};
 use crate::rules::Rules;
@@ -21,10 +20,8 @@ use crate::world::{World, check_room};
 pub const MAX_ENVS: usize = 1 << 20;
 /// Most threads of a batch.
 pub const MAX_THREADS: usize = 256;
-/// Fewest worlds for which another thread is worth waking.
-const ENVS_PER_THREAD: usize = 32;
 /// Shards for each thread, so that a busy one does not keep the others waiting.
-const SHARDS_PER_THREAD: usize = 4;
+const SHARDS_PER_THREAD: usize = 16;
 
 /// What happens when an episode ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,7 +99,7 @@ struct Shard {
 pub struct Batch {
     rules: Rules,
     shards: Vec<Shard>,
-    pool: Option<ThreadPool>,
+    pool: Pool,
     options: Options,
 }
 
@@ -113,16 +110,17 @@ impl Batch {
     /// [`Error::Scenario`] or [`Error::Argument`] for a value that is not allowed.
     pub fn new(scenario: Scenario, options: Options) -> Result<Self> {
         argument("num_envs", options.num_envs, MAX_ENVS)?;
-        let available = std::thread::available_parallelism().map_or(1, usize::from);
-        let worth = options.num_envs.div_ceil(ENVS_PER_THREAD);
-        let threads = options.num_threads.unwrap_or(available.min(worth).min(MAX_THREADS));
-        argument("num_threads", threads, MAX_THREADS)?;
         let rules = Rules::new(scenario)?;
         check_room(&rules)?;
-        let pool = match threads {
-            1 => None,
-            _ => Some(make_pool(threads)?),
-        };
+        let available = std::thread::available_parallelism().map_or(1, usize::from);
+        let worth = options.num_envs / rules.physics.envs_worth_a_thread();
+        let threads = options.num_threads.unwrap_or(available.min(worth).clamp(1, MAX_THREADS));
+        argument("num_threads", threads, MAX_THREADS)?;
+        let pool = Pool::new(threads).map_err(|error| Error::Argument {
+            name: "num_threads",
+            value: threads.to_string(),
+            rule: error.to_string(),
+        })?;
         let shards = if threads == 1 { 1 } else { threads * SHARDS_PER_THREAD };
         let length = options.num_envs.div_ceil(shards);
         let starts = (0..options.num_envs).step_by(length);
@@ -153,7 +151,7 @@ impl Batch {
     /// Threads in use.
     #[must_use]
     pub fn num_threads(&self) -> usize {
-        self.pool.as_ref().map_or(1, ThreadPool::current_num_threads)
+        self.pool.num_threads()
     }
 
     /// The worlds in order.
@@ -189,27 +187,23 @@ impl Batch {
     ///
     /// # Errors
     /// [`Error::Action`] or [`Error::EpisodeOver`], before anything has moved.
-    pub fn step(&mut self, commands: Commands, mut buffers: StepBuffers) -> Result<Vec<Rescue>> {
+    pub fn step(&mut self, commands: Commands, buffers: StepBuffers) -> Result<Vec<Rescue>> {
         self.check(commands)?;
         let (rules, autoreset) = (&self.rules, self.options.autoreset);
         let (robots, width) = (rules.team.len(), rules.layout.width());
-        match &self.pool {
-            None => self.shards[0].step(rules, autoreset, commands, &mut buffers),
-            Some(pool) => {
-                let mut rest = buffers;
-                let mut jobs = Vec::with_capacity(self.shards.len());
-                for shard in &mut self.shards {
-                    let (part, later) = rest.split(shard.worlds.len(), robots, width);
-                    rest = later;
-                    jobs.push((shard, part));
-                }
-                pool.install(|| {
-                    jobs.into_par_iter()
-                        .with_max_len(1)
-                        .for_each(|(shard, mut part)| shard.step(rules, autoreset, commands, &mut part));
-                });
-            }
+        let mut rest = buffers;
+        let mut jobs = Vec::with_capacity(self.shards.len());
+        for shard in &mut self.shards {
+            let (part, later) = rest.split(shard.worlds.len(), robots, width);
+            rest = later;
+            jobs.push(Mutex::new((shard, part)));
         }
+        self.pool.for_each(jobs.len(), |index| {
+            // Each job is taken once, so its lock is always free.
+            let mut job = jobs[index].lock().unwrap_or_else(PoisonError::into_inner);
+            let (shard, part) = &mut *job;
+            shard.step(rules, autoreset, commands, part);
+        });
         Ok(self.shards.iter().flat_map(|shard| &shard.rescues).copied().collect())
     }
 
@@ -321,18 +315,6 @@ impl Shard {
             }
         }
     }
-}
-
-fn make_pool(threads: usize) -> Result<ThreadPool> {
-    ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .thread_name(|index| format!("worlds-{index}"))
-        .build()
-        .map_err(|error| Error::Argument {
-            name: "num_threads",
-            value: threads.to_string(),
-            rule: error.to_string(),
-        })
 }
 
 fn argument(name: &'static str, value: usize, most: usize) -> Result<()> {

@@ -26,4 +26,6 @@ pub mod world;
 
 pub mod snapshot;
 
+pub mod pool;
+
 pub mod batch;

@@ -1,8 +1,8 @@
 //! Observations: world → one row of numbers for each robot, with named columns.
 
 use crate::geometry::Vec2;
-use crate::robot::Body;
-use crate::scenario::{Scenario, VictimOrder};
+use crate::robot::{Body, bodies};
+use crate::scenario::{MAX_VICTIMS, Scenario, VictimOrder};
 use crate::task::{Needs, Victim};
 
 /// The fixed order of an observation's columns, read off a valid scenario.
@@ -14,6 +14,8 @@ pub struct Layout {
     order: VictimOrder,
     /// For each task, how many of each ability it needs.
     needs: Vec<Vec<f32>>,
+    /// The columns that never change, of all robots (R × D); zeros elsewhere.
+    fixed: Vec<f32>,
 }
 
 impl Layout {
@@ -26,20 +28,49 @@ impl Layout {
             (0..abilities.len() as u32).map(number).collect()
         };
         let needs = tasks.iter().map(count).collect();
-        Self {
+        let mut layout = Self {
             robots: scenario.robots.len(),
             victims: scenario.num_victims(),
             order: scenario.victim_order,
             abilities,
             needs,
+            fixed: vec![],
+        };
+        layout.fixed = layout.fixed_columns(&bodies(scenario));
+        layout
+    }
+
+    /// Abilities and availability, own first and then the teammates' in team order.
+    fn fixed_columns(&self, team: &[Body]) -> Vec<f32> {
+        let mut fixed = vec![0.0; self.robots * self.width()];
+        for (own, row) in fixed.chunks_exact_mut(self.width()).enumerate() {
+            let others = (0..self.robots).filter(|other| *other != own);
+            for (block, robot) in
+                row.chunks_exact_mut(self.robot_width()).zip(std::iter::once(own).chain(others))
+            {
+                for ability in 0..self.abilities.len() {
+                    block[4 + ability] = (team[robot].abilities >> ability & 1) as f32;
+                }
+                block[self.robot_width() - 1] = 1.0;
+            }
         }
+        fixed
+    }
+
+    /// Columns of one robot.
+    fn robot_width(&self) -> usize {
+        5 + self.abilities.len()
+    }
+
+    /// Columns of one victim.
+    fn victim_width(&self) -> usize {
+        3 + self.abilities.len()
     }
 
     /// Width D of a row.
     #[must_use]
     pub fn width(&self) -> usize {
-        let abilities = self.abilities.len();
-        self.robots * (5 + abilities) + self.victims * (3 + abilities)
+        self.robots * self.robot_width() + self.victims * self.victim_width()
     }
 
     /// The name of every column; units are m and m/s, flags and abilities are 0 or 1, needs are counts.
@@ -78,51 +109,54 @@ impl Layout {
         victims: &[Option<Victim>],
         rows: &mut [f32],
     ) {
+        rows.copy_from_slice(&self.fixed);
         for (own, row) in rows.chunks_exact_mut(self.width()).enumerate() {
-            let mut row = Row { row, next: 0 };
-            self.write_robot(&mut row, positions[own], velocities[own], &team[own]);
+            let (robots, rest) = row.split_at_mut(self.robots * self.robot_width());
+            let mut blocks = robots.chunks_exact_mut(self.robot_width());
+            let (position, velocity) = (positions[own], velocities[own]);
+            let mut write = |position: Vec2, velocity: Vec2| {
+                if let Some(block) = blocks.next() {
+                    block[..4].copy_from_slice(&[position.x, position.y, velocity.x, velocity.y]);
+                }
+            };
+            write(position, velocity);
             for other in (0..self.robots).filter(|other| *other != own) {
-                let position = positions[other] - positions[own];
-                self.write_robot(&mut row, position, velocities[other] - velocities[own], &team[other]);
+                write(positions[other] - position, velocities[other] - velocity);
             }
-            self.write_victims(&mut row, &team[own], tasks, positions[own], victims);
+            self.write_victims(&team[own], tasks, position, victims, rest);
         }
-    }
-
-    fn write_robot(&self, row: &mut Row, position: Vec2, velocity: Vec2, body: &Body) {
-        row.extend([position.x, position.y, velocity.x, velocity.y]);
-        row.extend((0..self.abilities.len()).map(|ability| (body.abilities >> ability & 1) as f32));
-        row.extend([1.0]);
     }
 
     fn write_victims(
         &self,
-        row: &mut Row,
         body: &Body,
         tasks: &[Needs],
         own: Vec2,
         victims: &[Option<Victim>],
+        rows: &mut [f32],
     ) {
-        let mut order = [0_u8; crate::scenario::MAX_VICTIMS];
-        let order = &mut order[..victims.len()];
-        order.iter_mut().enumerate().for_each(|(slot, number)| *number = slot as u8);
-        if self.order == VictimOrder::Relevant {
-            order.sort_by(|a, b| {
-                let rank = |slot: u8| rank(victims[usize::from(slot)].as_ref(), body, tasks, own);
-                let (left, right) = (rank(*a), rank(*b));
-                left.0.cmp(&right.0).then(left.1.total_cmp(&right.1))
-            });
-        }
-        for slot in order {
-            match &victims[usize::from(*slot)] {
-                Some(victim) => {
-                    let place = victim.position - own;
-                    row.extend([1.0]);
-                    row.extend(self.needs[victim.task as usize].iter().copied());
-                    row.extend([place.x, place.y]);
-                }
-                None => row.extend(std::iter::repeat_n(0.0, 3 + self.abilities.len())),
+        let mut sorted = [(0_u8, 0.0_f32, 0_u8); MAX_VICTIMS];
+        for (slot, victim) in victims.iter().enumerate() {
+            let (kind, distance) = match self.order {
+                VictimOrder::Relevant => rank(victim.as_ref(), body, tasks, own),
+                VictimOrder::Slot => (0, 0.0),
+            };
+            // Into its place among those before it: there are few, and equals keep their order.
+            let later = |other: &(u8, f32, u8)| (other.0, other.1) > (kind, distance);
+            let mut place = slot;
+            while place > 0 && later(&sorted[place - 1]) {
+                sorted[place] = sorted[place - 1];
+                place -= 1;
             }
+            sorted[place] = (kind, distance, slot as u8);
+        }
+        for ((_, _, slot), row) in sorted.iter().zip(rows.chunks_exact_mut(self.victim_width())) {
+            let Some(victim) = &victims[usize::from(*slot)] else { continue };
+            let place = victim.position - own;
+            let abilities = self.abilities.len();
+            row[0] = 1.0;
+            row[1..=abilities].copy_from_slice(&self.needs[victim.task as usize]);
+            row[1 + abilities..].copy_from_slice(&[place.x, place.y]);
         }
     }
 }
@@ -138,25 +172,9 @@ fn rank(victim: Option<&Victim>, body: &Body, tasks: &[Needs], own: Vec2) -> (u8
     }
 }
 
-/// A row that is written from left to right.
-struct Row<'a> {
-    row: &'a mut [f32],
-    next: usize,
-}
-
-impl Row<'_> {
-    fn extend(&mut self, values: impl IntoIterator<Item = f32>) {
-        for value in values {
-            self.row[self.next] = value;
-            self.next += 1;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::bodies;
 
     /// Two robots (food, medicine) and two slots; what robot 1 sees in each order of victims.
     fn seen_by_medical(order: VictimOrder) -> (Vec<String>, Vec<f32>) {

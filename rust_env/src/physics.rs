@@ -20,6 +20,9 @@ trait Engine: Send + Sync {
         velocities: &mut [Vec2],
         obstacles: &[Vec2],
     ) -> u64;
+
+    /// Worlds whose steps take long enough to be worth another thread.
+    fn envs_worth_a_thread(&self) -> usize;
 }
 
 /// The engines' scratch memory; one for each thread, and nothing in it outlives a period.
@@ -52,6 +55,12 @@ impl Physics {
         obstacles: &[Vec2],
     ) -> u64 {
         self.0.advance(workspace, positions, velocities, obstacles)
+    }
+
+    /// Worlds whose steps take long enough to be worth another thread.
+    #[must_use]
+    pub fn envs_worth_a_thread(&self) -> usize {
+        self.0.envs_worth_a_thread()
     }
 }
 

@@ -140,13 +140,13 @@ fn bits(mask: u64) -> impl Iterator<Item = usize> {
 /// Distance of the able robot with `rank` nearer ones, m.
 fn kth_nearest(rank: usize, need: u32, victim: Vec2, team: &[Body], positions: &[Vec2]) -> f32 {
     let able = team.iter().zip(positions).filter(|(body, _)| body.abilities >> need & 1 == 1);
-    let distances = able.map(|(_, position)| (position - victim).norm());
+    let squares = able.map(|(_, position)| (position - victim).norm_squared());
     if rank == 0 {
-        return distances.fold(f32::INFINITY, f32::min);
+        return squares.fold(f32::INFINITY, f32::min).sqrt();
     }
-    let mut sorted: Vec<f32> = distances.collect();
+    let mut sorted: Vec<f32> = squares.collect();
     sorted.sort_unstable_by(f32::total_cmp);
-    sorted[rank]
+    sorted[rank].sqrt()
 }
 
 /// A rescue: which victim, when and by whom.

@@ -102,6 +102,7 @@ class BatchEnv:
         self.obs_width = self._core.obs_width
         helpers = [f"helper_{need}" for need in range(self._core.max_helpers)]
         self._rescue_dtype = np.dtype([(name, "i8") for name in (*_RESCUE_FIELDS, *helpers)])
+        self._no_rescues = np.empty(0, self._rescue_dtype)
         self._copy = copy
 
     def reset(self, seed: int | None = None, mask: ArrayLike | None = None) -> NDArray[np.float32]:
@@ -141,17 +142,10 @@ class BatchEnv:
                 named), or a world whose episode is over (autoreset disabled). Nothing has moved
                 then.
         """
-        obs, reward, terminated, truncated, final_obs, rescues = self._core.step(
-            np.asarray(actions)
-        )
-        return Step(
-            self._lend(obs),
-            self._lend(reward),
-            self._lend(terminated),
-            self._lend(truncated),
-            self._lend(final_obs),
-            rescues.view(self._rescue_dtype)[:, 0],
-        )
+        obs, reward, terminated, truncated, final_obs, events = self._core.step(np.asarray(actions))
+        rescues = self._no_rescues if events is None else events.view(self._rescue_dtype)[:, 0]
+        step = Step(obs, reward, terminated, truncated, final_obs, rescues)
+        return Step._make(array.copy() for array in step) if self._copy else step
 
     def observation_names(self) -> list[str]:
         """Names of the D columns of an observation; units are m and m/s."""

@@ -23,7 +23,7 @@ type Stepped = (
     Py<PyArray<bool, Ix1>>,
     Py<PyArray<bool, Ix1>>,
     Py<PyArray<f32, Ix3>>,
-    Py<PyArray<i64, Ix2>>,
+    Option<Py<PyArray<i64, Ix2>>>,
 );
 
 /// Many rescue worlds of one scenario.
@@ -290,8 +290,12 @@ impl Batch {
         shaped(py, numbers.collect(), [self.worlds.num_envs(), rows, 2])
     }
 
-    /// Rescues as rows of env, episode, step, slot, victim, task and one helper for each possible need.
-    fn events(&self, py: Python, rescues: &[Rescue]) -> PyResult<Py<PyArray2<i64>>> {
+    /// Rescues as rows of env, episode, step, slot, victim, task and one helper for each possible need;
+    /// none if there are none.
+    fn events(&self, py: Python, rescues: &[Rescue]) -> PyResult<Option<Py<PyArray2<i64>>>> {
+        if rescues.is_empty() {
+            return Ok(None);
+        }
         let helpers = self.worlds.rules().scenario.max_needs();
         let mut rows = Vec::with_capacity(rescues.len() * (6 + helpers));
         for rescue in rescues {
@@ -299,7 +303,7 @@ impl Batch {
             rows.extend([rescue.step, rescue.slot, rescue.victim, rescue.task].map(i64::from));
             rows.extend(rescue.helpers[..helpers].iter().map(|helper| helper.map_or(-1, i64::from)));
         }
-        Ok(shaped(py, rows, [rescues.len(), 6 + helpers])?.unbind())
+        Ok(Some(shaped(py, rows, [rescues.len(), 6 + helpers])?.unbind()))
     }
 }
 

@@ -4,6 +4,10 @@
 mod arrays;
 mod batch;
 
+/// rapier makes and frees hundreds of small things a period, which this does faster than the system.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 use innerattn_env::error::Error;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::Scenario;

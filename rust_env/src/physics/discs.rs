@@ -207,4 +207,8 @@ impl Engine for Discs {
         self.separate(positions, obstacles);
         touched
     }
+
+    fn envs_worth_a_thread(&self) -> usize {
+        64
+    }
 }

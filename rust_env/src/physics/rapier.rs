@@ -225,6 +225,10 @@ impl Engine for Rapier {
         }
         touched
     }
+
+    fn envs_worth_a_thread(&self) -> usize {
+        8
+    }
 }
 
 impl Scratch {
