@@ -34,9 +34,11 @@ format: setup ## format all code
 	ruff check --fix
 	ruff format
 
-bench: setup ## speed of worlds and learner on this machine
+bench: setup ## speed of worlds and learner on this machine, beside their peers; fills docs/performance.md
+	pip install --quiet --disable-pip-version-check '.[peers]' 2>/dev/null || echo "Without peers: they cannot be installed here."
 	cargo bench --quiet
-	python benches/batch_step.py
+	python benches/compare_envs.py
+	python benches/env_cost.py
 	python benches/learner_update.py
 
 setup: $(VENV)/.built ## environment and compiled module

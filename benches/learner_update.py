@@ -1,7 +1,7 @@
 """Time of one update of the off-policy learner, beside the plain loop over robots and heads.
 
 The plain form is the tests' reference: like MAAC's public code it has modules of its own for every
-robot and head. Run it as `python benches/learner_update.py`; nothing is written.
+robot and head. `python benches/learner_update.py` writes its table into `docs/performance.md`.
 """
 
 import statistics
@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import torch
+from page import machine, publish, table
 from torch import Tensor
 
 from innerattn.config import NetworkConfig, TDConfig
@@ -21,7 +22,7 @@ from reference import PlainTD
 
 TEAM = Team(num_robots=4, obs_width=44, num_actions=5)
 CASES = [(batch, threads) for batch in (256, 1024) for threads in (1, 2)]
-REPEATS = 15
+REPEATS = 25
 NUM_ENVS = 64
 
 
@@ -53,10 +54,10 @@ def median_ms(*actions: Callable[[], object]) -> list[float]:
 
 
 def main() -> None:
+    """Measure and publish the table."""
     torch.manual_seed(0)
     network = NetworkConfig()
-    print(f"{TEAM}, {network.attention_heads} heads of a width of {network.hidden_width} in all")
-    print(f"{'batch':>6}{'threads':>9}{'update ms':>11}{'plain ms':>10}{'ratio':>7}{'act ms':>8}")
+    rows = []
     for batch, threads in CASES:
         torch.set_num_threads(threads)
         numbers = TDConfig(batch_size=batch, replay_capacity=20_000)
@@ -65,15 +66,16 @@ def main() -> None:
         plain = PlainTD(learner.state(), network, numbers)
         mean, std = learner.replay.reward_mean.float(), learner.replay.reward_std.float()
         obs = random_transitions(NUM_ENVS).obs
-        fast_ms, plain_ms, act_ms = median_ms(
+        fast_ms, plain_ms, sample_ms, act_ms = median_ms(
             lambda: learner.update(learner.replay.sample(batch)),  # noqa: B023
             lambda: plain.update(learner.replay.sample(batch), mean, std, draw),  # noqa: B023
+            lambda: learner.replay.sample(batch),  # noqa: B023
             lambda: learner.act(obs),  # noqa: B023
         )
-        print(
-            f"{batch:6}{threads:9}{fast_ms:11.1f}{plain_ms:10.1f}{plain_ms / fast_ms:7.1f}"
-            f"{act_ms:8.2f}"
-        )
+        times = [fast_ms, plain_ms, plain_ms / fast_ms, sample_ms, act_ms]
+        rows.append([str(batch), str(threads), *(f"{time:.2f}" for time in times)])
+    head = ["batch", "threads", "update, ms", "plain, ms", "ratio", "sample, ms", "act, ms"]
+    publish("learner_update", f"{machine('numpy', 'torch')}.\n\n{table(head, rows)}")
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-//! Env-steps per second of a batch in pure Rust: random actions, 25-step episodes, one and two threads.
+//! Env-steps per second of a batch in pure Rust: both engines, random actions, 25-step episodes.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use innerattn_env::batch::{Autoreset, Batch, Options, StepBuffers};
 use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
-use innerattn_env::scenario::Scenario;
+use innerattn_env::scenario::{Engine, Scenario};
 
 const ROUNDS: usize = 64;
 
@@ -15,9 +15,12 @@ fn random_actions(envs: usize, robots: usize) -> Vec<Vec<i64>> {
 
 fn step(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("step");
-    for threads in [1, 2] {
-        for (envs, substeps) in [(1, 6), (32, 6), (1024, 1), (1024, 6), (4096, 6)] {
-            let scenario = Scenario { substeps, ..Scenario::default() };
+    for (threads, engine) in [1, 2].iter().flat_map(|t| [Engine::Rapier, Engine::Discs].map(|e| (*t, e))) {
+        for (envs, substeps) in [(1, 6), (32, 6), (1024, 1), (1024, 2), (1024, 6), (4096, 6)] {
+            if engine == Engine::Discs && substeps != 6 {
+                continue; // it has none
+            }
+            let scenario = Scenario { engine, substeps, ..Scenario::default() };
             let options = Options {
                 num_envs: envs,
                 seed: 0,
@@ -34,7 +37,7 @@ fn step(criterion: &mut Criterion) {
             let mut components = vec![0.0; envs * robots * 4];
             let (mut terminated, mut truncated) = (vec![false; envs], vec![false; envs]);
             group.throughput(Throughput::Elements(envs as u64));
-            let name = format!("{threads} threads, {substeps} substeps");
+            let name = format!("{engine:?}, {threads} threads, {substeps} substeps");
             let mut round = 0;
             group.bench_function(BenchmarkId::new(name, envs), |bencher| {
                 bencher.iter(|| {

@@ -264,6 +264,9 @@ impl Scenario {
     /// # Errors
     /// [`Error::ScenarioText`] for text of the wrong form, [`Error::Scenario`] for a bad value.
     pub fn from_json(text: &str) -> Result<Self> {
+        if !text.trim_start().starts_with('{') {
+            return Err(Error::ScenarioText("must be a JSON object".into())); // a list would do for serde
+        }
         let scenario: Self =
             serde_json::from_str(text).map_err(|error| Error::ScenarioText(error.to_string()))?;
         scenario.validate()?;

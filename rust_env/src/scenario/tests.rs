@@ -26,6 +26,8 @@ fn the_default_is_valid_and_survives_json() {
 fn text_that_is_no_scenario_is_refused() {
     for text in [
         "",
+        "[]",
+        " [1]",
         "{\"colour\": 1}",
         "{\"robots\": [{\"wheels\": 3}]}",
         "{\"engine\": \"bullet\"}",
