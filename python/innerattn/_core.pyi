@@ -21,8 +21,8 @@ class Batch:
     """Many rescue worlds of one scenario. E envs, R robots, D columns, V victim slots, O obstacles.
 
     Arrays returned by `reset`, `step`, `observe` and `reward_components` are read-only and valid
-    until the step after next. Not to be used from two threads at once (RuntimeError), nor in a
-    child process after a fork (RuntimeError).
+    until the step after next. Not to be used from two threads at once (RuntimeError), nor, with
+    several threads, in a child process after a fork (RuntimeError).
     """
 
     def __new__(
@@ -42,10 +42,6 @@ class Batch:
     def obs_width(self) -> int:
         """Columns D of an observation."""
 
-    @property
-    def max_helpers(self) -> int:
-        """Most helpers that any task needs."""
-
     def observation_names(self) -> list[str]:
         """Names of the D columns; units are m and m/s."""
 
@@ -64,14 +60,14 @@ class Batch:
         NDArray[np.bool_],
         NDArray[np.bool_],
         NDArray[np.float32],
-        NDArray[np.int64] | None,
+        NDArray[np.void],
     ]:
         """Do one control step; actions are (E, R) integers, or (E, R, 2) floats when continuous.
 
         Returns:
             obs (E, R, D), reward (E, R), terminated (E,), truncated (E,), final_obs (E, R, D), and
-            rescues (n, 6 + helpers): env, episode, step, slot, victim, task, helpers (-1 for none);
-            None in place of no rescues.
+            rescues (n,) structured int64: env, episode, step, slot, victim, task, helper_0, ...
+            (-1 for none).
 
         Raises:
             TypeError: wrong dtype.

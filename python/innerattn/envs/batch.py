@@ -15,7 +15,6 @@ Autoreset = Literal["same_step", "disabled"]
 Array = TypeVar("Array", bound=NDArray[Any])
 
 NUM_DISCRETE_ACTIONS = 5
-_RESCUE_FIELDS = ("env", "episode", "step", "slot", "victim", "task")
 _VICTIM_DTYPE = np.dtype(
     [
         ("present", "?"),
@@ -100,9 +99,6 @@ class BatchEnv:
         self.continuous = self.scenario.actions == "continuous"
         self.num_actions = 0 if self.continuous else NUM_DISCRETE_ACTIONS
         self.obs_width = self._core.obs_width
-        helpers = [f"helper_{need}" for need in range(self._core.max_helpers)]
-        self._rescue_dtype = np.dtype([(name, "i8") for name in (*_RESCUE_FIELDS, *helpers)])
-        self._no_rescues = np.empty(0, self._rescue_dtype)
         self._copy = copy
 
     def reset(self, seed: int | None = None, mask: ArrayLike | None = None) -> NDArray[np.float32]:
@@ -142,9 +138,7 @@ class BatchEnv:
                 named), or a world whose episode is over (autoreset disabled). Nothing has moved
                 then.
         """
-        obs, reward, terminated, truncated, final_obs, events = self._core.step(np.asarray(actions))
-        rescues = self._no_rescues if events is None else events.view(self._rescue_dtype)[:, 0]
-        step = Step(obs, reward, terminated, truncated, final_obs, rescues)
+        step = Step._make(self._core.step(np.asarray(actions)))
         return Step._make(array.copy() for array in step) if self._copy else step
 
     def observation_names(self) -> list[str]:

@@ -7,7 +7,7 @@ use innerattn_env::scenario::{Actions, Scenario};
 use innerattn_env::task::Rescue;
 use innerattn_env::world::World;
 use numpy::{
-    IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2,
+    IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2,
     PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
@@ -23,8 +23,11 @@ type Stepped = (
     Py<PyArray<bool, Ix1>>,
     Py<PyArray<bool, Ix1>>,
     Py<PyArray<f32, Ix3>>,
-    Option<Py<PyArray<i64, Ix2>>>,
+    Py<PyAny>,
 );
+
+/// Columns of a rescue, before those of its helpers.
+const RESCUE_FIELDS: [&str; 6] = ["env", "episode", "step", "slot", "victim", "task"];
 
 /// Many rescue worlds of one scenario.
 #[pyclass(module = "innerattn._core")]
@@ -36,6 +39,9 @@ pub struct Batch {
     /// What looks without a step (reset, observe) write, in turn: no view of a step is touched.
     looks: [Lent<f32, Ix3>; 2],
     latest_look: usize,
+    /// The type of a rescue, and the array of none.
+    rescue_dtype: Py<PyAny>,
+    no_rescues: Py<PyAny>,
     process: u32,
 }
 
@@ -60,7 +66,10 @@ impl Batch {
         let (robots, width) = (worlds.rules().team.len(), worlds.rules().layout.width());
         let set = || Arrays::new(py, num_envs, robots, width);
         let look = || Lent::zeros(py, [num_envs, robots, width]);
+        let rescue_dtype = rescue_dtype(py, worlds.rules().scenario.max_needs())?;
         Ok(Self {
+            no_rescues: py.import("numpy")?.call_method1("empty", (0, &rescue_dtype))?.unbind(),
+            rescue_dtype: rescue_dtype.unbind(),
             sets: [set()?, set()?],
             looks: [look()?, look()?],
             worlds,
@@ -78,11 +87,6 @@ impl Batch {
     #[getter]
     fn obs_width(&self) -> usize {
         self.worlds.rules().layout.width()
-    }
-
-    #[getter]
-    fn max_helpers(&self) -> usize {
-        self.worlds.rules().scenario.max_needs()
     }
 
     fn observation_names(&self) -> Vec<String> {
@@ -226,9 +230,9 @@ impl Batch {
 }
 
 impl Batch {
-    /// A pool's threads do not survive a fork: a child that used it would wait for ever.
+    /// A pool's threads do not survive a fork: a child would step with one thread and not know why.
     fn check_process(&self) -> PyResult<()> {
-        if self.process == std::process::id() {
+        if self.worlds.num_threads() == 1 || self.process == std::process::id() {
             return Ok(());
         }
         Err(PyRuntimeError::new_err(
@@ -290,11 +294,11 @@ impl Batch {
         shaped(py, numbers.collect(), [self.worlds.num_envs(), rows, 2])
     }
 
-    /// Rescues as rows of env, episode, step, slot, victim, task and one helper for each possible need;
-    /// none if there are none.
-    fn events(&self, py: Python, rescues: &[Rescue]) -> PyResult<Option<Py<PyArray2<i64>>>> {
+    /// Rescues as a structured array: env, episode, step, slot, victim, task and one helper for each
+    /// possible need.
+    fn events(&self, py: Python, rescues: &[Rescue]) -> PyResult<Py<PyAny>> {
         if rescues.is_empty() {
-            return Ok(None);
+            return Ok(self.no_rescues.clone_ref(py));
         }
         let helpers = self.worlds.rules().scenario.max_needs();
         let mut rows = Vec::with_capacity(rescues.len() * (6 + helpers));
@@ -303,8 +307,16 @@ impl Batch {
             rows.extend([rescue.step, rescue.slot, rescue.victim, rescue.task].map(i64::from));
             rows.extend(rescue.helpers[..helpers].iter().map(|helper| helper.map_or(-1, i64::from)));
         }
-        Ok(Some(shaped(py, rows, [rescues.len(), 6 + helpers])?.unbind()))
+        Ok(rows.into_pyarray(py).call_method1("view", (&self.rescue_dtype,))?.unbind())
     }
+}
+
+/// A structured type of int64 fields.
+fn rescue_dtype(py: Python, helpers: usize) -> PyResult<Bound<PyAny>> {
+    let helpers = (0..helpers).map(|need| format!("helper_{need}"));
+    let names = RESCUE_FIELDS.map(String::from).into_iter().chain(helpers);
+    let fields: Vec<(String, &str)> = names.map(|name| (name, "i8")).collect();
+    py.import("numpy")?.call_method1("dtype", (fields,))
 }
 
 fn wrong_shape(actions: &Bound<PyUntypedArray>, wanted: &str) -> PyErr {
