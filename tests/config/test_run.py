@@ -7,7 +7,13 @@ from innerattn.config import NetworkConfig, RunConfig, TDConfig, TrainConfig
 
 
 @pytest.mark.parametrize(
-    ("method", "attention"), [("td-inner", "inner"), ("td-uniform", "uniform")]
+    ("method", "attention"),
+    [
+        ("td-inner", "inner"),
+        ("td-uniform", "uniform"),
+        ("ppo-inner", "inner"),
+        ("ppo-uniform", "uniform"),
+    ],
 )
 def test_attention_follows_method(method: str, attention: str) -> None:
     train = {"method": method}
@@ -40,6 +46,9 @@ def test_contradicting_attention_is_refused(method: str, attention: str) -> None
         ("td", "warmup_env_steps", -1),
         ("td", "critic_grad_clip", float("inf")),
         ("td", "reward_std_floor", 0.0),
+        ("ppo", "gae_lambda", 1.5),
+        ("ppo", "clip", 1.0),
+        ("ppo", "minibatch_size", 0),
         ("train", "method", "ppo"),
         ("train", "seed", -1),
         ("train", "threads", 0),

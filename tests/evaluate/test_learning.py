@@ -12,7 +12,7 @@ from innerattn.train import train
 LEARNING_RATE = 0.003
 
 
-@pytest.mark.parametrize("method", ["td-inner", "td-uniform"])
+@pytest.mark.parametrize("method", ["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"])
 def test_two_robots_learn_to_rescue(method: str, tmp_path: Path) -> None:
     team = Scenario()
     scenario = Scenario(
@@ -27,6 +27,7 @@ def test_two_robots_learn_to_rescue(method: str, tmp_path: Path) -> None:
             "scenario": scenario,
             "network": {"hidden_width": 32, "attention_heads": 2},
             "td": {"learning_rate": LEARNING_RATE, "batch_size": 128},
+            "ppo": {"learning_rate": LEARNING_RATE, "minibatch_size": 400},
             "train": {"method": method, "env_steps": 40_000, "threads": 1},
         }
     )

@@ -86,11 +86,16 @@ class PlainValues:
 
 
 def values(
-    network: PlainNetwork, obs: Tensor, actions: Tensor, kind: str, available: Tensor | None = None
+    network: PlainNetwork,
+    obs: Tensor,
+    actions: Tensor,
+    kind: str,
+    available: Tensor | None = None,
+    num_actions: int | None = None,
 ) -> PlainValues:
     """Q of every own action for obs (B, R, D), actions (B, R), available (B, R) bool."""
     batch, robots, _ = obs.shape
-    num_actions = len(network.robot("output", 0)[1])
+    num_actions = num_actions or len(network.robot("output", 0)[1])
     query, key = network.layers["attention.query"], network.layers["attention.key"]
     value = network.layers["attention.value"]
     value_bias = network.layers["attention.value_bias"]

@@ -1,6 +1,7 @@
 """From presets, a file and single values to one `RunConfig`, and from there to TOML and back.
 
-Later sources win: scenario preset, budget, configuration file, single values.
+Later sources win: scenario preset, budget, what the budget says for PPO, configuration file, single
+values.
 """
 
 from __future__ import annotations
@@ -38,11 +39,18 @@ def load_run_config(
         ConfigError: unknown preset or key, value out of range, or values that contradict each
             other; the message names the key and what is allowed.
     """
+    given: dict[str, Any] = {"train": {"method": method}}
+    if config_file is not None:
+        _merge(given, toml_table(config_file))
+    train = given["train"]
+    chosen = (overrides or {}).get(
+        "train.method", train.get("method") if isinstance(train, dict) else None
+    )
     table: dict[str, Any] = {"scenario": preset_table("scenarios", preset)}
     _merge(table, preset_table("budgets", budget))
-    _merge(table, {"train": {"method": method}})
-    if config_file is not None:
-        _merge(table, toml_table(config_file))
+    if str(chosen).startswith("ppo"):
+        _merge(table, preset_table("budgets/ppo", budget))
+    _merge(table, given)
     for key, value in (overrides or {}).items():
         section, dot, name = key.partition(".")
         if not dot or not isinstance(table.setdefault(section, {}), dict):

@@ -1,4 +1,4 @@
-"""Everything that a training run needs, in five sections; a run is repeated from it alone.
+"""Everything that a training run needs, in six sections; a run is repeated from it alone.
 
 Ranges of the sections below live here; those of a scenario live in the compiled module.
 """
@@ -17,10 +17,15 @@ from innerattn.config.scenario import Scenario
 BUDGETS = preset_names("budgets")
 """Names of the built-in budgets: how long to train, and with which numbers."""
 
-Method = Literal["td-inner", "td-uniform"]
+Method = Literal["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"]
 Attention = Literal["inner", "uniform"]
 
-_ATTENTION: dict[str, Attention] = {"td-inner": "inner", "td-uniform": "uniform"}
+_ATTENTION: dict[str, Attention] = {
+    "td-inner": "inner",
+    "td-uniform": "uniform",
+    "ppo-inner": "inner",
+    "ppo-uniform": "uniform",
+}
 
 
 class NetworkConfig(Model):
@@ -102,6 +107,50 @@ class TDConfig(Model):
         return self
 
 
+class PPOConfig(Model):
+    """On-policy learning by proximal policy optimisation."""
+
+    place: ClassVar[str] = "ppo"
+
+    gamma: float = Field(0.95, ge=0.0, le=1.0, description="discount per control step")
+    gae_lambda: float = Field(
+        0.95, ge=0.0, le=1.0, description="how far advantages look: 0 one step, 1 to the end"
+    )
+    learning_rate: float = Field(0.001, gt=0.0, le=1.0, description="step size of Adam")
+    final_learning_rate_share: float = Field(
+        0.1,
+        ge=0.0,
+        le=1.0,
+        description="share of the step size left at the end of training; it falls evenly",
+    )
+    rollout_steps: int = Field(
+        25, ge=1, description="control steps of every world between updates [steps]"
+    )
+    epochs: int = Field(5, ge=1, description="passes over a rollout")
+    minibatch_size: int = Field(1_600, ge=1, description="rows of a rollout per update")
+    clip: float = Field(0.2, gt=0.0, lt=1.0, description="how far a probability ratio counts")
+    value_clip: float | None = Field(
+        None, gt=0.0, description="how far a value may move per rollout; None: freely"
+    )
+    entropy_weight: float = Field(0.01, ge=0.0, description="weight of the policy's entropy")
+    stop_at_kl: float | None = Field(
+        None, gt=0.0, description="divergence that ends a rollout's epochs [nats]; None: none does"
+    )
+    advantage: Literal["counterfactual", "value"] = Field(
+        "counterfactual",
+        description="baseline: expectation of Q over the own action, or a value head",
+    )
+    attention_logit_penalty: float = Field(
+        0.0, ge=0.0, description="weight of the squared attention logits in the critic's loss"
+    )
+    critic_weight_decay: float = Field(0.0, ge=0.0, description="L2 penalty of the critic's Adam")
+    critic_grad_clip: float = Field(40.0, gt=0.0, description="largest norm of critic gradients")
+    actor_grad_clip: float = Field(0.5, gt=0.0, description="largest norm of an actor's gradients")
+    return_deviation_floor: float = Field(
+        1e-2, gt=0.0, description="least deviation of returns that rewards are divided by"
+    )
+
+
 class TrainConfig(Model):
     """How long to train, where, and how often to log."""
 
@@ -156,7 +205,8 @@ class RunConfig(Model):
 
     scenario: Scenario = Field(default_factory=Scenario, description="the world")
     network: NetworkConfig = Field(default_factory=NetworkConfig, description="the networks")
-    td: TDConfig = Field(default_factory=TDConfig, description="the learning algorithm")
+    td: TDConfig = Field(default_factory=TDConfig, description="numbers of the TD methods")
+    ppo: PPOConfig = Field(default_factory=PPOConfig, description="numbers of the PPO methods")
     train: TrainConfig = Field(default_factory=TrainConfig, description="the run")
     evaluate: EvaluateConfig = Field(default_factory=EvaluateConfig, description="measuring")
 

@@ -1,7 +1,8 @@
 """Learners: they act, take in transitions and improve; they know no environment and no file."""
 
+from innerattn.learn.ppo import PPO
 from innerattn.learn.replay import Replay
 from innerattn.learn.td import TD
 from innerattn.learn.types import Learner, Team, Transitions
 
-__all__ = ["TD", "Learner", "Replay", "Team", "Transitions"]
+__all__ = ["PPO", "TD", "Learner", "Replay", "Team", "Transitions"]

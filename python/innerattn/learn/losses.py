@@ -80,3 +80,32 @@ def sampled_policy_loss(log_prob: Tensor, q: Tensor, actions: Tensor, temperatur
         advantage = taken(q, actions) - (log_prob.exp() * q).sum(dim=1)
         cost = temperature * drawn - advantage
     return (drawn * cost).mean(dim=1).sum()
+
+
+def clipped_policy_loss(log_prob: Tensor, before: Tensor, advantage: Tensor, clip: float) -> Tensor:
+    """-min(ratio A, clip(ratio, 1 - c, 1 + c) A): the clipped surrogate (Schulman et al. 2017).
+
+    Args:
+        log_prob: (R, B) of the actions taken, under the policy that is trained.
+        before: (R, B) the same under the policy that acted.
+        advantage: (R, B).
+        clip: c.
+    """
+    ratio = (log_prob - before).exp()
+    bounded = ratio.clamp(1.0 - clip, 1.0 + clip)
+    return -torch.minimum(ratio * advantage, bounded * advantage).mean(dim=1).sum()
+
+
+def clipped_value_loss(value: Tensor, before: Tensor, target: Tensor, clip: float) -> Tensor:
+    """Squared error, or that of the value held within ``clip`` of what it was, if that is larger.
+
+    All are (R, B).
+    """
+    held = before + (value - before).clamp(-clip, clip)
+    errors = torch.maximum((value - target).square(), (held - target).square())
+    return errors.mean(dim=1).sum()
+
+
+def entropy(log_prob: Tensor) -> Tensor:
+    """(R, B) entropies, nats, of policies with log-probabilities (R, A, B)."""
+    return -(log_prob.exp() * log_prob).sum(dim=1)

@@ -8,20 +8,16 @@ from __future__ import annotations
 
 import copy
 
-import numpy as np
 import torch
 from torch import Tensor, nn
 
 from innerattn.config.run import NetworkConfig, TDConfig
 from innerattn.learn import losses
+from innerattn.learn.actor_critic import ActorCritic
 from innerattn.learn.replay import Replay
 from innerattn.learn.types import Team, Transitions
-from innerattn.nn import Actor, Critic, InnerAttention, UniformAttention, sample_actions
+from innerattn.nn import sample_actions
 
-_ATTENTIONS: dict[str, type[InnerAttention] | type[UniformAttention]] = {
-    "inner": InnerAttention,
-    "uniform": UniformAttention,
-}
 _TARGETS = {"consistent": losses.consistent_target, "maac": losses.maac_target}
 _POLICY_LOSSES = {
     "expected": losses.expected_policy_loss,
@@ -37,12 +33,10 @@ _METRICS = (
 )
 
 
-class TD:
+class TD(ActorCritic):
     """The off-policy learner; its contract is `innerattn.learn.types.Learner`.
 
     Attributes:
-        actor: The trained policies.
-        critic: The trained critics.
         target_actor: Slow copy of the policies.
         target_critic: Slow copy of the critics.
         replay: Past transitions.
@@ -68,53 +62,29 @@ class TD:
             seed: Seed of the initial weights and of every draw.
             device: Where networks and replay live.
             dtype: Floating-point type of the networks.
-            availability_column: Column of a robot's observation that says whether it is available
-                (above 0.5); needed only where `network.mask_unavailable` is set.
+            availability_column: As in `ActorCritic`.
 
         Raises:
             ValueError: `network.mask_unavailable` is set without a column of the observation.
         """
-        if network.mask_unavailable and availability_column not in range(team.obs_width):
-            raise ValueError(
-                f"availability_column = {availability_column}: network.mask_unavailable needs a "
-                f"column in 0..{team.obs_width - 1}"
-            )
-        self._availability_column = availability_column if network.mask_unavailable else None
+        super().__init__(
+            team,
+            network,
+            learning_rate=td.learning_rate,
+            critic_weight_decay=td.critic_weight_decay,
+            seed=seed,
+            device=device,
+            dtype=dtype,
+            availability_column=availability_column,
+        )
         self._config = td
         self._temperature = 1.0 / td.reward_scale
         self._target = _TARGETS[td.entropy_target]
         self._policy_loss = _POLICY_LOSSES[td.policy_gradient]
-        self._device, self._dtype = device, dtype
-        weights_seed, noise_seed, replay_seed = (
-            int(child.generate_state(1, np.uint64)[0])
-            for child in np.random.SeedSequence(seed).spawn(3)
-        )
-        self._noise = torch.Generator(device).manual_seed(noise_seed)
-        self.replay = Replay(td.replay_capacity, team, replay_seed, device)
-        # Drawn on the CPU in float32 and then moved: a seed gives the same weights everywhere.
-        weights = torch.Generator().manual_seed(weights_seed)
-        width = network.hidden_width
-        attention = _ATTENTIONS[network.attention](width, network.attention_heads, weights)
-        self.actor = Actor(*team, width, weights).to(device, dtype)
-        self.critic = Critic(*team, attention, weights).to(device, dtype)
+        self.replay = Replay(td.replay_capacity, team, self._data_seed, device)
         self.target_actor = copy.deepcopy(self.actor).requires_grad_(False)
         self.target_critic = copy.deepcopy(self.critic).requires_grad_(False)
-        self._actor_adam = _adam(self.actor, td.learning_rate, weight_decay=0.0)
-        self._critic_adam = _adam(self.critic, td.learning_rate, td.critic_weight_decay)
-        self._updates = 0
         self._unpaid_env_steps = 0
-
-    @property
-    def updates(self) -> int:
-        """Number of updates done so far."""
-        return self._updates
-
-    @torch.no_grad()
-    def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
-        """Choose actions (E, R) int64 for observations (E, R, D); see `Learner.act`."""
-        logits = self.actor(self._robots_first(obs))
-        actions = logits.argmax(dim=1) if greedy else sample_actions(logits, self._noise)
-        return actions.t().contiguous().to(obs.device)
 
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
         """Store one control step of E worlds; see `Learner.observe`."""
@@ -127,9 +97,7 @@ class TD:
         """Let the step size fall evenly from its first to its final value; see `Learner.reach`."""
         config = self._config
         left = 1.0 - (1.0 - config.final_learning_rate_share) * share
-        for adam in (self._actor_adam, self._critic_adam):
-            for group in adam.param_groups:
-                group["lr"] = left * config.learning_rate
+        self._set_learning_rate(left * config.learning_rate)
 
     def learn(self) -> dict[str, float] | None:
         """Do one update for every `update_every_env_steps` env-steps since the warm-up.
@@ -169,44 +137,9 @@ class TD:
         self._updates += 1
         return torch.stack(critic_values + actor_values)
 
-    def attention(self, obs: Tensor, actions: Tensor) -> Tensor:
-        """Attention weights (B, H, R, R) of the critic; see `Learner.attention`."""
-        obs = self._robots_first(obs)
-        with torch.no_grad():
-            output = self.critic(obs, actions.to(self._device).t(), self._available(obs))
-        weights: Tensor = output.attended.weights
-        return weights
-
-    def state(self) -> dict[str, Tensor]:
-        """Copies of all weights, target weights, optimiser moments and the count of updates.
-
-        The replay and the random generators are not part of it.
-        """
-        state = {name: tensor.detach().clone() for name, tensor in self._tensors().items()}
-        return state | {"updates": torch.tensor(self._updates)}
-
-    def load(self, state: dict[str, Tensor]) -> None:
-        """Take over what `state` returned, on whatever device it lies.
-
-        Raises:
-            ValueError: A name, shape or dtype is wrong; the learner is left unchanged.
-        """
-        own = self._tensors() | {"updates": torch.tensor(self._updates)}
-        for name in sorted(own.keys() | state.keys()):
-            if name not in state:
-                raise ValueError(f"state has no tensor {name!r}")
-            if name not in own:
-                raise ValueError(f"state has an unknown tensor {name!r}")
-            given, wanted = state[name], own[name]
-            if given.shape != wanted.shape or given.dtype != wanted.dtype:
-                raise ValueError(
-                    f"state[{name!r}] is {given.dtype} {tuple(given.shape)}: must be "
-                    f"{wanted.dtype} {tuple(wanted.shape)}"
-                )
-        with torch.no_grad():
-            for name, tensor in own.items():
-                tensor.copy_(state[name])
-        self._updates = int(own["updates"])
+    def _networks(self) -> dict[str, nn.Module]:
+        targets = {"target_actor": self.target_actor, "target_critic": self.target_critic}
+        return super()._networks() | targets
 
     def _update_critic(self, obs: Tensor, batch: Transitions) -> list[Tensor]:
         config = self._config
@@ -219,15 +152,7 @@ class TD:
         if config.attention_logit_penalty and scores is not None:
             penalty = losses.attention_logit_penalty(scores, visible)
             loss = loss + config.attention_logit_penalty * penalty
-        self._critic_adam.zero_grad()
-        torch.autograd.backward(loss)
-        # The loss is a sum over robots, so what they share would learn faster with every robot
-        # more; MAAC likewise divides its gradient by their number, before clipping.
-        for shared in self.critic.attention.parameters():
-            if shared.grad is not None:
-                shared.grad.div_(len(obs))
-        norm = nn.utils.clip_grad_norm_(self.critic.parameters(), config.critic_grad_clip)
-        self._critic_adam.step()
+        norm = self._step_critic(loss, config.critic_grad_clip)
         return [loss.detach(), q_taken.detach().mean(), norm]
 
     def _update_actor(self, obs: Tensor) -> list[Tensor]:
@@ -237,10 +162,7 @@ class TD:
             q = self.critic(obs, actions, self._available(obs)).q
             entropy = -(log_prob.exp() * log_prob).sum(dim=1).mean()
         loss = self._policy_loss(log_prob, q, actions, self._temperature)
-        self._actor_adam.zero_grad()
-        torch.autograd.backward(loss)
-        norms = _clip_each_robot(self.actor, self._config.actor_grad_clip)
-        self._actor_adam.step()
+        norms = self._step_actor(loss, self._config.actor_grad_clip)
         return [loss.detach(), entropy, norms.mean()]
 
     @torch.no_grad()
@@ -259,56 +181,3 @@ class TD:
             self._temperature * losses.taken(log_prob, actions),
             self._config.gamma * continues.to(self._dtype),
         )
-
-    def _robots_first(self, obs: Tensor) -> Tensor:
-        """Bring (B, R, D) to (R, B, D), as the networks take it, on their device and dtype."""
-        return obs.to(self._device, self._dtype).transpose(0, 1)
-
-    def _available(self, obs: Tensor) -> Tensor | None:
-        """(B, R) bool from observations (R, B, D); None where no robot is to be masked."""
-        if self._availability_column is None:
-            return None
-        return (obs[:, :, self._availability_column] > 0.5).t()
-
-    def _tensors(self) -> dict[str, Tensor]:
-        """Live tensors of the state by name."""
-        tensors: dict[str, Tensor] = {}
-        for name in ("actor", "critic", "target_actor", "target_critic"):
-            network: nn.Module = getattr(self, name)
-            tensors |= {f"{name}.{key}": value for key, value in network.named_parameters()}
-        for name, network, adam in (
-            ("actor_adam", self.actor, self._actor_adam),
-            ("critic_adam", self.critic, self._critic_adam),
-        ):
-            for key, parameter in network.named_parameters():
-                moments = adam.state[parameter]
-                tensors |= {f"{name}.{key}.{part}": moments[part] for part in sorted(moments)}
-        return tensors
-
-
-def _adam(network: nn.Module, learning_rate: float, weight_decay: float) -> torch.optim.Adam:
-    """Adam with its moments in place from the start, so that a state always has the same names."""
-    parameters = list(network.parameters())
-    adam = torch.optim.Adam(parameters, learning_rate, weight_decay=weight_decay, fused=True)
-    for parameter in parameters:
-        adam.state[parameter] = {
-            "step": torch.zeros((), dtype=torch.float32, device=parameter.device),
-            "exp_avg": torch.zeros_like(parameter),
-            "exp_avg_sq": torch.zeros_like(parameter),
-        }
-    return adam
-
-
-def _clip_each_robot(network: nn.Module, limit: float) -> Tensor:
-    """Scale the gradient of each robot with a norm above the limit down to it.
-
-    Every parameter has robots first, (R, ...). Returns the norms (R,) before clipping.
-    """
-    gradients = [parameter.grad for parameter in network.parameters()]
-    flat = [gradient.flatten(1) for gradient in gradients if gradient is not None]
-    norms: Tensor = torch.linalg.vector_norm(
-        torch.stack([torch.linalg.vector_norm(g, dim=1) for g in flat]), dim=0
-    )
-    factors = (limit / (norms + 1e-6)).clamp_max(1.0).unsqueeze(1)
-    torch._foreach_mul_(flat, [factors] * len(flat))
-    return norms

@@ -33,6 +33,7 @@ class Actor(nn.Module):
             generator: Source of the initial parameters, on the CPU.
         """
         super().__init__()
+        self.num_robots = num_robots
         self.first = PerRobotLinear(num_robots, obs_width, hidden_width, generator)
         self.second = PerRobotLinear(num_robots, hidden_width, hidden_width, generator)
         self.output = PerRobotLinear(num_robots, hidden_width, num_actions, generator)

@@ -20,8 +20,8 @@ class CriticOutput(NamedTuple):
     """What the critic says of a batch.
 
     Attributes:
-        q: (R, A, B) Q_i(o, a, a_-i) for every own action a; robot i's own action is not an input
-            of its own values.
+        q: (R, A, B) Q_i(o, a, a_-i) for every own action a, or (R, outputs, B) other values; robot
+            i's own action is not an input of its own values.
         attended: What the attention made of the teammates.
     """
 
@@ -39,6 +39,7 @@ class Critic(nn.Module):
         num_actions: int,
         attention: InnerAttention | UniformAttention,
         generator: torch.Generator,
+        outputs: int | None = None,
     ) -> None:
         """Draw the parameters.
 
@@ -48,6 +49,7 @@ class Critic(nn.Module):
             num_actions: A.
             attention: The attention over teammates; its width is the width of every layer.
             generator: Source of the initial parameters, on the CPU.
+            outputs: Values for each robot; None: one for each own action.
         """
         super().__init__()
         width = attention.query.shape[0]
@@ -56,7 +58,7 @@ class Critic(nn.Module):
         self.action_encoder = PerRobotLinear(num_robots, obs_width + num_actions, width, generator)
         self.attention = attention
         self.hidden = PerRobotLinear(num_robots, 2 * width, width, generator)
-        self.output = PerRobotLinear(num_robots, width, num_actions, generator)
+        self.output = PerRobotLinear(num_robots, width, outputs or num_actions, generator)
 
     def forward(
         self, obs: Tensor, actions: Tensor, available: Tensor | None = None

@@ -13,6 +13,7 @@ import torch
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
+from innerattn.learn.ppo import PPO
 from innerattn.learn.td import TD
 from innerattn.learn.types import Learner, Team
 
@@ -28,14 +29,15 @@ def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
             "scenario.actions = 'continuous': learning needs 'discrete'; "
             "continuous worlds are for scripted policies"
         )
-    return TD(
-        Team(env.num_robots, env.obs_width, env.num_actions),
-        config.network,
-        config.td,
-        seed=config.train.seed,
-        device=_device(config.train.device),
-        availability_column=env.observation_names().index("own.available"),
-    )
+    team = Team(env.num_robots, env.obs_width, env.num_actions)
+    device = _device(config.train.device)
+    column = env.observation_names().index("own.available")
+    seed = config.train.seed
+    if config.train.method.startswith("ppo"):
+        return PPO(
+            team, config.network, config.ppo, seed=seed, device=device, availability_column=column
+        )
+    return TD(team, config.network, config.td, seed=seed, device=device, availability_column=column)
 
 
 _ROWS_PER_THREAD = 512
@@ -47,7 +49,9 @@ def thread_count(config: RunConfig) -> int:
     A second thread gains little on small batches, and torch's threads wait for each other: where
     another program takes one of the cores, two are many times slower than one.
     """
-    worth = max(1, config.td.batch_size // _ROWS_PER_THREAD)
+    ppo = config.train.method.startswith("ppo")
+    rows = config.ppo.minibatch_size if ppo else config.td.batch_size
+    worth = max(1, rows // _ROWS_PER_THREAD)
     return config.train.threads or min(worth, len(os.sched_getaffinity(0)))
 
 

@@ -1,0 +1,84 @@
+"""Advantages and the scale of returns, as functions of what was collected. Time comes first.
+
+Sources: Schulman et al. 2016, eq. 16 (generalised advantage estimation), and its treatment of time
+limits after Pardo et al. 2018: the value of the state that a time limit cut off still counts.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+
+def generalised_advantage(
+    reward: Tensor,
+    value: Tensor,
+    next_value: Tensor,
+    terminated: Tensor,
+    ended: Tensor,
+    gamma: float,
+    gae_lambda: float,
+) -> Tensor:
+    """A_t = d_t + gamma lambda A_t+1 with d_t = r_t + gamma V(s'_t) - V(s_t); episodes stay apart.
+
+    Args:
+        reward: (T, R, E).
+        value: (T, R, E) value of each step's state.
+        next_value: (T, R, E) value of the state after the step, in the same episode.
+        terminated: (T, E) bool; nothing comes after a termination.
+        ended: (T, E) bool, terminated or cut off by a time limit.
+        gamma: Discount of a control step.
+        gae_lambda: lambda; 0 looks one step ahead, 1 to the end.
+
+    Returns:
+        (T, R, E); A + V are the lambda-returns.
+    """
+    alive = (~terminated).to(reward.dtype).unsqueeze(1)
+    delta = reward + gamma * alive * next_value - value
+    carry = gamma * gae_lambda * (~ended).to(reward.dtype).unsqueeze(1)
+    advantage = torch.empty_like(delta)
+    later = torch.zeros_like(delta[0])
+    for step in range(len(delta) - 1, -1, -1):
+        later = delta[step] + carry[step] * later
+        advantage[step] = later
+    return advantage
+
+
+class ReturnScale:
+    """Running deviation of discounted returns, by which rewards are divided.
+
+    Attributes:
+        count: () float64, returns seen.
+        mean: (R,) float64.
+        squares: (R,) float64, sum of squared deviations from the mean.
+    """
+
+    def __init__(self, num_robots: int, gamma: float, device: torch.device) -> None:
+        """Start with nothing seen; rewards of ``num_robots`` robots are discounted by ``gamma``."""
+        self._gamma = gamma
+        self._open: Tensor | None = None
+        self.count = torch.zeros((), dtype=torch.float64, device=device)
+        self.mean = torch.zeros(num_robots, dtype=torch.float64, device=device)
+        self.squares = torch.zeros_like(self.mean)
+
+    def see(self, reward: Tensor, ended: Tensor) -> None:
+        """Take in rewards (T, R, E) and the ends of episodes (T, E) of worlds that go on."""
+        returns = []
+        before = self._open
+        for step_reward, step_ended in zip(reward.double(), ended, strict=True):
+            before = step_reward if before is None else step_reward + self._gamma * before
+            returns.append(before)
+            before = before * ~step_ended
+        self._open = before
+        seen = torch.stack(returns, dim=1).flatten(1)  # (R, T * E)
+        added = seen.shape[1]
+        # Chan's rule for the moments of two samples together.
+        apart = seen.mean(dim=1) - self.mean
+        self.squares += (seen - seen.mean(dim=1, keepdim=True)).square().sum(dim=1)
+        self.squares += apart.square() * self.count * added / (self.count + added)
+        self.mean += apart * added / (self.count + added)
+        self.count += added
+
+    def deviation(self, floor: float) -> Tensor:
+        """(R,) float64, at least ``floor``."""
+        return (self.squares / self.count.clamp_min(1.0)).sqrt().clamp_min(floor)

@@ -1,0 +1,250 @@
+"""The on-policy learner: proximal policy optimisation with the same actors and the same critic.
+
+It decides when to update and how; networks live in `nn`, formulas in `losses` and `advantage`.
+Sources: Schulman et al. 2017; the baseline of Iqbal & Sha 2019, section 3.3.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from innerattn.config.run import NetworkConfig, PPOConfig
+from innerattn.learn import losses
+from innerattn.learn.actor_critic import ActorCritic
+from innerattn.learn.advantage import ReturnScale, generalised_advantage
+from innerattn.learn.types import Team, Transitions
+from innerattn.nn import sample_actions
+
+_METRICS = (
+    "critic_loss",
+    "q_mean",
+    "critic_grad_norm",
+    "actor_loss",
+    "policy_entropy",
+    "actor_grad_norm",
+    "kl",
+    "clip_share",
+)
+_CHUNK = 4096
+"""Rows that values are computed for at a time."""
+
+
+class PPO(ActorCritic):
+    """The on-policy learner; its contract is `innerattn.learn.types.Learner`.
+
+    The baseline of robot i does not depend on its own action: with `advantage = "counterfactual"`
+    it is sum_a pi_i(a) Q_i(o, a, a_-i), and Q_i of the action taken is fitted to the lambda-return;
+    with "value" it is a value head on the same encodings.
+
+    Attributes:
+        scale: Running deviation of returns; rewards are divided by it.
+    """
+
+    def __init__(
+        self,
+        team: Team,
+        network: NetworkConfig,
+        ppo: PPOConfig,
+        *,
+        seed: int,
+        device: torch.device,
+        dtype: torch.dtype = torch.float32,
+        availability_column: int | None = None,
+    ) -> None:
+        """Build networks and optimisers; arguments as in `ActorCritic`, numbers in ``ppo``.
+
+        Raises:
+            ValueError: `network.mask_unavailable` is set without a column of the observation.
+        """
+        super().__init__(
+            team,
+            network,
+            learning_rate=ppo.learning_rate,
+            critic_weight_decay=ppo.critic_weight_decay,
+            seed=seed,
+            device=device,
+            dtype=dtype,
+            availability_column=availability_column,
+            critic_outputs=None if ppo.advantage == "counterfactual" else 1,
+        )
+        self._config = ppo
+        self._shuffle = torch.Generator().manual_seed(self._data_seed)
+        self._steps: list[tuple[Transitions, Tensor]] = []
+        self.scale = ReturnScale(team.num_robots, ppo.gamma, device)
+
+    def observe(self, batch: Transitions, truncated: Tensor) -> None:
+        """Keep one control step of E worlds until the rollout is full; see `Learner.observe`."""
+        self._steps.append((batch, truncated))
+
+    def reach(self, share: float) -> None:
+        """Let the step size fall evenly from its first to its final value; see `Learner.reach`."""
+        config = self._config
+        left = 1.0 - (1.0 - config.final_learning_rate_share) * share
+        self._set_learning_rate(left * config.learning_rate)
+
+    def learn(self) -> dict[str, float] | None:
+        """Do the epochs of a full rollout, of `rollout_steps` control steps.
+
+        Returns:
+            Means over the minibatches done now; None while the rollout is not full. Names as of
+            `TD.learn`; `kl` is the mean divergence from the policy that acted, in nats, and
+            `clip_share` the share of actions whose ratio was clipped.
+        """
+        if len(self._steps) < self._config.rollout_steps:
+            return None
+        rollout = self._rollout()
+        self._steps = []
+        rows = []
+        stop = self._config.stop_at_kl
+        for _ in range(self._config.epochs):
+            order = torch.randperm(rollout.obs.shape[1], generator=self._shuffle)
+            epoch = [
+                self.update(rollout.take(chosen.to(self._device)))
+                for chosen in torch.split(order, self._config.minibatch_size)
+            ]
+            rows += epoch
+            if stop is not None and float(torch.stack(epoch)[:, 6].mean()) > stop:
+                break
+        means = torch.stack(rows).mean(dim=0).tolist()
+        return dict(zip(_METRICS, means, strict=True))
+
+    def update(self, rows: Rollout) -> Tensor:
+        """Update the critic, then the actors, from some rows of a rollout.
+
+        Args:
+            rows: At least one row.
+
+        Returns:
+            (8,) the values that `learn` names, in that order.
+        """
+        config = self._config
+        output = self.critic(rows.obs, rows.actions, self._available(rows.obs))
+        value = self._of_taken(output.q, rows.actions)
+        if config.value_clip is None:
+            loss = losses.critic_loss(value, rows.target)
+        else:
+            loss = losses.clipped_value_loss(value, rows.value, rows.target, config.value_clip)
+        scores, visible = output.attended.scores, output.attended.visible
+        if config.attention_logit_penalty and scores is not None:
+            penalty = losses.attention_logit_penalty(scores, visible)
+            loss = loss + config.attention_logit_penalty * penalty
+        critic_norm = self._step_critic(loss, config.critic_grad_clip)
+
+        log_prob = self.actor(rows.obs).log_softmax(dim=1)
+        taken = losses.taken(log_prob, rows.actions)
+        entropy = losses.entropy(log_prob).mean(dim=1)
+        surrogate = losses.clipped_policy_loss(taken, rows.log_prob, rows.advantage, config.clip)
+        actor_loss = surrogate - config.entropy_weight * entropy.sum()
+        actor_norms = self._step_actor(actor_loss, config.actor_grad_clip)
+        self._updates += 1
+        with torch.no_grad():
+            change = taken - rows.log_prob
+            kl = (change.exp() - 1.0 - change).mean()
+            clipped = ((change.exp() - 1.0).abs() > config.clip).to(kl.dtype).mean()
+            values = [loss, value.mean(), critic_norm, actor_loss, entropy.mean()]
+            return torch.stack([*(x.detach() for x in values), actor_norms.mean(), kl, clipped])
+
+    @torch.no_grad()
+    def _rollout(self) -> Rollout:
+        """What was collected, with advantages, targets and the policy that acted."""
+        config = self._config
+        batches, cut = zip(*self._steps, strict=True)
+        obs = torch.stack([self._robots_first(batch.obs) for batch in batches])  # (T, R, E, D)
+        actions = torch.stack([batch.actions.to(self._device).t() for batch in batches])
+        reward = torch.stack([batch.reward.to(self._device).t() for batch in batches])
+        terminated = torch.stack([batch.terminated.to(self._device) for batch in batches])
+        ended = terminated | torch.stack([flags.to(self._device) for flags in cut])
+        self.scale.see(reward, ended)
+        deviation = self.scale.deviation(config.return_deviation_floor).unsqueeze(1)
+        reward = (reward / deviation).to(self._dtype)
+
+        flat_obs, flat_actions = _rows(obs), _rows(actions)
+        log_prob, taken, baseline = self._evaluate(flat_obs, flat_actions)
+        value = _steps(baseline, len(batches))
+        # Where an episode goes on, the next state's value is the next step's; elsewhere the actions
+        # that would have been taken in it are drawn.
+        next_value = torch.cat([value[1:], torch.zeros_like(value[:1])])
+        drawn = ended.clone()
+        drawn[-1] = True
+        step, env = drawn.nonzero(as_tuple=True)
+        after = torch.stack([self._robots_first(batch.next_obs) for batch in batches])
+        after = after[step, :, env].transpose(0, 1)  # (R, n, D)
+        next_actions = sample_actions(self.actor(after), self._noise)
+        next_value[step, :, env] = self._evaluate(after, next_actions)[2].t()
+        advantage = generalised_advantage(
+            reward, value, next_value, terminated, ended, config.gamma, config.gae_lambda
+        )
+        target = _rows(advantage + value)
+        advantage = _rows(advantage)
+        centred = advantage - advantage.mean(dim=1, keepdim=True)
+        spread = advantage.std(dim=1, correction=0, keepdim=True)
+        return Rollout(
+            obs=flat_obs,
+            actions=flat_actions,
+            log_prob=losses.taken(log_prob, flat_actions),
+            value=taken,
+            advantage=centred / (spread + 1e-8),
+            target=target,
+        )
+
+    def _evaluate(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Log-probabilities (R, A, B), fitted values (R, B) and baselines (R, B) of rows."""
+        parts = []
+        for some_obs, some_actions in zip(
+            torch.split(obs, _CHUNK, dim=1), torch.split(actions, _CHUNK, dim=1), strict=True
+        ):
+            log_prob = self.actor(some_obs).log_softmax(dim=1)
+            q = self.critic(some_obs, some_actions, self._available(some_obs)).q
+            if self._config.advantage == "counterfactual":
+                baseline = (log_prob.exp() * q).sum(dim=1)
+            else:
+                baseline = q.squeeze(1)
+            parts.append((log_prob, self._of_taken(q, some_actions), baseline))
+        log_probs, values, baselines = zip(*parts, strict=True)
+        return torch.cat(log_probs, dim=2), torch.cat(values, dim=1), torch.cat(baselines, dim=1)
+
+    def _of_taken(self, q: Tensor, actions: Tensor) -> Tensor:
+        """(R, B) the values that are fitted: of the actions taken, or of the state."""
+        if self._config.advantage == "counterfactual":
+            return losses.taken(q, actions)
+        return q.squeeze(1)
+
+    def _running(self) -> dict[str, Tensor]:
+        scale = self.scale
+        return {
+            "scale.count": scale.count,
+            "scale.mean": scale.mean,
+            "scale.squares": scale.squares,
+        }
+
+
+class Rollout:
+    """Rows of a rollout, robots first: obs (R, B, D), all else (R, B)."""
+
+    def __init__(
+        self,
+        obs: Tensor,
+        actions: Tensor,
+        log_prob: Tensor,
+        value: Tensor,
+        advantage: Tensor,
+        target: Tensor,
+    ) -> None:
+        """Hold rows; `value` is what the critic said of them, `target` what it should have said."""
+        self.obs, self.actions, self.log_prob = obs, actions, log_prob
+        self.value, self.advantage, self.target = value, advantage, target
+
+    def take(self, rows: Tensor) -> Rollout:
+        """Some rows, by their numbers (n,) int64."""
+        return Rollout(**{name: tensor[:, rows] for name, tensor in vars(self).items()})
+
+
+def _rows(steps: Tensor) -> Tensor:
+    """Bring (T, R, E, ...) to (R, T * E, ...)."""
+    return steps.transpose(0, 1).flatten(1, 2)
+
+
+def _steps(rows: Tensor, count: int) -> Tensor:
+    """Bring (R, T * E) back to (T, R, E)."""
+    return rows.view(len(rows), count, -1).transpose(0, 1)

@@ -1,0 +1,304 @@
+"""The on-policy learner against a plain form of it, in float64: rollouts, losses, updates."""
+
+import pytest
+import torch
+from reference import Adam, PlainNetwork, PlainTD, clip_factor, pick, policy, values
+from torch import Tensor
+
+from innerattn.config import NetworkConfig
+from innerattn.config.run import PPOConfig
+from innerattn.learn import PPO, Team, Transitions, ppo
+
+CPU = torch.device("cpu")
+OBS_WIDTH, NUM_ACTIONS, ENVS, STEPS = 5, 3, 4, 3
+NETWORK = {"hidden_width": 8, "attention_heads": 2}
+NUMBERS = {
+    "rollout_steps": STEPS,
+    "minibatch_size": 5,
+    "epochs": 2,
+    "gamma": 0.9,
+    "gae_lambda": 0.8,
+    "clip": 0.01,
+    "attention_logit_penalty": 0.1,
+    "critic_weight_decay": 0.01,
+    "learning_rate": 0.01,
+}
+
+
+def make(robots: int, network: dict | None = None, numbers: dict | None = None, **extra) -> PPO:
+    return PPO(
+        Team(robots, OBS_WIDTH, NUM_ACTIONS),
+        NetworkConfig(**{**NETWORK, **(network or {})}),
+        PPOConfig(**{**NUMBERS, **(numbers or {})}),
+        **{"seed": 3, "device": CPU, "dtype": torch.float64, **extra},
+    )
+
+
+def collect(learner: PPO, robots: int, seed: int) -> list[tuple[Transitions, Tensor]]:
+    """A rollout of worlds that go on, some of which end, shown to the learner."""
+    source = torch.Generator().manual_seed(seed)
+    obs = torch.randn(ENVS, robots, OBS_WIDTH, generator=source)
+    steps = []
+    for step in range(STEPS):
+        after = torch.randn(ENVS, robots, OBS_WIDTH, generator=source)
+        terminated = torch.tensor([step == 1, False, False, False])
+        truncated = torch.tensor([False, step == 0, step == 2, False])
+        batch = Transitions(
+            obs,
+            torch.randint(NUM_ACTIONS, (ENVS, robots), generator=source),
+            torch.randn(ENVS, robots, generator=source) + 0.3,
+            after,
+            terminated,
+        )
+        steps.append((batch, truncated))
+        learner.observe(batch, truncated)
+        fresh = torch.randn(ENVS, robots, OBS_WIDTH, generator=source)
+        obs = torch.where((terminated | truncated).view(-1, 1, 1), fresh, after)
+    return steps
+
+
+def close(got: Tensor, expected: Tensor) -> None:
+    torch.testing.assert_close(got, expected, rtol=1e-10, atol=1e-10)
+
+
+class PlainPPO:
+    """The learner's rollout and updates with loops over worlds, steps, robots and rows."""
+
+    def __init__(self, state, network, numbers) -> None:
+        heads = network.attention_heads
+        self.actor = PlainNetwork.cut(state, "actor", heads)
+        self.critic = PlainNetwork.cut(state, "critic", heads)
+        self.kind, self.numbers = network.attention, numbers
+        self.actor_adam = Adam(numbers.learning_rate, 0.0)
+        self.critic_adam = Adam(numbers.learning_rate, numbers.critic_weight_decay)
+        self.returns: list[list[float]] = []
+        self.open: dict[tuple[int, int], float] = {}
+
+    def fitted(self, obs: Tensor, actions: Tensor) -> tuple[list[Tensor], Tensor]:
+        """By robot the value that is fitted, and the logit penalty."""
+        out = values(self.critic, obs, actions, self.kind, num_actions=NUM_ACTIONS)
+        if self.numbers.advantage == "value":
+            return [q[:, 0] for q in out.q], out.penalty
+        return [pick(q, actions[:, i]) for i, q in enumerate(out.q)], out.penalty
+
+    @torch.no_grad()
+    def baseline(self, obs: Tensor, actions: Tensor, robot: int) -> float:
+        """Of one world (1, R, ...)."""
+        q = values(self.critic, obs, actions, self.kind, num_actions=NUM_ACTIONS).q[robot][0]
+        if self.numbers.advantage == "value":
+            return float(q[0])
+        return float((policy(self.actor, obs)[robot][0].exp() * q).sum())
+
+    def rollout(self, steps, drawn: Tensor) -> dict[str, Tensor]:
+        """Advantage and target (R, T * E) and so on; `drawn` (R, n) are actions at cuts."""
+        numbers, robots = self.numbers, steps[0][0].obs.shape[1]
+        steps = [
+            (Transitions(*(x.double() if x.is_floating_point() else x for x in b)), c)
+            for b, c in steps
+        ]
+        if not self.returns:
+            self.returns = [[] for _ in range(robots)]
+        for batch, cut in steps:
+            for env in range(ENVS):
+                for robot in range(robots):
+                    total = float(batch.reward[env, robot]) + numbers.gamma * self.open.get(
+                        (env, robot), 0.0
+                    )
+                    self.returns[robot].append(total)
+                    self.open[env, robot] = 0.0 if batch.terminated[env] or cut[env] else total
+        scale = [
+            max(
+                float(torch.tensor(r, dtype=torch.float64).std(correction=0)),
+                numbers.return_deviation_floor,
+            )
+            for r in self.returns
+        ]
+        cuts = [
+            (t, env)
+            for t, (batch, cut) in enumerate(steps)
+            for env in range(ENVS)
+            if batch.terminated[env] or cut[env] or t == len(steps) - 1
+        ]
+        advantage = torch.zeros(robots, len(steps) * ENVS, dtype=torch.float64)
+        target = torch.zeros_like(advantage)
+        for robot in range(robots):
+            for env in range(ENVS):
+                later = 0.0
+                for t in reversed(range(len(steps))):
+                    batch, cut = steps[t]
+                    row = slice(env, env + 1)
+                    value = self.baseline(batch.obs[row], batch.actions[row], robot)
+                    if (t, env) in cuts:
+                        actions = drawn[:, cuts.index((t, env))][None]
+                        after = self.baseline(batch.next_obs[row], actions, robot)
+                    else:
+                        following = steps[t + 1][0]
+                        after = self.baseline(following.obs[row], following.actions[row], robot)
+                    alive = 0.0 if batch.terminated[env] else 1.0
+                    delta = (
+                        float(batch.reward[env, robot]) / scale[robot]
+                        + numbers.gamma * alive * after
+                        - value
+                    )
+                    if batch.terminated[env] or cut[env]:
+                        later = 0.0
+                    later = delta + numbers.gamma * numbers.gae_lambda * later
+                    advantage[robot, t * ENVS + env] = later
+                    target[robot, t * ENVS + env] = later + value
+        spread = advantage.std(dim=1, correction=0, keepdim=True)
+        advantage = (advantage - advantage.mean(dim=1, keepdim=True)) / (spread + 1e-8)
+        return {"advantage": advantage, "target": target}
+
+    def update(self, rows, obs: Tensor, actions: Tensor) -> tuple[float, float]:
+        """Losses of the critic and the actors on rows; obs (B, R, D), actions (B, R)."""
+        numbers = self.numbers
+        value, penalty = self.fitted(obs, actions)
+        loss = numbers.attention_logit_penalty * penalty
+        for robot, fitted in enumerate(value):
+            errors = (fitted - rows.target[robot]) ** 2
+            if numbers.value_clip is not None:
+                move = (fitted - rows.value[robot]).clamp(-numbers.value_clip, numbers.value_clip)
+                held = (rows.value[robot] + move - rows.target[robot]) ** 2
+                errors = torch.where(held > errors, held, errors)
+            loss = loss + errors.mean()
+        gradients = PlainTD._backward(self.critic, loss)
+        for key, part in gradients:
+            if key.startswith("attention."):
+                gradients[key, part] = gradients[key, part] / len(value)
+        norm = sum(float((g**2).sum()) for g in gradients.values()) ** 0.5
+        factor = clip_factor(norm, numbers.critic_grad_clip)
+        self.critic_adam.step(self.critic, {key: factor * g for key, g in gradients.items()})
+
+        total = torch.zeros((), dtype=obs.dtype)
+        for robot, log_pi in enumerate(policy(self.actor, obs)):
+            ratio = (pick(log_pi, actions[:, robot]) - rows.log_prob[robot]).exp()
+            for r, a, entropy in zip(
+                ratio, rows.advantage[robot], -(log_pi.exp() * log_pi).sum(1), strict=True
+            ):
+                low, high = 1 - numbers.clip, 1 + numbers.clip
+                bounded = low if r.item() < low else high if r.item() > high else r
+                worse = (
+                    r * a
+                    if (r * a).item()
+                    <= (bounded if isinstance(bounded, float) else bounded.item()) * a.item()
+                    else bounded * a
+                )
+                total = total - (worse + numbers.entropy_weight * entropy) / len(ratio)
+        gradients = PlainTD._backward(self.actor, total)
+        for robot in range(len(value)):
+            own = [key for key in gradients if key[1] == robot]
+            norm = sum(float((gradients[key] ** 2).sum()) for key in own) ** 0.5
+            for key in own:
+                gradients[key] = gradients[key] * clip_factor(norm, numbers.actor_grad_clip)
+        self.actor_adam.step(self.actor, gradients)
+        return float(loss.detach()), float(total.detach())
+
+
+@pytest.mark.parametrize("value_clip", [None, 0.01])
+@pytest.mark.parametrize("advantage", ["counterfactual", "value"])
+@pytest.mark.parametrize("attention", ["inner", "uniform"])
+@pytest.mark.parametrize("robots", [2, 3])
+def test_rollouts_and_updates_agree_with_the_plain_form(
+    robots: int,
+    attention: str,
+    advantage: str,
+    value_clip: float | None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    learner = make(
+        robots, {"attention": attention}, {"advantage": advantage, "value_clip": value_clip}
+    )
+    network = NetworkConfig(**NETWORK, attention=attention)
+    plain = PlainPPO(learner.state(), network, learner._config)
+    drawn: list[Tensor] = []
+    original = ppo.sample_actions
+
+    def recording(logits: Tensor, generator: torch.Generator) -> Tensor:
+        drawn.append(original(logits, generator))
+        return drawn[-1]
+
+    monkeypatch.setattr(ppo, "sample_actions", recording)
+    clipped = 0.0
+    for round_ in range(2):
+        steps = collect(learner, robots, round_)
+        rollout = learner._rollout()
+        learner._steps = []
+        expected = plain.rollout(steps, drawn[-1])
+        close(rollout.advantage, expected["advantage"])
+        close(rollout.target, expected["target"])
+        for first in (0, 3, 6):
+            chosen = torch.arange(first, first + 6)
+            rows = rollout.take(chosen)
+            obs, actions = rows.obs.transpose(0, 1), rows.actions.t()
+            losses = plain.update(rows, obs, actions)
+            found = dict(zip(ppo._METRICS, learner.update(rows).tolist(), strict=True))
+            assert found["critic_loss"] == pytest.approx(losses[0], rel=1e-10, abs=1e-10)
+            assert found["actor_loss"] == pytest.approx(losses[1], rel=1e-10, abs=1e-10)
+            clipped += found["clip_share"]
+            state = learner.state()
+            for name, tensor in (
+                plain.actor.joined("actor") | plain.critic.joined("critic")
+            ).items():
+                close(state[name], tensor)
+    assert clipped > 0, "a test in which nothing is clipped proves little"
+
+
+def test_learning_waits_for_a_full_rollout_and_then_uses_every_row() -> None:
+    learner = make(2)
+    steps = collect(learner, 2, 0)
+    learner._steps = []
+    for batch, truncated in steps[:-1]:
+        learner.observe(batch, truncated)
+        assert learner.learn() is None
+    learner.observe(*steps[-1])
+    found = learner.learn()
+    assert found is not None
+    assert found.keys() == set(ppo._METRICS)
+    assert learner.updates == 2 * 3, "two epochs of 12 rows in minibatches of 5"
+    assert learner.learn() is None
+
+
+def test_a_large_divergence_ends_the_epochs() -> None:
+    numbers = {"epochs": 50, "learning_rate": 0.05, "clip": 0.9}
+    free, held = make(2, numbers=numbers), make(2, numbers=numbers | {"stop_at_kl": 0.01})
+    for learner in (free, held):
+        collect(learner, 2, 0)
+        learner.learn()
+    assert free.updates == 50 * 3
+    assert held.updates < free.updates
+    assert held.updates % 3 == 0
+
+
+def test_one_seed_gives_the_same_bytes_and_another_does_not() -> None:
+    def run(seed: int) -> dict[str, Tensor]:
+        learner = make(3, seed=seed)
+        for round_ in range(2):
+            collect(learner, 3, round_)
+            learner.learn()
+        return learner.state()
+
+    first, again, other = run(1), run(1), run(2)
+    assert all(torch.equal(first[name], again[name]) for name in first)
+    assert not torch.equal(first["actor.first.weight"], other["actor.first.weight"])
+
+
+@pytest.mark.parametrize("robots", [1, 2])
+def test_constant_rewards_and_a_robot_alone_stay_finite(robots: int) -> None:
+    learner = make(robots)
+    for batch, truncated in collect(make(robots), robots, 0):
+        learner.observe(batch._replace(reward=torch.ones_like(batch.reward)), truncated)
+    learner.learn()
+    assert all(torch.isfinite(tensor).all() for tensor in learner.state().values())
+
+
+def test_a_loaded_learner_equals_the_saved_one() -> None:
+    saved, loaded = make(3), make(3, seed=9)
+    collect(saved, 3, 0)
+    saved.learn()
+    loaded.load(saved.state())
+    assert loaded.updates == saved.updates
+    assert loaded.scale.deviation(1e-3).tolist() == saved.scale.deviation(1e-3).tolist()
+    obs = torch.randn(6, 3, OBS_WIDTH)
+    assert torch.equal(loaded.act(obs, greedy=True), saved.act(obs, greedy=True))
+    with pytest.raises(ValueError, match=r"state has no tensor 'scale\.count'"):
+        loaded.load({name: t for name, t in saved.state().items() if name != "scale.count"})
