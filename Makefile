@@ -35,7 +35,7 @@ format: setup ## format all code
 	ruff format
 
 bench: setup ## speed of worlds and learner on this machine, beside their peers; fills docs/performance.md
-	pip install --quiet --disable-pip-version-check '.[peers]' 2>/dev/null || echo "Without peers: they cannot be installed here."
+	PIP_QUIET=1 maturin develop --release --quiet --extras dev,peers || echo "Without peers: they cannot be installed here."
 	cargo bench --quiet
 	python benches/compare_envs.py
 	python benches/env_cost.py

@@ -2,9 +2,9 @@
 
 `python benches/compare_envs.py` measures every contestant that is installed, each in processes of
 its own, one after another, and writes the tables into `docs/performance.md`. The packages come with
-`pip install -e '.[peers]'`; JaxMARL besides with `pip install jaxmarl`. Protocol: four agents,
-25-step episodes, random discrete actions, one Python call for a step of the batch, observations and
-rewards made ready, new episodes at once; all cores.
+the extra `peers`, as `make bench` installs it; JaxMARL with `pip install jaxmarl`. Protocol: four
+agents, 25-step episodes, random discrete actions, one Python call for a step of the batch,
+observations and rewards made ready, new episodes at once; all cores.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ import statistics
 import subprocess
 import sys
 import time
+from importlib import import_module
 
 import numpy as np
 from contestants import ACTIONS, AGENTS, CONTESTANTS, Contestant, Floats, installed
 from page import machine, publish, table
 
+EPISODE = 25
 BATCHES = (1, 32, 1024, 4096, 16384)
 ROUNDS = 5
 ROUND_S = 0.6
@@ -33,9 +35,9 @@ SCENE_STEPS = 20
 def measure_speed(name: str, num_envs: int) -> dict[str, float]:
     """Env-steps/s (median of rounds), seconds to the first step, peak memory in MB."""
     package, make = CONTESTANTS[name]
-    __import__(package)
+    import_module({"innerattn": "innerattn.envs"}.get(package, package))
     begun = time.perf_counter()
-    contestant = make(num_envs)
+    contestant = make(num_envs, EPISODE)
     random = np.random.default_rng(0).integers(0, ACTIONS, (64, num_envs, AGENTS))
     actions = [contestant.prepare(batch) for batch in random]
     contestant.act(actions[0])
@@ -65,12 +67,15 @@ def directions(contestant: Contestant) -> Floats:
 
 
 def measure_contacts(name: str) -> dict[str, float]:
-    """Deepest overlap of two agents, as a share of a radius, in two plays of many scenes.
+    """How true contacts are, in many scenes of three plays.
 
     Head-on: two agents far from the others rush at each other at full speed, hardly off the line.
-    Crush: all four press into one point for the whole scene.
+    Crush: all four press into one point for the whole scene. Of both the deepest overlap of two
+    agents is returned, as a share of a radius. Passing: two agents fly past each other with 0.1 to
+    0.5 of their reach to spare, while the others press upon each other; returned is the share of
+    passes in which one was turned aside.
     """
-    contestant = CONTESTANTS[name][1](1)
+    contestant = CONTESTANTS[name][1](1, 1_000_000)
     ways = directions(contestant)
     rng = np.random.default_rng(0)
     radii, speed = contestant.radii, contestant.speed
@@ -87,7 +92,7 @@ def measure_contacts(name: str) -> dict[str, float]:
         wanted = goals - contestant.positions()[0]
         contestant.act(contestant.prepare(np.argmax(wanted @ ways.T, axis=1)[None]))
 
-    worst = {"head_on": 0.0, "crush": 0.0}
+    worst = {"head_on": 0.0, "crush": 0.0, "passing": 0.0}
     for _ in range(SCENES):
         off, gap = rng.uniform(-0.1, 0.1) * radii[0], rng.uniform(0.5, 0.8)
         at = np.array([[[-gap / 2, off], [gap / 2, -off], [-0.8, 0.8], [0.8, -0.8]]])
@@ -105,6 +110,18 @@ def measure_contacts(name: str) -> dict[str, float]:
         for _ in range(SCENE_STEPS):
             steer(np.zeros((AGENTS, 2), dtype=np.float32))
             worst["crush"] = max(worst["crush"], overlap())
+        half = 0.5 * reach[0, 1] * rng.uniform(1.1, 1.5)
+        pressing = 0.5 * reach[2, 3]
+        at = np.array(
+            [[[-0.15, half], [0.15, -half], [-0.6 - pressing, 0.6], [-0.6 + pressing, 0.6]]]
+        )
+        contestant.move(at.astype(np.float32), velocities.astype(np.float32))
+        stay = int(np.argmin(np.linalg.norm(ways, axis=1)))
+        right, left = int(np.argmax(ways[:, 0])), int(np.argmin(ways[:, 0]))
+        for _ in range(SCENE_STEPS):
+            contestant.act(contestant.prepare(np.array([[stay, stay, right, left]])))
+        aside = abs(contestant.positions()[0, :2, 1] - at[0, :2, 1]) > 0.01 * radii[:2]
+        worst["passing"] += float(aside.any()) / SCENES
     return worst
 
 
@@ -160,7 +177,11 @@ def main() -> None:
                     if found
                     else ["", ""]
                 ),
-                *([f"{100 * contacts[key]:.1f} %" for key in contacts] if contacts else ["", ""]),
+                *(
+                    [f"{100 * contacts[key]:.1f} %" for key in contacts]
+                    if contacts
+                    else ["", "", ""]
+                ),
             ]
         )
     head = [
@@ -169,6 +190,7 @@ def main() -> None:
         "first step",
         "overlap, head-on",
         "overlap, crush",
+        "passes turned aside",
     ]
     publish(
         "compare_envs",

@@ -1,8 +1,8 @@
 """Environments to compare, each behind the same few calls: steps of a batch, places for studies.
 
-Every contestant has four agents, 25-step episodes, a new episode at once when one ends, and five
-discrete actions. Peers play their simple spread, the scene nearest to ours. A contestant imports
-its package when it is made, so that each can be measured in a process of its own.
+Every contestant has four agents, a new episode at once when one ends, and five discrete actions.
+Peers play their simple spread, the scene nearest to ours. A contestant imports its package when it
+is made, so that each can be measured in a process of its own.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 AGENTS = 4
 ACTIONS = 5
-EPISODE = 25
 
 Floats = NDArray[np.float32]
 
@@ -48,11 +47,11 @@ class Contestant(Protocol):
 class Ours:
     """The default mixed scenario."""
 
-    def __init__(self, num_envs: int, engine: str, substeps: int = 6, arena: float = 1.0) -> None:
+    def __init__(self, num_envs: int, episode: int, engine: str, substeps: int) -> None:
         from innerattn.config import Scenario
         from innerattn.envs import BatchEnv
 
-        changed = {"engine": engine, "substeps": substeps, "arena_half_width_m": arena}
+        changed = {"engine": engine, "substeps": substeps, "episode_steps": episode}
         scenario = Scenario.model_validate(Scenario.preset("mixed").model_dump() | changed)
         self.env = BatchEnv(scenario, num_envs, seed=0)
         self.env.reset()
@@ -67,7 +66,7 @@ class Ours:
 class Vmas:
     """VMAS: PyTorch tensors over the batch."""
 
-    def __init__(self, num_envs: int) -> None:
+    def __init__(self, num_envs: int, episode: int) -> None:
         import torch
         from vmas import make_env
 
@@ -77,7 +76,7 @@ class Vmas:
             num_envs,
             device="cpu",
             continuous_actions=False,
-            max_steps=EPISODE,
+            max_steps=episode,
             seed=0,
             n_agents=AGENTS,
         )
@@ -85,7 +84,7 @@ class Vmas:
         self.agents = self.env.world.agents
         self.radii = np.array([agent.shape.radius for agent in self.agents], dtype=np.float32)
         self.speed = 1.0
-        self.steps = 0
+        self.steps, self.episode = 0, episode
 
     def prepare(self, actions: NDArray[np.int64]) -> Any:
         columns = self.torch.from_numpy(actions)
@@ -94,7 +93,7 @@ class Vmas:
     def act(self, actions: Any) -> object:
         result = self.env.step(list(actions))
         self.steps += 1
-        if self.steps % EPISODE == 0:  # all episodes end together
+        if self.steps % self.episode == 0:  # all episodes end together
             return result, self.env.reset()
         return result
 
@@ -111,11 +110,11 @@ class Vmas:
 class Mpe2:
     """mpe2, the particle environments of PettingZoo: one world at a time."""
 
-    def __init__(self, num_envs: int) -> None:
+    def __init__(self, num_envs: int, episode: int) -> None:
         from mpe2 import simple_spread_v3
 
         make = simple_spread_v3.parallel_env
-        self.envs = [make(N=AGENTS, max_cycles=EPISODE) for _ in range(num_envs)]
+        self.envs = [make(N=AGENTS, max_cycles=episode) for _ in range(num_envs)]
         for seed, env in enumerate(self.envs):
             env.reset(seed=seed)
         self.worlds = [env.unwrapped.world for env in self.envs]
@@ -145,12 +144,14 @@ class Mpe2:
 class JaxMarl:
     """JaxMARL: one compiled step over the batch, new episodes inside it."""
 
-    def __init__(self, num_envs: int) -> None:
+    def __init__(self, num_envs: int, episode: int) -> None:
         import jax
         import jaxmarl
 
         self.jax, self.num_envs = jax, num_envs
-        env = jaxmarl.make("MPE_simple_spread_v3", num_agents=AGENTS, num_landmarks=AGENTS)
+        env = jaxmarl.make(
+            "MPE_simple_spread_v3", num_agents=AGENTS, num_landmarks=AGENTS, max_steps=episode
+        )
         self.names = env.agents
         keys = jax.random.split(jax.random.key(0), num_envs)
         _, self.state = jax.jit(jax.vmap(env.reset))(keys)
@@ -177,18 +178,17 @@ class JaxMarl:
         self.state = state.replace(
             p_pos=state.p_pos.at[:, :AGENTS].set(positions),
             p_vel=state.p_vel.at[:, :AGENTS].set(velocities),
-            step=state.step * 0,
         )
 
     def positions(self) -> Floats:
         return np.asarray(self.state.p_pos[:, :AGENTS])
 
 
-def _ours(engine: str, substeps: int = 6) -> Callable[[int], Contestant]:
-    return lambda num_envs: Ours(num_envs, engine, substeps)
+def _ours(engine: str, substeps: int = 6) -> Callable[[int, int], Contestant]:
+    return lambda num_envs, episode: Ours(num_envs, episode, engine, substeps)
 
 
-CONTESTANTS: dict[str, tuple[str, Callable[[int], Contestant]]] = {
+CONTESTANTS: dict[str, tuple[str, Callable[[int, int], Contestant]]] = {
     "innerattn rapier": ("innerattn", _ours("rapier")),
     "innerattn rapier, 4 substeps": ("innerattn", _ours("rapier", 4)),
     "innerattn rapier, 2 substeps": ("innerattn", _ours("rapier", 2)),
@@ -198,7 +198,7 @@ CONTESTANTS: dict[str, tuple[str, Callable[[int], Contestant]]] = {
     "mpe2": ("mpe2", Mpe2),
     "JaxMARL": ("jaxmarl", JaxMarl),
 }
-"""Package and maker of each, by name."""
+"""Package, and maker from the number of worlds and the steps of an episode, by name."""
 
 
 def installed(package: str) -> str | None:

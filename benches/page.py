@@ -1,4 +1,4 @@
-"""Tables of measurements: printed, and written into their place in `docs/performance.md`."""
+"""Tables of measurements: printed, and written into their place in the documentation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 
-PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
+PERFORMANCE = Path(__file__).parents[1] / "docs" / "performance.md"
+LEARNING = PERFORMANCE.with_name("learning.md")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -45,7 +46,7 @@ def machine(*packages: str) -> str:
     return f"{processor}, {cores} cores, Python {python}, {versions}, {date.today()}"
 
 
-def publish(section: str, text: str) -> None:
+def publish(section: str, text: str, page: Path = PERFORMANCE) -> None:
     """Print text and put it between the marks of its section of the page.
 
     Raises:
@@ -53,10 +54,10 @@ def publish(section: str, text: str) -> None:
     """
     print(text, flush=True)
     begin, end = f"<!-- {section}: begin -->\n", f"<!-- {section}: end -->"
-    page = PAGE.read_text()
-    if begin not in page or end not in page:
-        sys.exit(f"{PAGE}: no marks {begin.strip()} and {end}")
-    before, rest = page.split(begin, 1)
-    new = PAGE.with_suffix(".new")
+    old = page.read_text()
+    if begin not in old or end not in old:
+        sys.exit(f"{page}: no marks {begin.strip()} and {end}")
+    before, rest = old.split(begin, 1)
+    new = page.with_suffix(".new")
     new.write_text(before + begin + "\n" + text + "\n\n" + end + rest.split(end, 1)[1])
-    new.replace(PAGE)
+    new.replace(page)
