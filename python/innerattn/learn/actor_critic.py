@@ -35,6 +35,7 @@ class ActorCritic:
         network: NetworkConfig,
         *,
         learning_rate: float,
+        final_learning_rate_share: float,
         critic_weight_decay: float,
         seed: int,
         device: torch.device,
@@ -48,6 +49,7 @@ class ActorCritic:
             team: Sizes of the team.
             network: Sizes and kind of the networks.
             learning_rate: Step size of both Adams at the start.
+            final_learning_rate_share: Share of it that is left at the end of training.
             critic_weight_decay: L2 penalty of the critic's Adam.
             seed: Seed of the initial weights and of every draw.
             device: Where the networks live.
@@ -66,6 +68,7 @@ class ActorCritic:
             )
         self._availability_column = availability_column if network.mask_unavailable else None
         self._device, self._dtype = device, dtype
+        self._learning_rate, self._final_share = learning_rate, final_learning_rate_share
         weights_seed, noise_seed, self._data_seed = (
             int(child.generate_state(1, np.uint64)[0])
             for child in np.random.SeedSequence(seed).spawn(3)
@@ -92,6 +95,13 @@ class ActorCritic:
         logits = self.actor(self._robots_first(obs))
         actions = logits.argmax(dim=1) if greedy else sample_actions(logits, self._noise)
         return actions.t().contiguous().to(obs.device)
+
+    def reach(self, share: float) -> None:
+        """Let the step size fall evenly from its first to its final value; see `Learner.reach`."""
+        left = 1.0 - (1.0 - self._final_share) * share
+        for adam in (self.actor_adam, self.critic_adam):
+            for group in adam.param_groups:
+                group["lr"] = left * self._learning_rate
 
     def attention(self, obs: Tensor, actions: Tensor) -> Tensor:
         """Attention weights (B, H, R, R) of the critic; see `Learner.attention`."""
@@ -153,11 +163,6 @@ class ActorCritic:
                 moments = adam.state[parameter]
                 tensors |= {f"{name}.{key}.{part}": moments[part] for part in sorted(moments)}
         return tensors
-
-    def _set_learning_rate(self, rate: float) -> None:
-        for adam in (self.actor_adam, self.critic_adam):
-            for group in adam.param_groups:
-                group["lr"] = rate
 
     def _step_critic(self, loss: Tensor, grad_clip: float) -> Tensor:
         """A step of the critic's Adam down a loss summed over robots; the norm before clipping."""

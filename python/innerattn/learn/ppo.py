@@ -61,6 +61,7 @@ class PPO(ActorCritic):
             team,
             network,
             learning_rate=ppo.learning_rate,
+            final_learning_rate_share=ppo.final_learning_rate_share,
             critic_weight_decay=ppo.critic_weight_decay,
             seed=seed,
             device=device,
@@ -76,12 +77,6 @@ class PPO(ActorCritic):
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
         """Keep one control step of E worlds until the rollout is full; see `Learner.observe`."""
         self._steps.append((batch, truncated))
-
-    def reach(self, share: float) -> None:
-        """Let the step size fall evenly from its first to its final value; see `Learner.reach`."""
-        config = self._config
-        left = 1.0 - (1.0 - config.final_learning_rate_share) * share
-        self._set_learning_rate(left * config.learning_rate)
 
     def learn(self) -> dict[str, float] | None:
         """Do the epochs of a full rollout, of `rollout_steps` control steps.

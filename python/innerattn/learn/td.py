@@ -71,6 +71,7 @@ class TD(ActorCritic):
             team,
             network,
             learning_rate=td.learning_rate,
+            final_learning_rate_share=td.final_learning_rate_share,
             critic_weight_decay=td.critic_weight_decay,
             seed=seed,
             device=device,
@@ -92,12 +93,6 @@ class TD(ActorCritic):
         self.replay.add(batch)
         if len(self.replay) >= min(self._config.warmup_env_steps, self.replay.capacity):
             self._unpaid_env_steps += len(batch.obs)
-
-    def reach(self, share: float) -> None:
-        """Let the step size fall evenly from its first to its final value; see `Learner.reach`."""
-        config = self._config
-        left = 1.0 - (1.0 - config.final_learning_rate_share) * share
-        self._set_learning_rate(left * config.learning_rate)
 
     def learn(self) -> dict[str, float] | None:
         """Do one update for every `update_every_env_steps` env-steps since the warm-up.
