@@ -161,11 +161,11 @@ fn discs_hold_however_unlike_small_and_fast_the_robots() {
     let mut robots = mixed_team(8);
     for (index, robot) in robots.iter_mut().enumerate() {
         (robot.mass_kg, robot.radius_m) = ([0.1, 10.0][index % 2], 0.02);
-        (robot.max_speed_mps, robot.drive_force_n) = (5.0, [5.0, 500.0][index % 2]);
+        (robot.max_speed_mps, robot.drive_force_n) = (5.0, [20.0, 2000.0][index % 2]);
     }
     let scenario = Scenario { robots, spawn_clearance_m: 0.1, ..long_episodes() };
     // Short periods: in a long one so fast a robot may be turned about by contact after contact, and
     // the straight line from its start to its end says nothing.
-    let scenario = Scenario { dt_s: 0.02, ..scenario };
+    let scenario = Scenario { dt_s: 0.005, damping: 0.1, ..scenario };
     play("extreme", &[Engine::Discs], &scenario, 25_000);
 }
