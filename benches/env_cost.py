@@ -26,7 +26,7 @@ from matplotlib import pyplot as plt
 
 FIGURE = Path(__file__).parents[1] / "docs" / "images" / "env_cost.png"
 ENGINES = ("rapier", "discs")
-CORES = len(os.sched_getaffinity(0))
+CORES = os.cpu_count() or 1
 DEFAULT = {"batch": 1024, "robots": 4, "victims": 2, "obstacles": 0, "threads": CORES}
 VARIED: dict[str, tuple[int, ...]] = {
     "batch": (1, 4, 16, 32, 64, 256, 1024, 4096, 16384, 65536),

@@ -6,6 +6,8 @@ Sources: Schulman et al. 2017; the baseline of Iqbal & Sha 2019, section 3.3.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 
@@ -214,25 +216,28 @@ class PPO(ActorCritic):
         }
 
 
-class Rollout:
-    """Rows of a rollout, robots first: obs (R, B, D), all else (R, B)."""
+class Rollout(NamedTuple):
+    """Rows of a rollout, robots first.
 
-    def __init__(
-        self,
-        obs: Tensor,
-        actions: Tensor,
-        log_prob: Tensor,
-        value: Tensor,
-        advantage: Tensor,
-        target: Tensor,
-    ) -> None:
-        """Hold rows; `value` is what the critic said of them, `target` what it should have said."""
-        self.obs, self.actions, self.log_prob = obs, actions, log_prob
-        self.value, self.advantage, self.target = value, advantage, target
+    Attributes:
+        obs: (R, B, D).
+        actions: (R, B) int64.
+        log_prob: (R, B) of the actions, under the policy that acted.
+        value: (R, B) what the critic said.
+        advantage: (R, B), of mean 0 and deviation 1 for each robot of the whole rollout.
+        target: (R, B) what the critic should have said.
+    """
+
+    obs: Tensor
+    actions: Tensor
+    log_prob: Tensor
+    value: Tensor
+    advantage: Tensor
+    target: Tensor
 
     def take(self, rows: Tensor) -> Rollout:
         """Some rows, by their numbers (n,) int64."""
-        return Rollout(**{name: tensor[:, rows] for name, tensor in vars(self).items()})
+        return Rollout._make(tensor[:, rows] for tensor in self)
 
 
 def _rows(steps: Tensor) -> Tensor:

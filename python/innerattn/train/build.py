@@ -52,7 +52,9 @@ def thread_count(config: RunConfig) -> int:
     ppo = config.train.method.startswith("ppo")
     rows = config.ppo.minibatch_size if ppo else config.td.batch_size
     worth = max(1, rows // _ROWS_PER_THREAD)
-    return config.train.threads or min(worth, len(os.sched_getaffinity(0)))
+    # What this process may use; not every system tells.
+    cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    return config.train.threads or min(worth, cores)
 
 
 def keep_heap_small() -> None:
