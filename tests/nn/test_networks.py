@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from innerattn.nn import Actor, Critic, InnerAttention, PerRobotLinear, sample_actions
+from innerattn.nn import Actor, Critic, InnerAttention, PerRobotLinear, action_noise, sample_actions
 
 R, B, D, A, W = 3, 6, 4, 5, 8
 
@@ -62,7 +62,9 @@ def test_policies_see_their_own_observation_only() -> None:
 def test_drawn_actions_have_the_given_probabilities() -> None:
     probabilities = torch.tensor([0.5, 0.3, 0.15, 0.05, 0.0])
     logits = probabilities.log().view(1, A, 1).expand(1, A, 100_000).contiguous()
-    counts = torch.bincount(sample_actions(logits, generator(4))[0], minlength=A)
+    counts = torch.bincount(
+        sample_actions(logits, action_noise(logits.shape, generator(4)))[0], minlength=A
+    )
     assert counts[4] == 0
     expected = 100_000 * probabilities[:4]
     assert ((counts[:4] - expected) ** 2 / expected).sum() < 16.3  # 0.1 % point, 3 d.o.f.
@@ -75,4 +77,5 @@ def test_the_extreme_draws_of_the_generator_choose_no_impossible_action(
     logits = torch.tensor([[[0.0, 0.0], [-200.0, -200.0]]])
     ends = torch.tensor([[[0.0, 1 - 2**-24], [1 - 2**-24, 0.0]]])
     monkeypatch.setattr(torch.Tensor, "uniform_", lambda self, **_: self.copy_(ends))
-    assert sample_actions(logits, generator()).tolist() == [[0, 0]]
+    noise = action_noise(logits.shape, generator())
+    assert sample_actions(logits, noise).tolist() == [[0, 0]]

@@ -5,13 +5,32 @@ It acts, reports attention, saves and loads; when and how to update is each lear
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import torch
 from torch import Tensor, nn
+from torch.func import functional_call
 
 from innerattn.config.run import NetworkConfig
+from innerattn.learn.descent import (
+    Descent,
+    Kept,
+    Network,
+    clip_each_robot,
+    clip_whole,
+    values_of,
+)
 from innerattn.learn.types import Team
-from innerattn.nn import Actor, Critic, InnerAttention, UniformAttention, sample_actions
+from innerattn.nn import (
+    Actor,
+    Critic,
+    InnerAttention,
+    UniformAttention,
+    action_noise,
+    sample_actions,
+)
 
 _ATTENTIONS: dict[str, type[InnerAttention] | type[UniformAttention]] = {
     "inner": InnerAttention,
@@ -25,9 +44,10 @@ class ActorCritic:
     Attributes:
         actor: The trained policies.
         critic: The trained critics.
-        actor_adam: Optimiser of the policies.
-        critic_adam: Optimiser of the critics.
     """
+
+    _step: Callable[..., Tensor]
+    """All arithmetic of one update, with nothing in it that a compiler cannot follow."""
 
     def __init__(
         self,
@@ -80,8 +100,12 @@ class ActorCritic:
         attention = _ATTENTIONS[network.attention](width, network.attention_heads, weights)
         self.actor = Actor(*team, width, weights).to(device, dtype)
         self.critic = Critic(*team, attention, weights, critic_outputs).to(device, dtype)
-        self.actor_adam = _adam(self.actor, learning_rate, weight_decay=0.0)
-        self.critic_adam = _adam(self.critic, learning_rate, critic_weight_decay)
+        self._actor_descent = Descent(self.actor, learning_rate, weight_decay=0.0)
+        self._critic_descent = Descent(self.critic, learning_rate, critic_weight_decay)
+        self._values = {
+            name: values_of(network) for name, network in ActorCritic._networks(self).items()
+        }
+        self._team = team
         self._updates = 0
 
     @property
@@ -89,19 +113,25 @@ class ActorCritic:
         """Number of updates done so far."""
         return self._updates
 
+    def compile(self, backend: str = "inductor") -> None:
+        """Do updates as one compiled graph from now on; see `Learner.compile`."""
+        self._step = torch.compile(self._step, fullgraph=True, dynamic=False, backend=backend)
+
     @torch.no_grad()
     def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
         """Choose actions (E, R) int64 for observations (E, R, D); see `Learner.act`."""
         logits = self.actor(self._robots_first(obs))
-        actions = logits.argmax(dim=1) if greedy else sample_actions(logits, self._noise)
+        if greedy:
+            actions: Tensor = logits.argmax(dim=1)
+        else:
+            actions = sample_actions(logits, self._draw(logits.shape))
         return actions.t().contiguous().to(obs.device)
 
     def reach(self, share: float) -> None:
         """Let the step size fall evenly from its first to its final value; see `Learner.reach`."""
         left = 1.0 - (1.0 - self._final_share) * share
-        for adam in (self.actor_adam, self.critic_adam):
-            for group in adam.param_groups:
-                group["lr"] = left * self._learning_rate
+        for descent in (self._actor_descent, self._critic_descent):
+            descent.set_learning_rate(left * self._learning_rate)
 
     def attention(self, obs: Tensor, actions: Tensor) -> Tensor:
         """Attention weights (B, H, R, R) of the critic; see `Learner.attention`."""
@@ -155,35 +185,53 @@ class ActorCritic:
         tensors = self._running()
         for name, network in self._networks().items():
             tensors |= {f"{name}.{key}": value for key, value in network.named_parameters()}
-        for name, network, adam in (
-            ("actor_adam", self.actor, self.actor_adam),
-            ("critic_adam", self.critic, self.critic_adam),
+        for name, descent in (
+            ("actor_adam", self._actor_descent),
+            ("critic_adam", self._critic_descent),
         ):
-            for key, parameter in network.named_parameters():
-                moments = adam.state[parameter]
+            for key, moments in descent.moments.items():
                 tensors |= {f"{name}.{key}.{part}": moments[part] for part in sorted(moments)}
         return tensors
 
-    def _step_critic(self, loss: Tensor, grad_clip: float) -> Tensor:
-        """A step of the critic's Adam down a loss summed over robots; the norm before clipping."""
-        self.critic_adam.zero_grad()
-        torch.autograd.backward(loss)
-        # The loss is a sum over robots, so what they share would learn faster with every robot
-        # more; MAAC likewise divides its gradient by their number, before clipping.
-        for shared in self.critic.attention.parameters():
-            if shared.grad is not None:
-                shared.grad.div_(self.actor.num_robots)
-        norm = nn.utils.clip_grad_norm_(self.critic.parameters(), grad_clip)
-        self.critic_adam.step()
-        return norm
+    def _run(self, name: str, *inputs: Tensor | None) -> Any:
+        """What a network makes of its inputs, without a gradient."""
+        network = self._networks()[name]
+        if torch.compiler.is_compiling():
+            output: Any = functional_call(network, self._values[name], inputs)
+            return output
+        return network(*inputs)
 
-    def _step_actor(self, loss: Tensor, grad_clip: float) -> Tensor:
-        """A step of the actors' Adam, each robot clipped alone; the norms (R,) before clipping."""
-        self.actor_adam.zero_grad()
-        torch.autograd.backward(loss)
-        norms = _clip_each_robot(self.actor, grad_clip)
-        self.actor_adam.step()
-        return norms
+    def _step_critic(
+        self, loss_of: Callable[[Network], tuple[Tensor, Kept]], rate: Tensor, limit: float
+    ) -> tuple[Tensor, Kept]:
+        """A step of the critic down a loss summed over robots; the norm before clipping."""
+
+        def clip(gradients: dict[str, Tensor]) -> Tensor:
+            # The loss is a sum over robots, so what they share would learn faster with every robot
+            # more; MAAC likewise divides its gradient by their number, before clipping.
+            shared = [g for name, g in gradients.items() if name.startswith("attention.")]
+            torch._foreach_div_(shared, self.actor.num_robots)
+            return clip_whole(gradients, limit)
+
+        return self._critic_descent.step(loss_of, clip, rate)
+
+    def _step_actor(
+        self, loss_of: Callable[[Network], tuple[Tensor, Kept]], rate: Tensor, limit: float
+    ) -> tuple[Tensor, Kept]:
+        """A step of the actors, each robot clipped alone; the norms (R,) before clipping."""
+        return self._actor_descent.step(
+            loss_of, lambda gradients: clip_each_robot(gradients, limit), rate
+        )
+
+    def _draw(self, shape: tuple[int, ...]) -> Tensor:
+        """Noise for `sample_actions`, of the shape of the logits."""
+        return action_noise(shape, self._noise, self._dtype)
+
+    def _rate(self) -> Tensor:
+        """() the step size now; as a tensor, since a graph is compiled anew for another number."""
+        return torch.tensor(
+            self._actor_descent.learning_rate, dtype=torch.float64, device=self._device
+        )
 
     def _robots_first(self, obs: Tensor) -> Tensor:
         """Bring (B, R, D) to (R, B, D), as the networks take it, on their device and dtype."""
@@ -194,31 +242,3 @@ class ActorCritic:
         if self._availability_column is None:
             return None
         return (obs[:, :, self._availability_column] > 0.5).t()
-
-
-def _adam(network: nn.Module, learning_rate: float, weight_decay: float) -> torch.optim.Adam:
-    """Adam with its moments in place from the start, so that a state always has the same names."""
-    parameters = list(network.parameters())
-    adam = torch.optim.Adam(parameters, learning_rate, weight_decay=weight_decay, fused=True)
-    for parameter in parameters:
-        adam.state[parameter] = {
-            "step": torch.zeros((), dtype=torch.float32, device=parameter.device),
-            "exp_avg": torch.zeros_like(parameter),
-            "exp_avg_sq": torch.zeros_like(parameter),
-        }
-    return adam
-
-
-def _clip_each_robot(network: nn.Module, limit: float) -> Tensor:
-    """Scale the gradient of each robot with a norm above the limit down to it.
-
-    Every parameter has robots first, (R, ...). Returns the norms (R,) before clipping.
-    """
-    gradients = [parameter.grad for parameter in network.parameters()]
-    flat = [gradient.flatten(1) for gradient in gradients if gradient is not None]
-    norms: Tensor = torch.linalg.vector_norm(
-        torch.stack([torch.linalg.vector_norm(g, dim=1) for g in flat]), dim=0
-    )
-    factors = (limit / (norms + 1e-6)).clamp_max(1.0).unsqueeze(1)
-    torch._foreach_mul_(flat, [factors] * len(flat))
-    return norms

@@ -15,6 +15,7 @@ from innerattn.config.run import NetworkConfig, PPOConfig
 from innerattn.learn import losses
 from innerattn.learn.actor_critic import ActorCritic
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
+from innerattn.learn.descent import Network
 from innerattn.learn.types import Team, Transitions
 from innerattn.nn import sample_actions
 
@@ -72,6 +73,7 @@ class PPO(ActorCritic):
             critic_outputs=None if ppo.advantage == "counterfactual" else 1,
         )
         self._config = ppo
+        self._step = self._update_all
         self._shuffle = torch.Generator().manual_seed(self._data_seed)
         self._steps: list[tuple[Transitions, Tensor]] = []
         self.scale = ReturnScale(team.num_robots, ppo.gamma, device)
@@ -106,6 +108,7 @@ class PPO(ActorCritic):
         means = torch.stack(rows).mean(dim=0).tolist()
         return dict(zip(_METRICS, means, strict=True))
 
+    @torch.no_grad()
     def update(self, rows: Rollout) -> Tensor:
         """Update the critic, then the actors, from some rows of a rollout.
 
@@ -115,32 +118,63 @@ class PPO(ActorCritic):
         Returns:
             (8,) the values that `learn` names, in that order.
         """
-        config = self._config
-        output = self.critic(rows.obs, rows.actions, self._available(rows.obs))
-        value = self._of_taken(output.q, rows.actions)
-        if config.value_clip is None:
-            loss = losses.critic_loss(value, rows.target)
-        else:
-            loss = losses.clipped_value_loss(value, rows.value, rows.target, config.value_clip)
-        scores, visible = output.attended.scores, output.attended.visible
-        if config.attention_logit_penalty and scores is not None:
-            penalty = losses.attention_logit_penalty(scores, visible)
-            loss = loss + config.attention_logit_penalty * penalty
-        critic_norm = self._step_critic(loss, config.critic_grad_clip)
-
-        log_prob = self.actor(rows.obs).log_softmax(dim=1)
-        taken = losses.taken(log_prob, rows.actions)
-        entropy = losses.entropy(log_prob).mean(dim=1)
-        surrogate = losses.clipped_policy_loss(taken, rows.log_prob, rows.advantage, config.clip)
-        actor_loss = surrogate - config.entropy_weight * entropy.sum()
-        actor_norms = self._step_actor(actor_loss, config.actor_grad_clip)
+        values = self._step(*rows, self._rate())
         self._updates += 1
-        with torch.no_grad():
-            change = taken - rows.log_prob
-            kl = (change.exp() - 1.0 - change).mean()
-            clipped = ((change.exp() - 1.0).abs() > config.clip).to(kl.dtype).mean()
-            values = [loss, value.mean(), critic_norm, actor_loss, entropy.mean()]
-            return torch.stack([*(x.detach() for x in values), actor_norms.mean(), kl, clipped])
+        return values
+
+    def _update_all(
+        self,
+        obs: Tensor,
+        actions: Tensor,
+        log_prob: Tensor,
+        value: Tensor,
+        advantage: Tensor,
+        target: Tensor,
+        rate: Tensor,
+    ) -> Tensor:
+        critic_values = self._update_critic(obs, actions, value, target, rate)
+        actor_values = self._update_actor(obs, actions, log_prob, advantage, rate)
+        return torch.stack([*critic_values, *actor_values])
+
+    def _update_critic(
+        self, obs: Tensor, actions: Tensor, before: Tensor, target: Tensor, rate: Tensor
+    ) -> tuple[Tensor, ...]:
+        config = self._config
+
+        def loss_of(critic: Network) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+            output = critic(obs, actions, self._available(obs))
+            value = self._of_taken(output.q, actions)
+            if config.value_clip is None:
+                loss = losses.critic_loss(value, target)
+            else:
+                loss = losses.clipped_value_loss(value, before, target, config.value_clip)
+            scores, visible = output.attended.scores, output.attended.visible
+            if config.attention_logit_penalty and scores is not None:
+                penalty = losses.attention_logit_penalty(scores, visible)
+                loss = loss + config.attention_logit_penalty * penalty
+            return loss, (loss.detach(), value.detach().mean())
+
+        norm, (loss, mean) = self._step_critic(loss_of, rate, config.critic_grad_clip)
+        return loss, mean, norm
+
+    def _update_actor(
+        self, obs: Tensor, actions: Tensor, before: Tensor, advantage: Tensor, rate: Tensor
+    ) -> tuple[Tensor, ...]:
+        config = self._config
+
+        def loss_of(actor: Network) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
+            log_prob = actor(obs).log_softmax(dim=1)
+            taken = losses.taken(log_prob, actions)
+            entropy = losses.entropy(log_prob).mean(dim=1)
+            surrogate = losses.clipped_policy_loss(taken, before, advantage, config.clip)
+            loss = surrogate - config.entropy_weight * entropy.sum()
+            return loss, (loss.detach(), entropy.detach().mean(), taken.detach() - before)
+
+        norms, (loss, entropy, change) = self._step_actor(loss_of, rate, config.actor_grad_clip)
+        ratio = change.exp()
+        kl = (ratio - 1.0 - change).mean()
+        clipped = ((ratio - 1.0).abs() > config.clip).to(kl.dtype).mean()
+        return loss, entropy, norms.mean(), kl, clipped
 
     @torch.no_grad()
     def _rollout(self) -> Rollout:
@@ -167,7 +201,8 @@ class PPO(ActorCritic):
         step, env = drawn.nonzero(as_tuple=True)
         after = torch.stack([self._robots_first(batch.next_obs) for batch in batches])
         after = after[step, :, env].transpose(0, 1)  # (R, n, D)
-        next_actions = sample_actions(self.actor(after), self._noise)
+        logits = self.actor(after)
+        next_actions = sample_actions(logits, self._draw(logits.shape))
         next_value[step, :, env] = self._evaluate(after, next_actions)[2].t()
         advantage = generalised_advantage(
             reward, value, next_value, terminated, ended, config.gamma, config.gae_lambda

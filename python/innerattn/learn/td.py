@@ -14,6 +14,7 @@ from torch import Tensor, nn
 from innerattn.config.run import NetworkConfig, TDConfig
 from innerattn.learn import losses
 from innerattn.learn.actor_critic import ActorCritic
+from innerattn.learn.descent import Network, values_of
 from innerattn.learn.replay import Replay
 from innerattn.learn.types import Team, Transitions
 from innerattn.nn import sample_actions
@@ -79,12 +80,17 @@ class TD(ActorCritic):
             availability_column=availability_column,
         )
         self._config = td
+        self._step = self._update_all
         self._temperature = 1.0 / td.reward_scale
         self._target = _TARGETS[td.entropy_target]
         self._policy_loss = _POLICY_LOSSES[td.policy_gradient]
         self.replay = Replay(td.replay_capacity, team, self._data_seed, device)
         self.target_actor = copy.deepcopy(self.actor).requires_grad_(False)
         self.target_critic = copy.deepcopy(self.critic).requires_grad_(False)
+        self._values |= {
+            "target_actor": values_of(self.target_actor),
+            "target_critic": values_of(self.target_critic),
+        }
         self._unpaid_env_steps = 0
 
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
@@ -110,6 +116,7 @@ class TD(ActorCritic):
         means = torch.stack(rows).mean(dim=0).tolist()
         return dict(zip(_METRICS, means, strict=True))
 
+    @torch.no_grad()
     def update(self, batch: Transitions) -> Tensor:
         """Update the critic, then the actors by the new critic, then the target networks.
 
@@ -119,60 +126,84 @@ class TD(ActorCritic):
         Returns:
             (6,) the values that `learn` names, in that order.
         """
-        obs = self._robots_first(batch.obs)
-        critic_values = self._update_critic(obs, batch)
-        actor_values = self._update_actor(obs)
-        for network, target in (
-            (self.critic, self.target_critic),
-            (self.actor, self.target_actor),
-        ):
-            torch._foreach_lerp_(
-                list(target.parameters()), list(network.parameters()), self._config.polyak
-            )
+        deviation = self.replay.reward_std.clamp_min(self._config.reward_std_floor)
+        reward = (batch.reward.to(self._device) - self.replay.reward_mean) / deviation
+        continues = ~batch.terminated.to(self._device)
+        shape = (self._team.num_robots, self._team.num_actions, len(batch.obs))
+        values = self._step(
+            self._robots_first(batch.obs),
+            batch.actions.to(self._device).t(),
+            reward.t().to(self._dtype),
+            self._robots_first(batch.next_obs),
+            self._config.gamma * continues.to(self._dtype),
+            self._draw(shape),
+            self._draw(shape),
+            self._rate(),
+        )
         self._updates += 1
-        return torch.stack(critic_values + actor_values)
+        return values
 
     def _networks(self) -> dict[str, nn.Module]:
         targets = {"target_actor": self.target_actor, "target_critic": self.target_critic}
         return super()._networks() | targets
 
-    def _update_critic(self, obs: Tensor, batch: Transitions) -> list[Tensor]:
+    def _update_all(
+        self,
+        obs: Tensor,
+        actions: Tensor,
+        reward: Tensor,
+        next_obs: Tensor,
+        discount: Tensor,
+        next_noise: Tensor,
+        noise: Tensor,
+        rate: Tensor,
+    ) -> Tensor:
+        target = self._targets(reward, next_obs, discount, next_noise)
+        critic_values = self._update_critic(obs, actions, target, rate)
+        actor_values = self._update_actor(obs, noise, rate)
+        for name in ("actor", "critic"):
+            torch._foreach_lerp_(
+                list(self._values[f"target_{name}"].values()),
+                list(self._values[name].values()),
+                self._config.polyak,
+            )
+        return torch.stack([*critic_values, *actor_values])
+
+    def _update_critic(
+        self, obs: Tensor, actions: Tensor, target: Tensor, rate: Tensor
+    ) -> tuple[Tensor, ...]:
         config = self._config
-        target = self._targets(batch)
-        actions = batch.actions.to(self._device).t()
-        output = self.critic(obs, actions, self._available(obs))
-        q_taken = losses.taken(output.q, actions)
-        loss = losses.critic_loss(q_taken, target)
-        scores, visible = output.attended.scores, output.attended.visible
-        if config.attention_logit_penalty and scores is not None:
-            penalty = losses.attention_logit_penalty(scores, visible)
-            loss = loss + config.attention_logit_penalty * penalty
-        norm = self._step_critic(loss, config.critic_grad_clip)
-        return [loss.detach(), q_taken.detach().mean(), norm]
 
-    def _update_actor(self, obs: Tensor) -> list[Tensor]:
-        log_prob = self.actor(obs).log_softmax(dim=1)
-        with torch.no_grad():
-            actions = sample_actions(log_prob, self._noise)
-            q = self.critic(obs, actions, self._available(obs)).q
-            entropy = -(log_prob.exp() * log_prob).sum(dim=1).mean()
-        loss = self._policy_loss(log_prob, q, actions, self._temperature)
-        norms = self._step_actor(loss, self._config.actor_grad_clip)
-        return [loss.detach(), entropy, norms.mean()]
+        def loss_of(critic: Network) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+            output = critic(obs, actions, self._available(obs))
+            q_taken = losses.taken(output.q, actions)
+            loss = losses.critic_loss(q_taken, target)
+            scores, visible = output.attended.scores, output.attended.visible
+            if config.attention_logit_penalty and scores is not None:
+                penalty = losses.attention_logit_penalty(scores, visible)
+                loss = loss + config.attention_logit_penalty * penalty
+            return loss, (loss.detach(), q_taken.detach().mean())
 
-    @torch.no_grad()
-    def _targets(self, batch: Transitions) -> Tensor:
+        norm, (loss, q_mean) = self._step_critic(loss_of, rate, config.critic_grad_clip)
+        return loss, q_mean, norm
+
+    def _update_actor(self, obs: Tensor, noise: Tensor, rate: Tensor) -> tuple[Tensor, ...]:
+        def loss_of(actor: Network) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+            log_prob = actor(obs).log_softmax(dim=1)
+            with torch.no_grad():
+                actions = sample_actions(log_prob, noise)
+                q = self._run("critic", obs, actions, self._available(obs)).q
+                entropy = losses.entropy(log_prob).mean()
+            loss = self._policy_loss(log_prob, q, actions, self._temperature)
+            return loss, (loss.detach(), entropy)
+
+        norms, (loss, entropy) = self._step_actor(loss_of, rate, self._config.actor_grad_clip)
+        return loss, entropy, norms.mean()
+
+    def _targets(self, reward: Tensor, next_obs: Tensor, discount: Tensor, noise: Tensor) -> Tensor:
         """The targets (R, B) of a batch; the next actions are drawn from the target policy."""
-        next_obs = self._robots_first(batch.next_obs)
-        log_prob = self.target_actor(next_obs).log_softmax(dim=1)
-        actions = sample_actions(log_prob, self._noise)
-        q = self.target_critic(next_obs, actions, self._available(next_obs)).q
-        deviation = self.replay.reward_std.clamp_min(self._config.reward_std_floor)
-        reward = (batch.reward.to(self._device) - self.replay.reward_mean) / deviation
-        continues = ~batch.terminated.to(self._device)
-        return self._target(
-            reward.t().to(self._dtype),
-            losses.taken(q, actions),
-            self._temperature * losses.taken(log_prob, actions),
-            self._config.gamma * continues.to(self._dtype),
-        )
+        log_prob = self._run("target_actor", next_obs).log_softmax(dim=1)
+        actions = sample_actions(log_prob, noise)
+        q = self._run("target_critic", next_obs, actions, self._available(next_obs)).q
+        entropy_term = self._temperature * losses.taken(log_prob, actions)
+        return self._target(reward, losses.taken(q, actions), entropy_term, discount)

@@ -4,7 +4,7 @@ Tensors have robots first, (R, B, ...), so that every layer is one batched produ
 It knows nothing of environments, losses or files.
 """
 
-from innerattn.nn.actor import Actor, sample_actions
+from innerattn.nn.actor import Actor, action_noise, sample_actions
 from innerattn.nn.attention import Attended, InnerAttention, UniformAttention
 from innerattn.nn.critic import Critic, CriticOutput
 from innerattn.nn.linear import PerRobotLinear
@@ -17,5 +17,6 @@ __all__ = [
     "InnerAttention",
     "PerRobotLinear",
     "UniformAttention",
+    "action_noise",
     "sample_actions",
 ]

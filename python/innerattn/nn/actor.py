@@ -45,18 +45,30 @@ class Actor(nn.Module):
         return self.output.batch_last(hidden)
 
 
-def sample_actions(logits: Tensor, generator: torch.Generator) -> Tensor:
+def action_noise(
+    shape: tuple[int, ...], generator: torch.Generator, dtype: torch.dtype = torch.float32
+) -> Tensor:
+    """Noise for `sample_actions`: log(-log(u)) of uniform u, minus a draw of Gumbel's distribution.
+
+    Args:
+        shape: (R, A, B).
+        generator: Source of the draw; the noise is made on its device.
+        dtype: Type of the logits.
+    """
+    noise = torch.empty(shape, dtype=dtype, device=generator.device).uniform_(generator=generator)
+    # -log(u) is exponential, and never exactly 0 because u never is 1; an infinite Gumbel would
+    # override even an impossible action. (`exponential_` can return 0, and is slower.)
+    return noise.clamp_min_(torch.finfo(dtype).tiny).log_().neg_().log_()
+
+
+def sample_actions(logits: Tensor, noise: Tensor) -> Tensor:
     """Draw an action of every robot from softmax(logits), by the Gumbel-max trick.
 
     Args:
         logits: (R, A, B), normalised or not.
-        generator: Source of the draw, on the same device.
+        noise: (R, A, B) of `action_noise`.
 
     Returns:
         (R, B) int64.
     """
-    noise = torch.empty_like(logits).uniform_(generator=generator)
-    # -log(u) is exponential, and never exactly 0 because u never is 1; an infinite Gumbel would
-    # override even an impossible action. (`exponential_` can return 0, and is slower.)
-    noise.clamp_min_(torch.finfo(noise.dtype).tiny).log_().neg_().log_()
     return (logits.detach() - noise).max(dim=1).indices  # argmax is many times slower here

@@ -92,6 +92,8 @@ class InnerAttention(_TeammateAttention):
             others: (R, B, W) state-action encodings, the source of keys and values.
             available: (B, R) bool; an unavailable robot is attended to by none. None: all are.
         """
+        if torch.compiler.is_compiling():
+            return self._fused(own, others, available)
         robots, batch, width = own.shape
         queries = self._by_head(functional.linear(own, self.query))
         keys = self._by_head(functional.linear(others, self.key))
@@ -116,6 +118,23 @@ class InnerAttention(_TeammateAttention):
             visible,
         )
 
+    def _fused(self, own: Tensor, others: Tensor, available: Tensor | None) -> Attended:
+        """The same as sums over broadcast products, which a compiler fuses into a few loops."""
+        robots, batch, width = own.shape
+        shape = (robots, batch, self.heads, width // self.heads)
+        queries = functional.linear(own, self.query).view(shape)
+        keys = functional.linear(others, self.key).view(shape)
+        values = self._values(others).view(shape)
+        scores = (queries.unsqueeze(1) * keys.unsqueeze(0)).sum(4)  # (R, R, B, H)
+        visible = visible_teammates(own, available)
+        seen = visible.permute(1, 2, 0).unsqueeze(3)
+        lowest = torch.finfo(scores.dtype).min
+        weights = (scores * shape[3] ** -0.5).masked_fill(~seen, lowest).softmax(dim=1)
+        if robots == 1 or available is not None:
+            weights = weights * seen
+        mixed = (weights.unsqueeze(4) * values.unsqueeze(0)).sum(1).view(robots, batch, width)
+        return Attended(mixed, weights.permute(2, 3, 0, 1), scores.permute(2, 3, 0, 1), visible)
+
     def _by_head(self, x: Tensor) -> Tensor:
         """View (R, B, W) as (B*H, R, d) without a copy."""
         robots, batch, width = x.shape
@@ -125,15 +144,25 @@ class InnerAttention(_TeammateAttention):
 class UniformAttention(_TeammateAttention):
     """The baseline: alpha_ij = 1/(N-1) for every teammate seen; query and key go unused."""
 
+    def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
+        """Draw the same parameters as `InnerAttention`; those unused are not trained."""
+        super().__init__(width, heads, generator)
+        self.query.requires_grad_(False)
+        self.key.requires_grad_(False)
+
     def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
         """Average over teammates; arguments as in `InnerAttention.forward`."""
         values = self._values(others)
         visible = visible_teammates(own, available)
         weights = visible.to(values.dtype)
         weights = weights / weights.sum(dim=2, keepdim=True).clamp_min(1.0)
-        mixed = torch.bmm(weights.expand(own.shape[1], -1, -1), values.transpose(0, 1))
+        if torch.compiler.is_compiling():
+            mixed = (weights.permute(1, 2, 0).unsqueeze(3) * values.unsqueeze(0)).sum(1)
+        else:
+            mixed = torch.bmm(weights.expand(own.shape[1], -1, -1), values.transpose(0, 1))
+            mixed = mixed.transpose(0, 1)
         return Attended(
-            mixed.transpose(0, 1).contiguous(),
+            mixed.contiguous(),
             weights.unsqueeze(1).expand(own.shape[1], self.heads, -1, -1),
             None,
             visible,
