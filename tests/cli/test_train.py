@@ -130,7 +130,8 @@ def test_help_shows_the_chosen_defaults(capsys: pytest.CaptureFixture[str]) -> N
         (["--network.attention", "uniform"], "network.attention = 'uniform': train.method"),
         (["--scenario.episode-steps", "0"], "scenario.episode_steps = 0: must be"),
         (["--config", "none.toml"], "cannot read none.toml"),
-        (["--device", "abacus"], "train.device = 'abacus': not usable here"),
+        (["--device", "abacus"], "train.device = 'abacus': not usable here, must be 'cpu'"),
+        (["--td.batch-size", "9", "--td.replay-capacity", "8"], "td.replay_capacity = 8: must be"),
         (["--scenario.actions", "continuous"], "scenario.actions = 'continuous'"),
     ],
 )
@@ -147,6 +148,18 @@ def test_what_cannot_be_run_is_one_line(
     assert err.startswith(f"innerattn: error: {message}")
     assert err.count("\n") == 1
     assert list(tmp_path.glob("runs/*")) == []
+
+
+def test_divergence_is_one_line(
+    tmp_path: Path, tiny: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run"
+    assert main(["train", "--run-dir", str(path), *tiny, "--td.reward-scale", "1e-37"]) == 1
+    err = capsys.readouterr().err
+    assert err.startswith("innerattn: error: training diverged at env_steps = ")
+    assert err.endswith(": losses.critic_loss = inf: must be finite\n")
+    assert err.count("\n") == 1
+    assert json.loads((path / "run.json").read_text())["state"] == "interrupted"
 
 
 def test_existing_folder_is_refused(

@@ -1,6 +1,7 @@
 """Run folders: made whole or not at all, and read with suspicion."""
 
 import json
+import math
 import os
 import shutil
 from collections.abc import Callable
@@ -96,6 +97,18 @@ def test_a_newer_checkpoint_is_the_one_loaded(run: Path) -> None:
     folder.save_weights(state, 10_000)
     _, newer = load_policy(run)
     assert all(torch.equal(tensor, state[name]) for name, tensor in newer.state().items())
+
+
+@pytest.mark.parametrize("bad", [math.nan, -math.inf])
+def test_broken_weights_leave_the_newest_checkpoint_whole(run: Path, bad: float) -> None:
+    before = {file: file.read_bytes() for file in run.rglob("*") if file.is_file()}
+    state = load_policy(run)[1].state()
+    name = sorted(name for name in state if name.startswith("critic."))[0]
+    state[name].view(-1)[3] = bad
+    folder = RunFolder(run, read_info(run))
+    with pytest.raises(RunError, match=rf"env_steps = 700: a value of {name} is {bad}: must be"):
+        folder.save_weights(state, 700)
+    assert {file: file.read_bytes() for file in run.rglob("*") if file.is_file()} == before
 
 
 def test_loaded_policies_are_alike_and_draw_alike(small_config: Configure, run: Path) -> None:

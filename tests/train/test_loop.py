@@ -1,6 +1,7 @@
 """Whole runs: what they leave behind when they end, are interrupted, or cannot begin."""
 
 import json
+import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -9,10 +10,11 @@ import pytest
 import torch
 
 from innerattn.config import RunConfig
+from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError, RunError
-from innerattn.learn import TD
-from innerattn.train import Progress, load_policy, read_info, train
-from innerattn.train.build import thread_count
+from innerattn.learn.types import Learner
+from innerattn.train import Progress, load_policy, loop, read_info, train
+from innerattn.train.build import build_learner, thread_count
 
 Configure = Callable[..., RunConfig]
 
@@ -90,13 +92,43 @@ def test_an_interrupt_saves_and_is_passed_on(
     assert learner.updates == info.updates == seen[-1].updates
 
 
-def test_a_run_that_breaks_says_so(
-    small_config: Configure, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_divergence_ends_a_run_at_once(small_config: Configure, tmp_path: Path) -> None:
+    # Rewards weigh so little beside the entropy that a float32 loss overflows in the first update,
+    # long before the only line of metrics.
+    config = small_config(**{"td.reward_scale": 1e-37, "train.log_every_env_steps": 10_000})
+    with pytest.raises(RunError, match=r"env_steps = 252: losses\.critic_loss = inf: must be"):
+        train(config, tmp_path / "run")
+    info = read_info(tmp_path / "run")
+    assert (info.state, info.env_steps) == ("interrupted", 252)
+    with pytest.raises(RunError, match="holds no checkpoint yet"):
+        load_policy(tmp_path / "run")
+
+
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_broken_weights_are_never_saved(
+    small_config: Configure,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    interrupted: bool,
 ) -> None:
-    monkeypatch.setattr(TD, "learn", lambda _: {"critic_loss": float("nan")})
-    with pytest.raises(RunError, match=r"losses\.critic_loss is not finite"):
-        train(small_config(), tmp_path / "run")
-    assert read_info(tmp_path / "run").state == "interrupted"
+    def poisoned(config: RunConfig, env: BatchEnv) -> Learner:
+        learner = build_learner(config, env)
+        state = learner.state()
+        next(tensor for name, tensor in state.items() if name.startswith("actor.")).fill_(math.nan)
+        learner.load(state)
+        return learner
+
+    def press_ctrl_c(_: Progress) -> None:
+        if interrupted:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(loop, "build_learner", poisoned)
+    # The run ends before the first update: no loss tells.
+    config = small_config(**{"train.env_steps": 120})
+    with pytest.raises(RunError, match=r"a value of actor\.\S+ is nan: must be finite"):
+        train(config, tmp_path / "run", progress=press_ctrl_c)
+    info = read_info(tmp_path / "run")
+    assert (info.state, info.env_steps) == ("interrupted", 12 if interrupted else 120)
     with pytest.raises(RunError, match="holds no checkpoint yet"):
         load_policy(tmp_path / "run")
 
@@ -114,7 +146,8 @@ def test_an_existing_folder_is_refused_untouched(small_config: Configure, tmp_pa
     ("values", "place"),
     [
         ({"train.device": "abacus"}, r"train\.device = 'abacus'"),
-        ({"train.device": "cuda:99"}, r"train\.device = 'cuda:99'"),
+        ({"train.device": "cuda:99"}, r"train\.device = 'cuda:99': not usable here, must be 'cpu'"),
+        ({"train.device": "meta"}, r"train\.device = 'meta'"),
         ({"scenario.actions": "continuous"}, r"scenario\.actions = 'continuous'"),
     ],
 )

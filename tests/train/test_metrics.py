@@ -53,7 +53,7 @@ def test_entropy_takes_time_and_episodes_together() -> None:
 
 def test_interval_counts_from_line_to_line() -> None:
     interval = Interval()
-    interval.add_losses(None)
+    interval.add_losses({})
     interval.add_losses({"critic_loss": 1.0, "q": 2.0})
     interval.add_losses({"critic_loss": 3.0, "q": 4.0})
     line = interval.close(1000, 20, Tally(4, 10, 4), {"food_0": [1.0]})
@@ -88,10 +88,19 @@ def test_lines_are_appended_whole(tmp_path: Path) -> None:
     assert [json.loads(line) for line in text.splitlines()] == lines
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_divergence_is_named(tmp_path: Path, bad: float) -> None:
+@pytest.mark.parametrize(
+    ("figures", "named"),
+    [
+        ({"losses": {"q": 1.0, "critic_loss": math.nan}}, "losses.critic_loss = nan"),
+        ({"losses": {"q": -math.inf, "critic_loss": math.nan}}, "losses.q = -inf"),
+        ({"attention_entropy": {"food_0": [0.5, math.inf]}}, "attention_entropy.food_0 = inf"),
+    ],
+)
+def test_divergence_is_named(
+    tmp_path: Path, figures: dict[str, dict[str, object]], named: str
+) -> None:
     file = MetricsFile(tmp_path / "metrics.jsonl")
-    line = {"env_steps": 600, "rescues_per_episode": None, "losses": {"q": 1.0, "critic_loss": bad}}
-    with pytest.raises(RunError, match=r"losses\.critic_loss is not finite at env_steps = 600"):
-        file.append(line)
+    with pytest.raises(RunError) as caught:
+        file.append({"env_steps": 600, "rescues_per_episode": None, **figures})
+    assert str(caught.value) == f"training diverged at env_steps = 600: {named}: must be finite"
     assert not (tmp_path / "metrics.jsonl").exists()

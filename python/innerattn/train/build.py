@@ -84,8 +84,13 @@ def torch_threads(count: int) -> Iterator[None]:
 def _device(name: str) -> torch.device:
     try:
         device = torch.device(name)
-        torch.empty(0, device=device)  # a well-formed name may still be of a device not here
+        # A well-formed name may still be of a device that is not here or that keeps no values.
+        torch.zeros(1, device=device).item()
     except (RuntimeError, AssertionError) as error:
-        reason = str(error).splitlines()[0]
-        raise ConfigError(f"train.device = {name!r}: not usable here ({reason})") from error
+        count = torch.cuda.device_count()
+        allowed = f"'cpu', 'cuda' or 'cuda:0' to 'cuda:{count - 1}'" if count else "'cpu'"
+        none = "" if count else "; torch finds no CUDA device"
+        raise ConfigError(
+            f"train.device = {name!r}: not usable here, must be {allowed}{none}"
+        ) from error
     return device

@@ -95,9 +95,18 @@ class RunFolder:
     def save_weights(self, tensors: Mapping[str, Tensor], env_steps: int) -> None:
         """Write a checkpoint named after ``env_steps`` and make it the newest one.
 
+        Whatever is raised, the newest checkpoint stays what it was.
+
         Raises:
-            OSError: the files cannot be written; the newest checkpoint stays what it was.
+            RunError: a value is not finite, which means that training has diverged.
+            OSError: the files cannot be written.
         """
+        for name, tensor in tensors.items():
+            if not bool(tensor.isfinite().all()):
+                raise RunError(
+                    f"training diverged at env_steps = {env_steps}: a value of {name} is "
+                    f"{_not_finite(tensor)}: must be finite; these weights are not saved"
+                )
         folder = self.path / "checkpoints" / str(env_steps)
         folder.mkdir(exist_ok=True)
         write_weights(folder / "weights.safetensors", tensors)
@@ -198,6 +207,10 @@ def _plain_file(path: Path) -> Path:
 
 def _write_info(folder: Path, info: RunInfo) -> None:
     write_whole(folder / "run.json", (json.dumps(asdict(info), indent=1) + "\n").encode())
+
+
+def _not_finite(tensor: Tensor) -> float:
+    return float(tensor[~tensor.isfinite()].flatten()[0])
 
 
 def _versions() -> dict[str, str]:

@@ -23,7 +23,13 @@ from innerattn.train.build import (
 )
 from innerattn.train.checkpoint import RunFolder, State, refuse_existing
 from innerattn.train.collect import Collector
-from innerattn.train.metrics import Interval, Metrics, MetricsFile, attention_entropy
+from innerattn.train.metrics import (
+    Interval,
+    Metrics,
+    MetricsFile,
+    attention_entropy,
+    refuse_divergence,
+)
 
 
 @dataclass(frozen=True)
@@ -117,8 +123,10 @@ class _Loop:
             self._save()
             self._mark("done")
         except KeyboardInterrupt:
-            self._save()
-            self._mark("interrupted")
+            try:
+                self._save()
+            finally:
+                self._mark("interrupted")
             raise
         except BaseException:
             self._mark("interrupted")
@@ -128,9 +136,11 @@ class _Loop:
         transitions, truncated = self._collector.step()
         self._learner.observe(transitions, truncated)
         self._learner.reach(min(self._env_steps / self._config.env_steps, 1.0))
-        self._interval.add_losses(self._learner.learn())
+        losses = self._learner.learn() or {}
         before = self._env_steps
         self._env_steps += self._config.num_envs
+        refuse_divergence({"losses": losses}, self._env_steps)
+        self._interval.add_losses(losses)
         every = self._config.log_every_env_steps
         last = self._env_steps >= self._config.env_steps
         if last or before // every < self._env_steps // every:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,15 +34,10 @@ class MetricsFile:
         """Add one line.
 
         Raises:
-            RunError: a figure is not finite, which means that training has diverged.
+            RunError: training has diverged.
         """
-        try:
-            line = json.dumps(metrics, allow_nan=False)
-        except ValueError as error:
-            bad = ", ".join(_not_finite(metrics)) or "a figure"
-            raise RunError(
-                f"training diverged: {bad} is not finite at env_steps = {metrics['env_steps']}"
-            ) from error
+        refuse_divergence(metrics, metrics["env_steps"])
+        line = json.dumps(metrics, allow_nan=False)
         # One write of one line to a file opened for appending: a reader never sees half of it.
         with self._path.open("ab", buffering=0) as file:
             file.write(f"{line}\n".encode())
@@ -64,9 +59,9 @@ class Interval:
         """Time since the start of training [s]."""
         return time.perf_counter() - self._start
 
-    def add_losses(self, losses: Mapping[str, float] | None) -> None:
-        """Take the losses of the updates of one control step, if there were any."""
-        for name, value in (losses or {}).items():
+    def add_losses(self, losses: Mapping[str, float]) -> None:
+        """Take the losses of the updates of one control step; none where none was due."""
+        for name, value in losses.items():
             self._losses.setdefault(name, []).append(value)
 
     def close(
@@ -107,11 +102,27 @@ def attention_entropy(weights: NDArray[np.float32]) -> NDArray[np.float64]:
     return np.asarray(-terms.sum(-1).mean(0).T + 0.0)
 
 
-def _not_finite(metrics: Mapping[str, Any], prefix: str = "") -> list[str]:
-    names = []
-    for name, value in metrics.items():
+def refuse_divergence(figures: Mapping[str, Any], env_steps: int) -> None:
+    """Stop training whose figures have left the finite numbers.
+
+    Args:
+        figures: numbers, lists of numbers and None, by name, nested or not.
+        env_steps: when they were computed.
+
+    Raises:
+        RunError: a figure is not finite; the message names it and its value.
+    """
+    for name, values in _flat(figures):
+        bad = values[~np.isfinite(values)]
+        if bad.size:
+            raise RunError(
+                f"training diverged at env_steps = {env_steps}: {name} = {bad[0]}: must be finite"
+            )
+
+
+def _flat(figures: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, NDArray[Any]]]:
+    for name, value in figures.items():
         if isinstance(value, Mapping):
-            names += _not_finite(value, f"{prefix}{name}.")
-        elif not np.all(np.isfinite(np.asarray(0.0 if value is None else value))):
-            names.append(prefix + name)
-    return names
+            yield from _flat(value, f"{prefix}{name}.")
+        elif value is not None:
+            yield prefix + name, np.atleast_1d(value)
