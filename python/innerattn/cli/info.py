@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import os
 import platform
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -13,6 +12,7 @@ import tomli_w
 
 from innerattn.cli.options import Command
 from innerattn.config import BUDGETS, SCENARIOS, Scenario
+from innerattn.cores import usable_cores
 
 _PACKAGES = ("torch", "numpy", "pydantic", "pettingzoo")
 
@@ -24,8 +24,11 @@ class Info(Command):
     scenario: Path | None = None
     """TOML file with a scenario: check it and print it with all defaults."""
 
-    def run(self) -> None:
+    def run(self) -> int:
         """Print the answer.
+
+        Returns:
+            The exit code, 0.
 
         Raises:
             ConfigError: the scenario file is not valid.
@@ -33,15 +36,16 @@ class Info(Command):
         if self.scenario is not None:
             scenario = Scenario.from_toml(self.scenario)
             print(tomli_w.dumps(scenario.model_dump(exclude_none=True)), end="")
-            return
+            return 0
         rows = {"innerattn": _version("innerattn"), "python": platform.python_version()}
         rows |= {name: _version(name) for name in _PACKAGES}
-        rows["threads"] = str(len(os.sched_getaffinity(0)))
+        rows["threads"] = str(usable_cores())
         rows["device"] = _device()
         rows["presets"] = ", ".join(SCENARIOS)
         rows["budgets"] = ", ".join(BUDGETS)
         for name, value in rows.items():
             print(f"{name:<11}{value}")
+        return 0
 
 
 def _version(package: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +10,7 @@ from contextlib import contextmanager
 import torch
 
 from innerattn.config import RunConfig
+from innerattn.cores import usable_cores
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
 from innerattn.learn.ppo import PPO
@@ -52,9 +52,7 @@ def thread_count(config: RunConfig) -> int:
     ppo = config.train.method.startswith("ppo")
     rows = config.ppo.minibatch_size if ppo else config.td.batch_size
     worth = max(1, rows // _ROWS_PER_THREAD)
-    # What this process may use; not every system tells.
-    cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
-    return config.train.threads or min(worth, cores)
+    return config.train.threads or min(worth, usable_cores())
 
 
 def keep_heap_small() -> None:
