@@ -5,7 +5,12 @@ import itertools
 import numpy as np
 import pytest
 
-from innerattn.evaluate.statistics import mean_interval, resampled_means, score_interval
+from innerattn.evaluate.statistics import (
+    mean_interval,
+    resampled_means,
+    score_interval,
+    student_interval,
+)
 
 
 def test_resampling_against_every_possible_resample() -> None:
@@ -80,3 +85,26 @@ def test_what_is_not_a_sample_is_refused(values: object) -> None:
         mean_interval(values, 0)
     with pytest.raises(ValueError, match="must be"):
         score_interval([1.0], [1.0, 2.0], [1.0], 0)
+
+
+@pytest.mark.parametrize(("n", "quantile"), [(2, 12.7062), (5, 2.7764), (30, 2.0452)])
+def test_interval_over_runs_has_the_quantiles_of_the_tables(n: int, quantile: float) -> None:
+    values = np.random.default_rng(n).normal(7.0, 2.0, n)
+    interval = student_interval(values)
+    deviation = np.sqrt(np.sum((values - values.mean()) ** 2) / (n - 1))
+    assert interval.mean == pytest.approx(values.mean())
+    assert interval.high - interval.mean == pytest.approx(
+        quantile * deviation / np.sqrt(n), rel=1e-4
+    )
+    assert interval.mean - interval.low == pytest.approx(interval.high - interval.mean)
+
+
+def test_interval_over_few_runs_holds_the_truth_as_often_as_it_says() -> None:
+    samples = np.random.default_rng(0).normal(3.0, 1.0, (4000, 4))
+    intervals = [student_interval(sample) for sample in samples]
+    assert np.mean([x.low <= 3.0 <= x.high for x in intervals]) == pytest.approx(0.95, abs=0.012)
+
+
+def test_interval_over_runs_needs_two() -> None:
+    with pytest.raises(ValueError, match="at least 2"):
+        student_interval([1.0])

@@ -7,7 +7,7 @@ from innerattn.evaluate.dispatch import SCRIPTED, scripted_policy
 from innerattn.evaluate.episodes import Policy, Record, View, run_episodes
 from innerattn.evaluate.measure import Evaluation, evaluate_policy, evaluate_run
 from innerattn.evaluate.records import read_records, write_records
-from innerattn.evaluate.statistics import Interval
+from innerattn.evaluate.statistics import Interval, student_interval
 from innerattn.evaluate.summary import Figures, Summary
 from innerattn.evaluate.trained import TrainedPolicy, load_trained
 
@@ -27,5 +27,6 @@ __all__ = [
     "read_records",
     "run_episodes",
     "scripted_policy",
+    "student_interval",
     "write_records",
 ]

@@ -1,14 +1,17 @@
-"""Means with intervals, by a bootstrap over whole episodes; it knows nothing of what is averaged.
+"""Means with intervals; it knows nothing of what is averaged.
 
-Rescues within an episode depend on each other, episodes do not, so episodes are what is resampled.
+Rescues within an episode depend on each other, episodes do not, so whole episodes are what a
+bootstrap resamples. Runs are too few for that; their interval is Student's.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import stdtrit
 
 _RESAMPLES = 4000
 _CHUNK = 2**21  # indices drawn at once, 16 MB
@@ -17,15 +20,36 @@ _LOW, _HIGH = 2.5, 97.5
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean, or a ratio of means, and its 95 % percentile-bootstrap interval."""
+    """A mean, or a ratio of means, and its 95 % interval."""
 
     mean: float
     low: float
     high: float
 
 
+def student_interval(values: ArrayLike) -> Interval:
+    """The mean over independent runs, by Student's t.
+
+    ``mean ± t s / sqrt(n)``, with s the deviation of the sample and t the 97.5 % quantile of
+    Student's distribution with n - 1 degrees of freedom.
+
+    Args:
+        values: (n,) one value per run, n >= 2.
+
+    Raises:
+        ValueError: there are fewer than two values.
+    """
+    column = _columns(values)[:, 0]
+    n = len(column)
+    if n < 2:
+        raise ValueError(f"{n} value: an interval over runs needs at least 2")
+    mean = float(column.mean())
+    half = float(stdtrit(n - 1, _HIGH / 100.0) * column.std(ddof=1) / math.sqrt(n))
+    return Interval(mean, mean - half, mean + half)
+
+
 def mean_interval(values: ArrayLike, seed: int) -> Interval:
-    """The mean over episodes.
+    """The mean over episodes, by a percentile bootstrap.
 
     Args:
         values: (n,) one value per episode, n >= 1.
