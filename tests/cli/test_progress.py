@@ -1,10 +1,13 @@
 """The bar on a terminal, plain lines elsewhere."""
 
 import io
+from pathlib import Path
 
 from rich.console import Console
 
-from innerattn.cli.progress import Evaluating, Training
+from innerattn.cli.progress import Evaluating, SeveralRuns, Training
+from innerattn.cli.several import Run
+from innerattn.config import RunConfig
 from innerattn.train import Progress
 
 
@@ -57,3 +60,31 @@ def test_evaluation_counts_episodes() -> None:
         show(10, 2000)
         show(500, 2000)
     assert out.getvalue() == "evaluating  25% | 0:30 left | 500 of 2,000 episodes\n"
+
+
+def test_several_runs_share_one_display() -> None:
+    out = io.StringIO()
+    now = [0.0]
+    runs = [Run(RunConfig(), Path(f"run-s{seed}")) for seed in range(5)]
+    with SeveralRuns(Console(file=out, width=120), clock=lambda: now[0]) as show:
+
+        def pass_time(seconds: float, shares: list[float]) -> None:
+            now[0] += seconds
+            for run, share in zip(runs, shares, strict=False):
+                run.share, run.state = share, "done" if share == 1.0 else "running"
+            show(runs)
+
+        pass_time(10.0, [0.0, 0.0])  # still starting
+        pass_time(0.0, [0.1, 0.1])
+        # Half of two runs in 40 s of both: the five go three rounds of 80 s, and 40 s are over.
+        pass_time(40.0, [0.5, 0.5])
+        pass_time(40.0, [1.0, 1.0, 0.0, 0.0])
+        runs[2].state = "failed"
+        pass_time(80.0, [1.0, 1.0])
+        pass_time(0.0, [1.0, 1.0])
+    assert out.getvalue().splitlines() == [
+        "training   0% | -:-- left | 0 of 5 runs done, 2 running",
+        "training  20% | 3:20 left | 0 of 5 runs done, 2 running",
+        "training  40% | 2:40 left | 2 of 5 runs done, 2 running",
+        "training  60% | 2:40 left | 2 of 5 runs done, 1 running, 1 failed",
+    ]

@@ -1,10 +1,11 @@
 """The tables say what the summary holds, and nothing about what it does not hold."""
 
 import io
+from dataclasses import replace
 
 from rich.console import Console
 
-from innerattn.cli.tables import print_summary
+from innerattn.cli.tables import print_seeds, print_summary
 from innerattn.config import Scenario
 from innerattn.evaluate import Figures, Interval, Summary
 
@@ -50,7 +51,18 @@ def printed(found: Summary) -> list[list[str]]:
     """Cells by line."""
     out = io.StringIO()
     print_summary(Console(file=out, width=80, markup=False), found, Scenario())
-    lines = out.getvalue().splitlines()
+    return cells(out.getvalue())
+
+
+def printed_seeds(found: dict[int, Summary | None]) -> list[list[str]]:
+    """Cells by line."""
+    out = io.StringIO()
+    print_seeds(Console(file=out, width=80, markup=False), found)
+    return cells(out.getvalue())
+
+
+def cells(text: str) -> list[list[str]]:
+    lines = text.splitlines()
     return [[cell.strip() for cell in line.split("  ") if cell.strip()] for line in lines]
 
 
@@ -98,3 +110,29 @@ def test_what_was_not_measured_is_not_mentioned() -> None:
     text = " ".join(cell for row in printed(summary()) for cell in row).lower()
     assert "helped" not in text
     assert "attention" not in text
+
+
+def of_seed(rescues: float, score: float | None) -> Summary:
+    """Figures whose own intervals over episodes are narrow."""
+    found = figures(25, score=None if score is None else Interval(score, score, score))
+    return summary(standard=replace(found, rescues_per_episode=Interval(rescues, rescues, rescues)))
+
+
+def test_seeds_have_a_row_each_and_a_mean() -> None:
+    found = printed_seeds({4: of_seed(1.0, 0.1), 2: of_seed(2.0, 0.2), 7: of_seed(3.0, 0.3)})
+    rows = {row[0]: row[1:] for row in found if row}
+    assert rows["seed"] == ["25 steps", "score", "100 steps", "score"]
+    assert rows["4"] == ["1.00", "0.10", "3.00", "0.50"]
+    assert [row[0] for row in found if row and row[0] in "247"] == ["4", "2", "7"]
+    # The 97.5 % quantile of Student's t with 2 degrees of freedom is 4.303; 4.303 / sqrt(3) = 2.48.
+    assert rows["mean of 3"] == ["2.00 ± 2.48", "0.20 ± 0.25", "3.00 ± 0.00", "0.50 ± 0.00"]
+
+
+def test_seeds_that_failed_or_have_no_score() -> None:
+    found = printed_seeds({0: of_seed(1.0, 0.1), 1: None, 2: of_seed(2.0, None)})
+    rows = {row[0]: row[1:] for row in found if row}
+    assert rows["1"] == ["failed"]
+    assert rows["2"] == ["2.00", "-", "3.00", "0.50"]
+    assert rows["mean of 2"][:2] == ["1.50 ± 6.35", "-"]
+    assert not any("mean of" in row for row in map(str, printed_seeds({3: of_seed(1.0, 0.1)})))
+    assert printed_seeds({3: None}) == []

@@ -43,8 +43,11 @@ class Evaluate(Command):
     json: Path | None = None
     """Write the figures to this file too; - for standard output, and nothing else there."""
 
-    def run(self) -> None:
+    def run(self) -> int:
         """Measure, print, write.
+
+        Returns:
+            The exit code, 0.
 
         Raises:
             InnerattnError: no such run or policy, or wrong options.
@@ -56,7 +59,7 @@ class Evaluate(Command):
         document = json.dumps(evaluation.summary.to_json(), indent=1, allow_nan=False)
         if self.json == Path("-"):
             print(document)
-            return
+            return 0
         print_summary(
             Console(markup=False, highlight=False),
             evaluation.summary,
@@ -64,6 +67,7 @@ class Evaluate(Command):
         )
         if self.json is not None:
             write_whole(self.json, f"{document}\n".encode())
+        return 0
 
     def _measure(self) -> Evaluation:
         from innerattn.evaluate import SCRIPTED, evaluate_policy, evaluate_run, scripted_policy

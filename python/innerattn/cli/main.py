@@ -14,6 +14,7 @@ import tyro
 
 from innerattn.cli.evaluate import Evaluate
 from innerattn.cli.info import Info
+from innerattn.cli.options import UsageError
 from innerattn.cli.train import command_type
 from innerattn.errors import InnerattnError
 
@@ -34,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     argv = list(sys.argv[1:] if argv is None else argv)
     try:
-        _parse(argv).run()
+        return int(_parse(argv).run())
     except KeyboardInterrupt:
         print("innerattn: interrupted", file=sys.stderr)
         return 130
@@ -45,8 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if "--debug" in argv:
             raise
         print(f"innerattn: error: {' '.join(str(error).split())}", file=sys.stderr)
-        return 1
-    return 0
+        return 2 if isinstance(error, UsageError) else 1
 
 
 def _parse(argv: list[str]) -> Any:

@@ -12,6 +12,7 @@ import tyro
 from pydantic import BaseModel
 
 from innerattn.config import RunConfig
+from innerattn.errors import InnerattnError
 
 _SHORT = ("method", "seed", "device")
 """Keys of the section `train` that are options by their last word too."""
@@ -21,6 +22,10 @@ _FILE_ONLY = frozenset({"scenario.robots", "scenario.tasks", "scenario.obstacles
 
 OptionField = tuple[str, Any, Any]
 """Name, type and default, as `dataclasses.make_dataclass` takes them."""
+
+
+class UsageError(InnerattnError):
+    """Options are written wrongly or contradict each other."""
 
 
 @dataclass(kw_only=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import heapq
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -11,9 +12,11 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 if TYPE_CHECKING:
+    from innerattn.cli.several import Run
     from innerattn.train import Progress as TrainProgress
 
 _PLAIN_EVERY_S = 10.0
+_STATES = ("running", "done", "failed")
 
 
 class Work:
@@ -54,12 +57,17 @@ class Work:
         if self._bar is not None:
             self._bar.stop()
 
-    def show(self, done: int, total: int, note: str) -> None:
-        """Show that ``done`` of ``total`` units are done, and a note."""
+    def show(self, done: float, total: float, note: str, left_s: float | None = None) -> None:
+        """Show that ``done`` of ``total`` units are done, and a note.
+
+        Time left is ``left_s``; None: as long as the rest takes at the pace so far.
+        """
         now = self._clock()
         share = min(done / total, 1.0)
-        left = int((now - self._start) * (1.0 / share - 1.0)) if share > 0.0 else 0
-        head = f"{self.title} {share:4.0%} | {left // 60}:{left % 60:02d} left"
+        if left_s is None and share > 0.0:
+            left_s = (now - self._start) * (1.0 / share - 1.0)
+        left = "-:--" if left_s is None else f"{int(left_s) // 60}:{int(left_s) % 60:02d}"
+        head = f"{self.title} {share:4.0%} | {left} left"
         if self._bar is not None:
             self._bar.update(self._task, completed=share, description=f"{head}\n{note}")
         elif now - self._last_line >= _PLAIN_EVERY_S:
@@ -92,3 +100,44 @@ class Evaluating(Work):
     def __call__(self, done: int, total: int) -> None:
         """Show how far evaluation is."""
         self.show(done, total, f"{done:,} of {total:,} episodes")
+
+
+class SeveralRuns(Work):
+    """Shows runs side by side, their evaluation included; call it with all of them."""
+
+    title = "training"
+
+    def __init__(
+        self, console: Console | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """As `Work`."""
+        super().__init__(console, clock)
+        self._last_call = self._start
+        self._training = 0
+        self._spent = 0.0  # on all runs together, without the time that they take to start [s]
+
+    def __call__(self, runs: Sequence[Run]) -> None:
+        """Show how far the runs are."""
+        now = self._clock()
+        self._spent += self._training * (now - self._last_call)
+        self._last_call = now
+        self._training = sum(run.state == "running" and run.share > 0.0 for run in runs)
+        count = {state: sum(run.state == state for run in runs) for state in _STATES}
+        done = sum(1.0 if run.state == "failed" else run.share for run in runs)
+        note = f"{count['done']} of {len(runs)} runs done, {count['running']} running"
+        if count["failed"]:
+            note += f", {count['failed']} failed"
+        self.show(done, len(runs), note, self._left(runs))
+
+    def _left(self, runs: Sequence[Run]) -> float | None:
+        """Time until the last run is done [s]; each waiting one takes the first free place."""
+        progress = sum(run.share for run in runs)
+        if not (progress and self._spent):
+            return None
+        a_run = self._spent / progress
+        places = [(1.0 - run.share) * a_run for run in runs if run.state == "running"]
+        heapq.heapify(places)
+        for run in runs:
+            if run.state == "waiting":
+                heapq.heapreplace(places, places[0] + a_run)
+        return max(places, default=0.0)

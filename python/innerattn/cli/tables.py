@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -18,6 +19,10 @@ _KEY = """\
   greedy: each robot to the nearest victim it can help
   hungarian: robots assigned to victims by arrival time
   score: 0 plays like random, 1 like hungarian; ± is half the 95 % interval
+"""
+_KEY_OF_SEEDS = """\
+  score: 0 plays like random, 1 like hungarian
+  mean: ± is half the 95 % interval over seeds (Student's t)
 """
 
 
@@ -48,6 +53,49 @@ def print_summary(console: Console, summary: Summary, scenario: Scenario) -> Non
                 f"  100% is ln {others} = {math.log(others):.2f}: even attention over "
                 f"{others} teammates; less is more selective\n"
             )
+
+
+def print_seeds(console: Console, summaries: Mapping[int, Summary | None]) -> None:
+    """Print what the runs of several seeds found, and their mean.
+
+    Args:
+        console: where to.
+        summaries: the figures by seed, in order; None for a run that failed.
+    """
+    found = [summary for summary in summaries.values() if summary is not None]
+    if not found:
+        return
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("seed")
+    for figures in (found[0].standard, found[0].long):
+        table.add_column(f"{figures.episode_steps} steps", justify="right")
+        table.add_column("score", justify="right")
+    for seed, summary in summaries.items():
+        cells = [_mean(x) for x in _of_seed(summary)] if summary else ["failed"]
+        table.add_row(str(seed), *cells)
+    if len(found) > 1:
+        table.add_section()
+        columns = zip(*(_of_seed(summary) for summary in found), strict=True)
+        table.add_row(f"mean of {len(found)}", *map(_over_seeds, columns), style="bold")
+    console.print(f"\nRescues per episode, situation {found[0].situation}", style="bold")
+    console.print(table)
+    console.print(_KEY_OF_SEEDS)
+
+
+def _of_seed(summary: Summary) -> list[Interval | None]:
+    lengths = (summary.standard, summary.long)
+    return [x for figures in lengths for x in (figures.rescues_per_episode, figures.score)]
+
+
+def _over_seeds(intervals: Sequence[Interval | None]) -> str:
+    from innerattn.evaluate import student_interval
+
+    means = [interval.mean for interval in intervals if interval is not None]
+    return _plus_minus(student_interval(means) if len(means) == len(intervals) else None)
+
+
+def _mean(interval: Interval | None) -> str:
+    return "-" if interval is None else f"{interval.mean:.2f}"
 
 
 def _rescues(summary: Summary) -> Table:

@@ -12,11 +12,14 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 import tyro
 from rich.console import Console
 
-from innerattn.cli.options import Command, changed, run_options
-from innerattn.cli.progress import Evaluating, Training
-from innerattn.cli.tables import print_summary
+from innerattn.cli.options import Command, UsageError, changed, run_options
+from innerattn.cli.progress import Evaluating, SeveralRuns, Training
+from innerattn.cli.seeds import parse_seeds
+from innerattn.cli.several import Run, refuse_what_cannot_run, train_side_by_side
+from innerattn.cli.tables import print_seeds, print_summary
 from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
 from innerattn.config.run import Method
+from innerattn.cores import usable_cores
 
 if TYPE_CHECKING:
     Preset: TypeAlias = str
@@ -46,11 +49,15 @@ class _Sources(Command):
 
 @dataclass(kw_only=True)
 class _Choice(_Sources):
-    """The options that the defaults of all others depend on."""
+    """The options that must be known before all others, which take their defaults from them."""
 
     method: Annotated[Method | None, tyro.conf.arg(aliases=["--train.method"])] = None
+    seed: Annotated[int | None, tyro.conf.arg(aliases=["--train.seed"])] = None
+    seeds: str | None = None
 
     def defaults(self) -> RunConfig:
+        if self.seed is not None and self.seeds is not None:
+            raise UsageError(f"--seed {self.seed}, --seeds {self.seeds}: must be one of the two")
         return self.load({} if self.method is None else {"train.method": self.method})
 
 
@@ -61,45 +68,107 @@ class _Train(_Sources):
     defaults: ClassVar[RunConfig]
 
     run_dir: Path | None = None
-    """Folder to make for the run; None: runs/PRESET-METHOD-BUDGET-sSEED-TIME."""
+    """Folder to make for the run; with --seeds one for each, RUN_DIR-s0, RUN_DIR-s1, ...; None:
+    runs/PRESET-METHOD-BUDGET-sSEED-TIME."""
+    seeds: str | None = None
+    """Train one run per seed, instead of --seed: 0..4 (both ends), 0,3,7 or 0..2,7.
+    As many go side by side as there are cores, with one thread each unless --train.threads is
+    given."""
 
-    def run(self) -> None:
+    def run(self) -> int:
         """Train, evaluate and print.
 
+        Returns:
+            The exit code: 0, or 1 where some of several runs failed.
+
         Raises:
-            InnerattnError: wrong configuration, or the run's folder exists.
+            InnerattnError: wrong configuration, or a run's folder exists.
             KeyboardInterrupt: the user stopped it; what was learnt is saved.
         """
+        overrides = {"train.method": self.defaults.train.method} | changed(self, self.defaults)
+        console = Console(markup=False, highlight=False)
+        if self.seeds is None:
+            return self._train_one(console, self.load(overrides))
+        seeds = parse_seeds(self.seeds)
+        threads = self.load(overrides).train.threads or 1
+        configs = [
+            self.load(overrides | {"train.seed": seed, "train.threads": threads}) for seed in seeds
+        ]
+        return self._train_several(console, configs)
+
+    def _train_one(self, console: Console, config: RunConfig) -> int:
         from innerattn.evaluate import evaluate_run
         from innerattn.train import train
 
-        method = {"train.method": self.defaults.train.method}
-        config = self.load(method | changed(self, self.defaults))
-        run_dir = self.run_dir or self._new_run_dir(config)
-        console = Console(markup=False, highlight=False)
-        console.print(
-            f"Training {config.train.method} on {config.scenario.situation}: "
-            f"{config.train.env_steps:,} env-steps in {config.train.num_envs} worlds, "
-            f"seed {config.train.seed}",
-        )
+        run_dir = self.run_dir or self._new_run_dir(config, _stamp())
+        console.print(f"{_what(config)}, seed {config.train.seed}")
         console.print(f"Run folder: {run_dir}", soft_wrap=True)
         try:
             with Training() as progress:
                 train(config, run_dir, progress=progress)
         except KeyboardInterrupt:
-            if run_dir.is_dir():
-                print(f"innerattn: what was learnt is kept in {run_dir}", file=sys.stderr)
+            _say_what_is_kept([run_dir])
             raise
         with Evaluating() as progress:
             evaluation = evaluate_run(run_dir, progress=progress)
         evaluation.write(run_dir / "evaluation")
         print_summary(console, evaluation.summary, config.scenario)
         console.print(f"Measure it again with: innerattn evaluate {run_dir}", soft_wrap=True)
+        return 0
 
-    def _new_run_dir(self, config: RunConfig) -> Path:
-        train, stamp = config.train, time.strftime("%Y%m%d-%H%M%S")
+    def _train_several(self, console: Console, configs: Sequence[RunConfig]) -> int:
+        stamp = _stamp()
+        runs = [Run(config, self._folder_of_seed(config, stamp)) for config in configs]
+        refuse_what_cannot_run(runs)
+        threads = configs[0].train.threads or 1
+        at_once = max(1, min(usable_cores() // threads, len(runs)))
+        console.print(f"{_what(configs[0])}, {len(runs)} seeds, {at_once} at a time")
+        console.print(f"Run folders: {runs[0].folder} to {runs[-1].folder}", soft_wrap=True)
+        try:
+            with SeveralRuns() as progress:
+                train_side_by_side(
+                    runs, at_once, changed=progress, failed=_say_why, debug=self.debug
+                )
+        except KeyboardInterrupt:
+            _say_what_is_kept([run.folder for run in runs])
+            raise
+        print_seeds(console, {run.config.train.seed: run.summary for run in runs})
+        console.print("Run folders", style="bold")
+        for run in runs:
+            console.print(f"  {run.folder} ({run.state})", soft_wrap=True)
+        return int(any(run.failure for run in runs))
+
+    def _folder_of_seed(self, config: RunConfig, stamp: str) -> Path:
+        if self.run_dir is None:
+            return self._new_run_dir(config, stamp)
+        return Path(f"{self.run_dir}-s{config.train.seed}")
+
+    def _new_run_dir(self, config: RunConfig, stamp: str) -> Path:
+        train = config.train
         name = f"{config.scenario.situation}-{train.method}-{self.budget}-s{train.seed}-{stamp}"
         return Path("runs") / name
+
+
+def _stamp() -> str:
+    return time.strftime("%Y%m%d-%H%M%S")
+
+
+def _what(config: RunConfig) -> str:
+    train = config.train
+    return (
+        f"Training {train.method} on {config.scenario.situation}: "
+        f"{train.env_steps:,} env-steps in {train.num_envs} worlds"
+    )
+
+
+def _say_why(run: Run) -> None:
+    print(f"innerattn: error: seed {run.config.train.seed}: {run.failure}", file=sys.stderr)
+
+
+def _say_what_is_kept(folders: Sequence[Path]) -> None:
+    for folder in folders:
+        if (folder / "checkpoints" / "latest").exists():
+            print(f"innerattn: what was learnt is kept in {folder}", file=sys.stderr)
 
 
 def command_type(argv: Sequence[str]) -> Any:
@@ -107,6 +176,7 @@ def command_type(argv: Sequence[str]) -> Any:
 
     Raises:
         ConfigError: the chosen sources make no valid configuration.
+        UsageError: both --seed and --seeds are given.
     """
     known = [argument for argument in argv if argument not in ("-h", "--help")]
     choice, _ = tyro.cli(_Choice, args=known, prog="innerattn train", return_unknown_args=True)
