@@ -165,6 +165,9 @@ class TrainConfig(Model):
         le=256,
         description="threads of worlds and networks; None: as many as are worth it",
     )
+    compile: Literal["auto", "on", "off"] = Field(
+        "auto", description="compile the update before training; auto: where the run is long enough"
+    )
     num_envs: int = Field(64, ge=1, le=1_000_000, description="worlds stepped side by side")
     env_steps: int = Field(
         150_000, ge=1, description="length of training, all worlds counted [env-steps]"

@@ -79,6 +79,12 @@ class Learner(Protocol):
     def updates(self) -> int:
         """Number of updates done so far."""
 
+    def compile(self) -> None:
+        """Do updates as one compiled graph from now on; the first ones wait for the compiler.
+
+        Results are those of uncompiled updates but for rounding.
+        """
+
     def attention(self, obs: Tensor, actions: Tensor) -> Tensor:
         """Attention weights of the critic.
 

@@ -49,6 +49,7 @@ class RunInfo:
     env_steps: int
     updates: int
     seconds: float
+    compiled: bool = False
 
 
 class RunFolder:
@@ -60,7 +61,9 @@ class RunFolder:
         self.info = info
 
     @classmethod
-    def create(cls, path: Path, config: RunConfig, threads: int) -> RunFolder:
+    def create(
+        cls, path: Path, config: RunConfig, threads: int, compiled: bool = False
+    ) -> RunFolder:
         """Make the folder at ``path``; it appears with its files or not at all.
 
         Raises:
@@ -73,6 +76,7 @@ class RunFolder:
             seed=config.train.seed,
             commit=_commit(),
             threads=threads,
+            compiled=compiled,
             device=config.train.device,
             state="running",
             env_steps=0,

@@ -23,6 +23,7 @@ from innerattn.train.build import (
 )
 from innerattn.train.checkpoint import RunFolder, State, refuse_existing
 from innerattn.train.collect import Collector
+from innerattn.train.compilation import compiles
 from innerattn.train.metrics import (
     Interval,
     Metrics,
@@ -83,7 +84,10 @@ def train(
         with closing(env):
             learner = build_learner(config, env)
             collector = Collector(env, learner, torch.device(config.train.device))
-            folder = RunFolder.create(path, config, threads)
+            compiled = compiles(config)
+            if compiled:
+                learner.compile()
+            folder = RunFolder.create(path, config, threads, compiled)
             _Loop(config, folder, learner, collector, env.robot_names, progress).run()
     return path
 

@@ -1,0 +1,58 @@
+"""Whether updates run as one compiled graph: what is asked for, what pays, what works here."""
+
+from __future__ import annotations
+
+import logging
+
+import torch
+from torch import Tensor
+
+from innerattn.config import RunConfig
+
+_log = logging.getLogger(__name__)
+
+_WORTH_ROWS = 8_000_000
+"""Rows of training from which compiling pays: it takes about a minute of one core once, and then
+saves some 15 microseconds a row (`benches/compare_learner.py`)."""
+
+
+def compiles(config: RunConfig) -> bool:
+    """Whether this run's updates are to be compiled here.
+
+    Where it is wanted but cannot be, one line of the log says so.
+    """
+    choice = config.train.compile
+    if choice == "off":
+        return False
+    worth = config.train.device == "cpu" and _rows(config) >= _WORTH_ROWS
+    if choice == "auto" and not worth:
+        return False
+    problem = _problem()
+    if problem is not None:
+        _log.warning("Updates run uncompiled, which is slower: no working C++ compiler %s", problem)
+    return problem is None
+
+
+def _rows(config: RunConfig) -> int:
+    """Transitions that all updates of the run go through, counted as often as they are used."""
+    steps = config.train.env_steps
+    if config.train.method.startswith("ppo"):
+        return steps * config.ppo.epochs
+    return steps // config.td.update_every_env_steps * config.td.batch_size
+
+
+def _problem() -> str | None:
+    """What keeps the compiler from working, found by compiling a line; None where it works.
+
+    A compiler alone is not enough: Python's headers, for one, are needed, too.
+    """
+
+    def line(x: Tensor) -> Tensor:
+        return x.exp() + 1.0
+
+    try:
+        torch.compile(line)(torch.ones(8))
+    except Exception as error:  # whatever a missing part of the tool chain raises
+        reason = [text for text in str(error).splitlines() if text.strip()]
+        return f"({reason[0] if reason else type(error).__name__})"
+    return None
