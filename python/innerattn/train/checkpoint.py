@@ -50,6 +50,7 @@ class RunInfo:
     updates: int
     seconds: float
     compiled: bool = False
+    products: str = "default"
 
 
 class RunFolder:
@@ -62,7 +63,12 @@ class RunFolder:
 
     @classmethod
     def create(
-        cls, path: Path, config: RunConfig, threads: int, compiled: bool = False
+        cls,
+        path: Path,
+        config: RunConfig,
+        threads: int,
+        compiled: bool = False,
+        products: str = "default",
     ) -> RunFolder:
         """Make the folder at ``path``; it appears with its files or not at all.
 
@@ -77,6 +83,7 @@ class RunFolder:
             commit=_commit(),
             threads=threads,
             compiled=compiled,
+            products=products,
             device=config.train.device,
             state="running",
             env_steps=0,

@@ -31,6 +31,7 @@ from innerattn.train.metrics import (
     attention_entropy,
     refuse_divergence,
 )
+from innerattn.train.products import best_products
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def train(
     refuse_existing(path)
     keep_heap_small()
     threads = thread_count(config)
-    with torch_threads(threads):
+    with torch_threads(threads), best_products() as products:
         env = BatchEnv(
             config.scenario,
             config.train.num_envs,
@@ -87,7 +88,7 @@ def train(
             compiled = compiles(config)
             if compiled:
                 learner.compile()
-            folder = RunFolder.create(path, config, threads, compiled)
+            folder = RunFolder.create(path, config, threads, compiled, products)
             _Loop(config, folder, learner, collector, env.robot_names, progress).run()
     return path
 
