@@ -50,6 +50,7 @@ def test_contradicting_attention_is_refused(method: str, attention: str) -> None
         ("ppo", "clip", 1.0),
         ("ppo", "minibatch_size", 0),
         ("train", "method", "ppo"),
+        ("train", "method", ["td-inner"]),
         ("train", "seed", -1),
         ("train", "threads", 0),
         ("train", "num_envs", 0),

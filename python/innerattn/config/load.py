@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from innerattn.config.files import preset_table, toml_table, write_whole
 from innerattn.config.model import config_error
-from innerattn.config.run import RunConfig
+from innerattn.config.run import RunConfig, on_policy
 from innerattn.errors import ConfigError
 
 
@@ -48,7 +48,7 @@ def load_run_config(
     )
     table: dict[str, Any] = {"scenario": preset_table("scenarios", preset)}
     _merge(table, preset_table("budgets", budget))
-    if str(chosen).startswith("ppo"):
+    if on_policy(chosen):
         _merge(table, preset_table("budgets/ppo", budget))
     _merge(table, given)
     for key, value in (overrides or {}).items():

@@ -6,7 +6,7 @@ Ranges of the sections below live here; those of a scenario live in the compiled
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, Field, model_validator
 
@@ -20,12 +20,26 @@ BUDGETS = preset_names("budgets")
 Method = Literal["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"]
 Attention = Literal["inner", "uniform"]
 
-_ATTENTION: dict[str, Attention] = {
-    "td-inner": "inner",
-    "td-uniform": "uniform",
-    "ppo-inner": "inner",
-    "ppo-uniform": "uniform",
+
+class _Kind(NamedTuple):
+    """What a method is: its algorithm, and the values it needs, by section and key."""
+
+    on_policy: bool
+    needs: dict[str, dict[str, object]]
+
+
+_KINDS = {
+    "td-inner": _Kind(False, {"network": {"attention": "inner"}}),
+    "td-uniform": _Kind(False, {"network": {"attention": "uniform"}}),
+    "ppo-inner": _Kind(True, {"network": {"attention": "inner"}}),
+    "ppo-uniform": _Kind(True, {"network": {"attention": "uniform"}}),
 }
+
+
+def on_policy(method: object) -> bool:
+    """Whether a method learns by PPO; what is no method does not."""
+    kind = _KINDS.get(str(method))
+    return kind is not None and kind.on_policy
 
 
 class NetworkConfig(Model):
@@ -199,7 +213,7 @@ class EvaluateConfig(Model):
 
 
 class RunConfig(Model):
-    """A whole run. `network.attention` follows from `train.method` where it is not given.
+    """A whole run. What `train.method` needs follows from it where it is not given.
 
     Raises:
         pydantic.ValidationError: (a `ValueError`) unknown key, wrong type, value out of range, or
@@ -215,32 +229,30 @@ class RunConfig(Model):
 
     @model_validator(mode="before")
     @classmethod
-    def _attention_follows_method(cls, data: Any) -> Any:
+    def _follow_method(cls, data: Any) -> Any:
         if not isinstance(data, Mapping):
             return data
-        method = _given(data.get("train"), "method")
-        network = data.get("network", {})
-        if method not in _ATTENTION or _given(network, "attention") is not None:
-            return data
-        if isinstance(network, NetworkConfig):
-            network = network.model_dump(exclude_unset=True)
-        if not isinstance(network, Mapping):
-            return data  # the field's own check names the wrong type
-        return {**data, "network": {**network, "attention": _ATTENTION[method]}}
+        kind = _KINDS.get(str(_given(data.get("train")).get("method")))
+        for section, values in kind.needs.items() if kind else ():
+            if isinstance(data.get(section, {}), Mapping | BaseModel):  # else its own check says so
+                data = {**data, section: {**values, **_given(data.get(section))}}
+        return data
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        wanted = _ATTENTION[self.train.method]
-        if self.network.attention != wanted:
-            raise ValueError(
-                f"network.attention = {self.network.attention!r}: train.method = "
-                f"{self.train.method!r} needs {wanted!r}"
-            )
+        method = self.train.method
+        for section, values in _KINDS[method].needs.items():
+            for key, wanted in values.items():
+                value = getattr(getattr(self, section), key)
+                if value != wanted:
+                    raise ValueError(
+                        f"{section}.{key} = {value!r}: train.method = {method!r} needs {wanted!r}"
+                    )
         return self
 
 
-def _given(section: object, key: str) -> Any:
-    """The value of ``key`` where a section (a table or a model) sets it, else None."""
+def _given(section: object) -> Mapping[str, Any]:
+    """What a section (a table or a model) sets."""
     if isinstance(section, BaseModel):
-        return getattr(section, key) if key in section.model_fields_set else None
-    return section.get(key) if isinstance(section, Mapping) else None
+        return section.model_dump(exclude_unset=True)
+    return section if isinstance(section, Mapping) else {}

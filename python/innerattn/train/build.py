@@ -10,6 +10,7 @@ from contextlib import contextmanager
 import torch
 
 from innerattn.config import RunConfig
+from innerattn.config.run import on_policy
 from innerattn.cores import usable_cores
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
@@ -33,7 +34,7 @@ def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
     device = _device(config.train.device)
     column = env.observation_names().index("own.available")
     seed = config.train.seed
-    if config.train.method.startswith("ppo"):
+    if on_policy(config.train.method):
         return PPO(
             team, config.network, config.ppo, seed=seed, device=device, availability_column=column
         )
@@ -49,7 +50,7 @@ def thread_count(config: RunConfig) -> int:
     A second thread gains little on small batches, and torch's threads wait for each other: where
     another program takes one of the cores, two are many times slower than one.
     """
-    ppo = config.train.method.startswith("ppo")
+    ppo = on_policy(config.train.method)
     rows = config.ppo.minibatch_size if ppo else config.td.batch_size
     worth = max(1, rows // _ROWS_PER_THREAD)
     return config.train.threads or min(worth, usable_cores())

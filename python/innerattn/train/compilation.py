@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from innerattn.config import RunConfig
+from innerattn.config.run import on_policy
 
 _log = logging.getLogger(__name__)
 
@@ -36,7 +37,7 @@ def compiles(config: RunConfig) -> bool:
 def _rows(config: RunConfig) -> int:
     """Transitions that all updates of the run go through, counted as often as they are used."""
     steps = config.train.env_steps
-    if config.train.method.startswith("ppo"):
+    if on_policy(config.train.method):
         return steps * config.ppo.epochs
     return steps // config.td.update_every_env_steps * config.td.batch_size
 
