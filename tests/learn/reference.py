@@ -94,6 +94,8 @@ def values(
     num_actions: int | None = None,
 ) -> PlainValues:
     """Q of every own action for obs (B, R, D), actions (B, R), available (B, R) bool."""
+    if kind == "none":
+        return joint_values(network, obs)
     batch, robots, _ = obs.shape
     num_actions = num_actions or len(network.robot("output", 0)[1])
     query, key = network.layers["attention.query"], network.layers["attention.key"]
@@ -138,6 +140,18 @@ def values(
         hidden = leaky(affine(torch.cat([own[i], *mixed], 1), network.robot("hidden", i)))
         q.append(affine(hidden, network.robot("output", i)))
     return PlainValues(q, weights, penalty)
+
+
+def joint_values(network: PlainNetwork, obs: Tensor) -> PlainValues:
+    """Values of the critic without attention: of all observations side by side, of no action."""
+    batch, robots, _ = obs.shape
+    joint = torch.cat([obs[:, j] for j in range(robots)], 1)
+    q = []
+    for i in range(robots):
+        hidden = leaky(affine(joint, network.robot("first", i)))
+        hidden = leaky(affine(hidden, network.robot("second", i)))
+        q.append(affine(hidden, network.robot("output", i)))
+    return PlainValues(q, obs.new_zeros(batch, 0, robots, robots), obs.new_zeros(()))
 
 
 class Adam:

@@ -86,6 +86,10 @@ def test_the_traced_update_agrees_masked_and_clipped(algorithm: str, numbers: di
     agree(algorithm, 4, "aot_eager", {"attention": "inner", "mask_unavailable": True}, numbers)
 
 
+def test_the_traced_update_agrees_without_attention() -> None:
+    agree("ppo", 4, "aot_eager", {"attention": "none"}, {"advantage": "value"})
+
+
 @pytest.mark.parametrize("algorithm", ["td", "ppo"])
 def test_the_compiled_update_agrees(algorithm: str) -> None:
     agree(algorithm, 4, "inductor", {"attention": "inner"}, {})

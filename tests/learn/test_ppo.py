@@ -195,8 +195,16 @@ class PlainPPO:
 
 
 @pytest.mark.parametrize("value_clip", [None, 0.01])
-@pytest.mark.parametrize("advantage", ["counterfactual", "value"])
-@pytest.mark.parametrize("attention", ["inner", "uniform"])
+@pytest.mark.parametrize(
+    ("attention", "advantage"),
+    [
+        ("inner", "counterfactual"),
+        ("inner", "value"),
+        ("uniform", "counterfactual"),
+        ("uniform", "value"),
+        ("none", "value"),
+    ],
+)
 @pytest.mark.parametrize("robots", [2, 3])
 def test_rollouts_and_updates_agree_with_the_plain_form(
     robots: int,
@@ -289,6 +297,17 @@ def test_constant_rewards_and_a_robot_alone_stay_finite(robots: int) -> None:
         learner.observe(batch._replace(reward=torch.ones_like(batch.reward)), truncated)
     learner.learn()
     assert all(torch.isfinite(tensor).all() for tensor in learner.state().values())
+
+
+def test_without_attention_values_heed_no_action_and_nothing_is_attended_to() -> None:
+    first, other = (make(3, {"attention": "none"}, {"advantage": "value"}) for _ in range(2))
+    for batch, truncated in collect(first, 3, 0):
+        other.observe(batch._replace(actions=(batch.actions + 1) % NUM_ACTIONS), truncated)
+    assert first.attention(batch.obs, batch.actions) is None
+    one, two = first._rollout(), other._rollout()
+    assert torch.equal(one.value, two.value)
+    assert torch.equal(one.advantage, two.advantage)
+    assert not torch.equal(one.log_prob, two.log_prob)
 
 
 def test_a_loaded_learner_equals_the_saved_one() -> None:

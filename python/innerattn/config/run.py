@@ -18,7 +18,7 @@ BUDGETS = preset_names("budgets")
 """Names of the built-in budgets: how long to train, and with which numbers."""
 
 Method = Literal["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"]
-Attention = Literal["inner", "uniform"]
+Attention = Literal["inner", "uniform", "none"]
 
 
 class _Kind(NamedTuple):
@@ -50,7 +50,8 @@ class NetworkConfig(Model):
     hidden_width: int = Field(128, ge=1, le=4096, description="width of encodings and layers")
     attention_heads: int = Field(4, ge=1, le=64, description="attention heads of the critic")
     attention: Attention = Field(
-        "inner", description="learnt, or fixed at 1/(N-1); follows from the method"
+        "inner",
+        description="learnt, fixed at 1/(N-1), or none; follows from the method",
     )
     mask_unavailable: bool = Field(
         False, description="keep unavailable teammates out of the attention"

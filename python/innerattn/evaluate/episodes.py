@@ -52,10 +52,10 @@ class Policy(Protocol):
 
 @runtime_checkable
 class Attentive(Protocol):
-    """A policy with a critic whose attention can be recorded."""
+    """A policy with a critic whose attention, if it has any, can be recorded."""
 
-    def attention(self, view: View, actions: NDArray[Any]) -> NDArray[np.float32]:
-        """Attention weights (E, H, R, R) for these actions."""
+    def attention(self, view: View, actions: NDArray[Any]) -> NDArray[np.float32] | None:
+        """Attention weights (E, H, R, R) for these actions; None where there are none."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,8 @@ def _run_batch(
         actions = policy.act(view)
         seen: dict[str, NDArray[Any]] = {**view._asdict(), "actions": actions}
         if "attention" in record and isinstance(policy, Attentive):
-            seen["attention"] = policy.attention(view, actions)
+            weights = policy.attention(view, actions)
+            seen |= {} if weights is None else {"attention": weights}
         for name in seen.keys() & set(record):
             _keep(steps, name, step_index, total_steps, seen[name], running)
         step = env.step(actions)

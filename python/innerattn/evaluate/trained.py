@@ -32,10 +32,10 @@ class TrainedPolicy:
         actions = self._learner.act(torch.tensor(view.obs), greedy=self._greedy)
         return np.asarray(actions.numpy())
 
-    def attention(self, view: View, actions: NDArray[Any]) -> NDArray[np.float32]:
+    def attention(self, view: View, actions: NDArray[Any]) -> NDArray[np.float32] | None:
         """See `Attentive.attention`."""
         weights = self._learner.attention(torch.tensor(view.obs), torch.tensor(actions))
-        return np.asarray(weights.numpy())
+        return None if weights is None else np.asarray(weights.numpy())
 
 
 def load_trained(

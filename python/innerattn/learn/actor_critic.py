@@ -1,4 +1,4 @@
-"""What every learner here is made of: per-robot actors, a critic with attention, and their Adams.
+"""What every learner here is made of: per-robot actors, a critic, and their Adams.
 
 It acts, reports attention, saves and loads; when and how to update is each learner's own.
 """
@@ -14,6 +14,7 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from innerattn.config.run import NetworkConfig
+from innerattn.learn import losses
 from innerattn.learn.descent import (
     Descent,
     Kept,
@@ -26,7 +27,9 @@ from innerattn.learn.types import Team
 from innerattn.nn import (
     Actor,
     Critic,
+    CriticOutput,
     InnerAttention,
+    JointCritic,
     UniformAttention,
     action_noise,
     sample_actions,
@@ -97,9 +100,17 @@ class ActorCritic:
         # Drawn on the CPU in float32 and then moved: a seed gives the same weights everywhere.
         weights = torch.Generator().manual_seed(weights_seed)
         width = network.hidden_width
-        attention = _ATTENTIONS[network.attention](width, network.attention_heads, weights)
+        attention = None
+        if network.attention != "none":
+            attention = _ATTENTIONS[network.attention](width, network.attention_heads, weights)
         self.actor = Actor(*team, width, weights).to(device, dtype)
-        self.critic = Critic(*team, attention, weights, critic_outputs).to(device, dtype)
+        critic: Critic | JointCritic
+        if attention is None:
+            outputs = critic_outputs or team.num_actions
+            critic = JointCritic(team.num_robots, team.obs_width, outputs, width, weights)
+        else:
+            critic = Critic(*team, attention, weights, critic_outputs)
+        self.critic = critic.to(device, dtype)
         self._actor_descent = Descent(self.actor, learning_rate, weight_decay=0.0)
         self._critic_descent = Descent(self.critic, learning_rate, critic_weight_decay)
         self._values = {
@@ -133,13 +144,14 @@ class ActorCritic:
         for descent in (self._actor_descent, self._critic_descent):
             descent.set_learning_rate(left * self._learning_rate)
 
-    def attention(self, obs: Tensor, actions: Tensor) -> Tensor:
-        """Attention weights (B, H, R, R) of the critic; see `Learner.attention`."""
+    def attention(self, obs: Tensor, actions: Tensor) -> Tensor | None:
+        """Attention weights (B, H, R, R) of the critic, if it has any; see `Learner.attention`."""
         obs = self._robots_first(obs)
         with torch.no_grad():
-            output = self.critic(obs, actions.to(self._device).t(), self._available(obs))
-        weights: Tensor = output.attended.weights
-        return weights
+            output: CriticOutput = self.critic(
+                obs, actions.to(self._device).t(), self._available(obs)
+            )
+        return None if output.attended is None else output.attended.weights
 
     def state(self) -> dict[str, Tensor]:
         """Copies of all weights, optimiser moments and running numbers, and the count of updates.
@@ -201,6 +213,14 @@ class ActorCritic:
             return output
         return network(*inputs)
 
+    @staticmethod
+    def _attention_penalty(output: CriticOutput, weight: float) -> Tensor | float:
+        """The weighted logit penalty () of a critic; 0 where nothing is scored."""
+        attended = output.attended
+        if not weight or attended is None or attended.scores is None:
+            return 0.0
+        return weight * losses.attention_logit_penalty(attended.scores, attended.visible)
+
     def _step_critic(
         self, loss_of: Callable[[Network], tuple[Tensor, Kept]], rate: Tensor, limit: float
     ) -> tuple[Tensor, Kept]:
@@ -210,7 +230,8 @@ class ActorCritic:
             # The loss is a sum over robots, so what they share would learn faster with every robot
             # more; MAAC likewise divides its gradient by their number, before clipping.
             shared = [g for name, g in gradients.items() if name.startswith("attention.")]
-            torch._foreach_div_(shared, self.actor.num_robots)
+            if shared:
+                torch._foreach_div_(shared, self.actor.num_robots)
             return clip_whole(gradients, limit)
 
         return self._critic_descent.step(loss_of, clip, rate)

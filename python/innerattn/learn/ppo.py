@@ -1,4 +1,4 @@
-"""The on-policy learner: proximal policy optimisation with the same actors and the same critic.
+"""The on-policy learner: proximal policy optimisation with the same actors and critics.
 
 It decides when to update and how; networks live in `nn`, formulas in `losses` and `advantage`.
 Sources: Schulman et al. 2017; the baseline of Iqbal & Sha 2019, section 3.3.
@@ -38,7 +38,7 @@ class PPO(ActorCritic):
 
     The baseline of robot i does not depend on its own action: with `advantage = "counterfactual"`
     it is sum_a pi_i(a) Q_i(o, a, a_-i), and Q_i of the action taken is fitted to the lambda-return;
-    with "value" it is a value head on the same encodings.
+    with "value" it is a value head, of the same critic or of one without attention.
 
     Attributes:
         scale: Running deviation of returns; rewards are divided by it.
@@ -148,10 +148,7 @@ class PPO(ActorCritic):
                 loss = losses.critic_loss(value, target)
             else:
                 loss = losses.clipped_value_loss(value, before, target, config.value_clip)
-            scores, visible = output.attended.scores, output.attended.visible
-            if config.attention_logit_penalty and scores is not None:
-                penalty = losses.attention_logit_penalty(scores, visible)
-                loss = loss + config.attention_logit_penalty * penalty
+            loss = loss + self._attention_penalty(output, config.attention_logit_penalty)
             return loss, (loss.detach(), value.detach().mean())
 
         norm, (loss, mean) = self._step_critic(loss_of, rate, config.critic_grad_clip)

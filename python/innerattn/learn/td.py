@@ -178,10 +178,7 @@ class TD(ActorCritic):
             output = critic(obs, actions, self._available(obs))
             q_taken = losses.taken(output.q, actions)
             loss = losses.critic_loss(q_taken, target)
-            scores, visible = output.attended.scores, output.attended.visible
-            if config.attention_logit_penalty and scores is not None:
-                penalty = losses.attention_logit_penalty(scores, visible)
-                loss = loss + config.attention_logit_penalty * penalty
+            loss = loss + self._attention_penalty(output, config.attention_logit_penalty)
             return loss, (loss.detach(), q_taken.detach().mean())
 
         norm, (loss, q_mean) = self._step_critic(loss_of, rate, config.critic_grad_clip)

@@ -85,7 +85,7 @@ class Learner(Protocol):
         Results are those of uncompiled updates but for rounding.
         """
 
-    def attention(self, obs: Tensor, actions: Tensor) -> Tensor:
+    def attention(self, obs: Tensor, actions: Tensor) -> Tensor | None:
         """Attention weights of the critic.
 
         Args:
@@ -93,7 +93,8 @@ class Learner(Protocol):
             actions: (B, R) int64.
 
         Returns:
-            (B, H, R, R): row i holds robot i's weights over its teammates; the diagonal is 0.
+            (B, H, R, R): row i holds robot i's weights over its teammates; the diagonal is 0. None
+            where the critic has no attention.
         """
 
     def state(self) -> dict[str, Tensor]:

@@ -1,4 +1,4 @@
-"""The networks of the learners: per-robot actors and critics with attention over teammates.
+"""The networks of the learners: per-robot actors, critics with and without attention.
 
 Tensors have robots first, (R, B, ...), so that every layer is one batched product over the robots.
 It knows nothing of environments, losses or files.
@@ -7,6 +7,7 @@ It knows nothing of environments, losses or files.
 from innerattn.nn.actor import Actor, action_noise, sample_actions
 from innerattn.nn.attention import Attended, InnerAttention, UniformAttention
 from innerattn.nn.critic import Critic, CriticOutput
+from innerattn.nn.joint_critic import JointCritic
 from innerattn.nn.linear import PerRobotLinear
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Critic",
     "CriticOutput",
     "InnerAttention",
+    "JointCritic",
     "PerRobotLinear",
     "UniformAttention",
     "action_noise",

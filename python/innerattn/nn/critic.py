@@ -22,11 +22,11 @@ class CriticOutput(NamedTuple):
     Attributes:
         q: (R, A, B) Q_i(o, a, a_-i) for every own action a, or (R, outputs, B) other values; robot
             i's own action is not an input of its own values.
-        attended: What the attention made of the teammates.
+        attended: What the attention made of the teammates; None where the critic has no attention.
     """
 
     q: Tensor
-    attended: Attended
+    attended: Attended | None
 
 
 class Critic(nn.Module):

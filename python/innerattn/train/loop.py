@@ -163,12 +163,15 @@ class _Loop:
 
     def _log(self, newest: Transitions) -> None:
         weights = self._learner.attention(newest.obs, newest.actions)
-        entropy = attention_entropy(weights.cpu().numpy())
+        entropy: dict[str, list[float]] = {}
+        if weights is not None:
+            rows = attention_entropy(weights.cpu().numpy()).tolist()
+            entropy = dict(zip(self._robot_names, rows, strict=True))
         self._metrics = self._interval.close(
             self._env_steps,
             self._learner.updates,
             self._collector.take_tally(),
-            dict(zip(self._robot_names, entropy.tolist(), strict=True)),
+            entropy,
         )
         self._file.append(self._metrics)
         self._mark("running")

@@ -20,7 +20,8 @@ from innerattn.train.collect import Tally
 
 Metrics = Mapping[str, Any]
 """One line: env_steps, episodes, updates, seconds, env_steps_per_s, updates_per_s, losses by name,
-rescues_per_episode (none where no episode ended) and attention_entropy by robot and head [nats]."""
+rescues_per_episode (none where no episode ended) and attention_entropy by robot and head [nats],
+empty where the critic has no attention."""
 
 
 class MetricsFile:

@@ -1,0 +1,57 @@
+"""The plain centralised critic: each robot's values from the observations of all, no attention.
+
+It computes values; targets and losses belong to the learner. Source: Yu et al. 2022 ("MAPPO"), with
+every robot's parameters its own.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from innerattn.nn.critic import CriticOutput
+from innerattn.nn.linear import PerRobotLinear
+
+
+class JointCritic(nn.Module):
+    """Critics of all robots, two hidden layers each; nothing is shared between robots."""
+
+    def __init__(
+        self,
+        num_robots: int,
+        obs_width: int,
+        outputs: int,
+        hidden_width: int,
+        generator: torch.Generator,
+    ) -> None:
+        """Draw the parameters.
+
+        Args:
+            num_robots: R.
+            obs_width: D.
+            outputs: Values for each robot.
+            hidden_width: Width of both hidden layers.
+            generator: Source of the initial parameters, on the CPU.
+        """
+        super().__init__()
+        self.first = PerRobotLinear(num_robots, num_robots * obs_width, hidden_width, generator)
+        self.second = PerRobotLinear(num_robots, hidden_width, hidden_width, generator)
+        self.output = PerRobotLinear(num_robots, hidden_width, outputs, generator)
+
+    def forward(
+        self, obs: Tensor, actions: Tensor, available: Tensor | None = None
+    ) -> CriticOutput:
+        """Value the state.
+
+        Args:
+            obs: (R, B, D) observations; every robot's values depend on all of them.
+            actions: (R, B) int64, no input: it is here because other critics have it.
+            available: (B, R) bool, no input either.
+        """
+        del actions, available
+        joint = obs.transpose(0, 1).flatten(1)  # (B, R * D), robots side by side
+        joint = joint.expand(len(obs), -1, -1)
+        hidden = functional.leaky_relu_(self.first(joint))
+        hidden = functional.leaky_relu_(self.second(hidden))
+        return CriticOutput(self.output.batch_last(hidden), None)
