@@ -76,6 +76,18 @@ def test_tables_and_file(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFi
     assert max(map(len, printed.splitlines())) <= 80
 
 
+def test_a_run_without_attention_shows_none(
+    tmp_path: Path, tiny: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = str(tmp_path / "plain")
+    assert main(["train", "--method", "mappo", "--run-dir", run, *tiny]) == 0
+    assert main(["evaluate", run]) == 0
+    for printed in capsys.readouterr().out.split("Measure it again"):
+        assert "mappo (trained)" in printed
+        assert "Attention entropy" not in printed
+    assert document(capsys, run)["attention_entropy"] == {}
+
+
 def test_wrong_values(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "empty").mkdir()
     cases = [

@@ -62,7 +62,7 @@ def test_budgets_differ_in_length() -> None:
     assert steps["quick"] < steps["short"] < steps["paper"]
 
 
-@pytest.mark.parametrize("method", ["td-inner", "td-uniform"])
+@pytest.mark.parametrize("method", ["td-inner", "td-uniform", "mappo"])
 @pytest.mark.parametrize("budget", BUDGETS)
 @pytest.mark.parametrize("preset", SCENARIOS)
 def test_every_combination_loads_and_round_trips(
@@ -70,9 +70,18 @@ def test_every_combination_loads_and_round_trips(
 ) -> None:
     config = load_run_config(preset, method, budget)
     assert config.scenario == Scenario.preset(preset)
-    assert f"td-{config.network.attention}" == config.train.method == method
+    assert config.train.method == method
     write_toml(config, tmp_path / "config.toml")
     assert read_toml(tmp_path / "config.toml") == config
+
+
+@pytest.mark.parametrize("budget", BUDGETS)
+def test_budgets_of_ppo_are_for_every_on_policy_method(budget: str) -> None:
+    configs = [load_run_config(method=method, budget=budget) for method in ("ppo-inner", "mappo")]
+    for config in configs:
+        assert config.train.num_envs == 256
+        assert config.ppo.gamma == (0.99 if budget == "paper" else 0.95)
+        assert config.train.env_steps == configs[0].train.env_steps
 
 
 def test_later_sources_win(tmp_path: Path) -> None:

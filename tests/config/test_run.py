@@ -1,9 +1,12 @@
-"""The run configuration: ranges, contradictions, and attention that follows from the method."""
+"""The run configuration: ranges, contradictions, and what follows from the method."""
+
+import re
 
 import pytest
 from pydantic import ValidationError
 
 from innerattn.config import NetworkConfig, RunConfig, TDConfig, TrainConfig
+from innerattn.config.run import PPOConfig
 
 
 @pytest.mark.parametrize(
@@ -13,6 +16,7 @@ from innerattn.config import NetworkConfig, RunConfig, TDConfig, TrainConfig
         ("td-uniform", "uniform"),
         ("ppo-inner", "inner"),
         ("ppo-uniform", "uniform"),
+        ("mappo", "none"),
     ],
 )
 def test_attention_follows_method(method: str, attention: str) -> None:
@@ -29,6 +33,40 @@ def test_attention_follows_method(method: str, attention: str) -> None:
 def test_contradicting_attention_is_refused(method: str, attention: str) -> None:
     with pytest.raises(ValidationError, match=rf"network\.attention = '{attention}'.*'{method}'"):
         RunConfig.model_validate({"train": {"method": method}, "network": {"attention": attention}})
+
+
+@pytest.mark.parametrize(
+    ("method", "advantage"),
+    [("td-inner", "counterfactual"), ("ppo-inner", "counterfactual"), ("mappo", "value")],
+)
+def test_advantage_follows_method(method: str, advantage: str) -> None:
+    train = {"method": method}
+    as_tables = RunConfig.model_validate({"train": train, "ppo": {"epochs": 2}})
+    as_models = RunConfig(train=TrainConfig(**train), ppo=PPOConfig(epochs=2))
+    assert as_tables == as_models
+    assert (as_tables.ppo.advantage, as_tables.ppo.epochs) == (advantage, 2)
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value", "wanted"),
+    [
+        ("network", "attention", "inner", "none"),
+        ("network", "mask_unavailable", True, False),
+        ("ppo", "advantage", "counterfactual", "value"),
+    ],
+)
+def test_mappo_refuses_what_contradicts_it(
+    section: str, key: str, value: object, wanted: object
+) -> None:
+    message = f"{section}.{key} = {value!r}: train.method = 'mappo' needs {wanted!r}"
+    with pytest.raises(ValidationError, match=re.escape(message)):
+        RunConfig.model_validate({"train": {"method": "mappo"}, section: {key: value}})
+
+
+@pytest.mark.parametrize("method", ["td-inner", "ppo-uniform"])
+def test_only_mappo_goes_without_attention(method: str) -> None:
+    with pytest.raises(ValidationError, match=rf"network\.attention = 'none'.*'{method}' needs"):
+        RunConfig.model_validate({"train": {"method": method}, "network": {"attention": "none"}})
 
 
 @pytest.mark.parametrize(

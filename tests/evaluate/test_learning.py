@@ -1,4 +1,4 @@
-"""Learning, small and sure: two robots, one victim at a time; both attentions beat random."""
+"""Learning, small and sure: two robots, one victim at a time; every method beats random."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from innerattn.train import train
 LEARNING_RATE = 0.003
 
 
-@pytest.mark.parametrize("method", ["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"])
+@pytest.mark.parametrize("method", ["td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo"])
 def test_two_robots_learn_to_rescue(method: str, tmp_path: Path) -> None:
     team = Scenario()
     scenario = Scenario(

@@ -16,6 +16,7 @@ from innerattn.evaluate import (
     read_records,
     scripted_policy,
 )
+from innerattn.evaluate.episodes import FIELDS
 from innerattn.evaluate.summary import summarise
 from innerattn.train import train
 
@@ -106,6 +107,31 @@ def test_worlds_that_look_alike_are_allowed(run: Path) -> None:
     worlds = Scenario.preset("double")
     summary = evaluate_run(run, scenario=worlds, settings=SETTINGS).summary
     assert summary.situation == "double"
+
+
+def test_without_attention_none_is_recorded_or_reported(tmp_path: Path) -> None:
+    config = load_run_config(
+        "mixed",
+        "mappo",
+        overrides={
+            "train.env_steps": 600,
+            "train.num_envs": 12,
+            "train.threads": 1,
+            "train.log_every_env_steps": 300,
+            "network.hidden_width": 16,
+        },
+    )
+    run = train(config, tmp_path / "plain")
+    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    assert [line["attention_entropy"] for line in lines] == [{}, {}]
+    assert lines[-1]["updates"] > 0
+    evaluation = evaluate_run(run, settings=SETTINGS)
+    evaluation.write(tmp_path / "evaluation")
+    summary = json.loads((tmp_path / "evaluation" / "summary.json").read_text())
+    assert (summary["policy"], summary["method"]) == ("plain", "mappo")
+    assert summary["attention_entropy"] == summary["attention_entropy_share"] == {}
+    recorded = read_records(tmp_path / "evaluation")[0]
+    assert list(recorded.steps) == [name for name in FIELDS if name != "attention"]
 
 
 def test_a_scripted_policy_is_measured_once() -> None:

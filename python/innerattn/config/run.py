@@ -17,7 +17,7 @@ from innerattn.config.scenario import Scenario
 BUDGETS = preset_names("budgets")
 """Names of the built-in budgets: how long to train, and with which numbers."""
 
-Method = Literal["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"]
+Method = Literal["td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo"]
 Attention = Literal["inner", "uniform", "none"]
 
 
@@ -33,6 +33,13 @@ _KINDS = {
     "td-uniform": _Kind(False, {"network": {"attention": "uniform"}}),
     "ppo-inner": _Kind(True, {"network": {"attention": "inner"}}),
     "ppo-uniform": _Kind(True, {"network": {"attention": "uniform"}}),
+    "mappo": _Kind(
+        True,
+        {
+            "network": {"attention": "none", "mask_unavailable": False},
+            "ppo": {"advantage": "value"},
+        },
+    ),
 }
 
 
@@ -153,7 +160,8 @@ class PPOConfig(Model):
     )
     advantage: Literal["counterfactual", "value"] = Field(
         "counterfactual",
-        description="baseline: expectation of Q over the own action, or a value head",
+        description="baseline: expectation of Q over the own action, or a value head; mappo needs "
+        "the latter",
     )
     attention_logit_penalty: float = Field(
         0.0, ge=0.0, description="weight of the squared attention logits in the critic's loss"
@@ -171,7 +179,7 @@ class TrainConfig(Model):
 
     place: ClassVar[str] = "train"
 
-    method: Method = Field("td-inner", description="learning algorithm and kind of attention")
+    method: Method = Field("td-inner", description="learning algorithm and kind of critic")
     seed: int = Field(0, ge=0, lt=2**63, description="seed of everything random")
     device: str = Field("cpu", description="where networks run: cpu, cuda, cuda:0, ...")
     threads: int | None = Field(
