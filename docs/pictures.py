@@ -7,8 +7,7 @@ from matplotlib.image import imsave
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.envs.render import draw_world
-from innerattn.evaluate.dispatch import scripted_policy
-from innerattn.evaluate.episodes import View
+from innerattn.scripted import View, scripted_policy
 
 IMAGES = Path(__file__).parent / "images"
 SEED = 99
@@ -22,7 +21,7 @@ def main() -> None:
     with BatchEnv(scenario, 1, seed=SEED) as env:
         obs = env.reset()
         for _ in range(STEPS):
-            view = View(obs, env.positions(), env.velocities(), env.victims())
+            view = View.of(env, obs)
             obs = env.step(policy.act(view)).obs
         picture = draw_world(
             scenario,

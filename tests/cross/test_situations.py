@@ -6,8 +6,8 @@ from scipy import stats
 
 from innerattn.config import Obstacle, Scenario, Task
 from innerattn.envs import BatchEnv
-from innerattn.evaluate.dispatch import HungarianPolicy
-from innerattn.evaluate.episodes import View
+from innerattn.scripted import View
+from innerattn.scripted.dispatch import HungarianPolicy
 
 LEAST_P = 1e-3
 WORLDS = 4000

@@ -8,8 +8,8 @@ import pytest
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.evaluate import episodes
-from innerattn.evaluate.dispatch import scripted_policy
-from innerattn.evaluate.episodes import FIELDS, Record, View, run_episodes
+from innerattn.evaluate.episodes import FIELDS, Record, run_episodes
+from innerattn.scripted import View, scripted_policy
 
 
 def record_of(name: str, scenario: Scenario, count: int, **options: object) -> Record:
@@ -39,7 +39,7 @@ def test_record_against_a_plain_loop() -> None:
     events = []
     total = np.zeros((6, 4, 4))
     for t in range(12):
-        seen = View(obs, env.positions(), env.velocities(), env.victims())
+        seen = View.of(env, obs)
         actions = policy.act(seen)
         for name, value in [*seen._asdict().items(), ("actions", actions)]:
             np.testing.assert_array_equal(record.steps[name][:, t], value)

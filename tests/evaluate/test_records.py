@@ -10,9 +10,9 @@ import pytest
 
 from innerattn.config import Scenario
 from innerattn.errors import RunError
-from innerattn.evaluate.dispatch import scripted_policy
 from innerattn.evaluate.episodes import FIELDS, Record, run_episodes
 from innerattn.evaluate.records import read_records, write_records
+from innerattn.scripted import scripted_policy
 
 
 @pytest.fixture(scope="module")

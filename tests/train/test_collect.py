@@ -6,8 +6,7 @@ from torch import Tensor
 
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
-from innerattn.evaluate.dispatch import scripted_policy
-from innerattn.evaluate.episodes import View
+from innerattn.scripted import View, scripted_policy
 from innerattn.train.collect import Collector
 
 
@@ -23,7 +22,7 @@ class Scripted:
         assert not greedy  # training explores
         self.seen.append(obs)
         env = self.env
-        view = View(obs.numpy(), env.positions(), env.velocities(), env.victims())
+        view = View.of(env, obs.numpy())
         return torch.from_numpy(self.policy.act(view))
 
 

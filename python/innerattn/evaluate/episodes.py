@@ -9,45 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
+from innerattn.scripted import Policy, View
 
 FIELDS = ("obs", "actions", "rewards", "positions", "velocities", "victims", "attention")
 """What can be recorded step by step."""
 
 _WORLDS_AT_ONCE = 1024
-
-
-class View(NamedTuple):
-    """What a policy may look at before it acts: the robots' observations and the true state.
-
-    Attributes:
-        obs: (E, R, D) float32.
-        positions: (E, R, 2) float32 [m].
-        velocities: (E, R, 2) float32 [m/s].
-        victims: (E, V) structured: present, task, id, appeared_step, x, y [m].
-    """
-
-    obs: NDArray[np.float32]
-    positions: NDArray[np.float32]
-    velocities: NDArray[np.float32]
-    victims: NDArray[np.void]
-
-
-class Policy(Protocol):
-    """Anything that drives a team."""
-
-    @property
-    def name(self) -> str:
-        """What to call it in tables."""
-
-    def act(self, view: View) -> NDArray[Any]:
-        """Choose actions: (E, R) integers, or (E, R, 2) float32 where actions are continuous."""
 
 
 @runtime_checkable
@@ -156,7 +130,7 @@ def _run_batch(
     steps: dict[str, NDArray[Any]] = {}
     events = []
     for step_index in range(total_steps):
-        view = View(obs, env.positions(), env.velocities(), env.victims())
+        view = View.of(env, obs)
         actions = policy.act(view)
         seen: dict[str, NDArray[Any]] = {**view._asdict(), "actions": actions}
         if "attention" in record and isinstance(policy, Attentive):

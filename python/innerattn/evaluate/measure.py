@@ -12,11 +12,11 @@ from pathlib import Path
 
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
-from innerattn.evaluate.dispatch import SCRIPTED, scripted_policy
-from innerattn.evaluate.episodes import FIELDS, Policy, Record, run_episodes
+from innerattn.evaluate.episodes import FIELDS, Record, run_episodes
 from innerattn.evaluate.records import write_records
 from innerattn.evaluate.summary import Summary, summarise
 from innerattn.evaluate.trained import load_trained
+from innerattn.scripted import SCRIPTED, Policy, scripted_policy
 from innerattn.train.build import thread_count, torch_threads
 
 ProgressCall = Callable[[int, int], None]

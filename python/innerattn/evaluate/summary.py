@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from innerattn.evaluate.attention import Entropy, entropy_of
 from innerattn.evaluate.cooperation import count_cooperation, count_pairs, pair_rates
-from innerattn.evaluate.dispatch import SCRIPTED
 from innerattn.evaluate.episodes import Record
 from innerattn.evaluate.statistics import Interval, mean_interval, score_interval
+from innerattn.scripted import SCRIPTED
 
 SCHEMA_VERSION = 1
 

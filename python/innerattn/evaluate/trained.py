@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from innerattn.config import RunConfig, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
-from innerattn.evaluate.episodes import View
 from innerattn.learn.types import Learner
+from innerattn.scripted import View
 from innerattn.train import load_policy
 
 

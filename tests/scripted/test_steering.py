@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from innerattn.config import Scenario
-from innerattn.evaluate.steering import NEVER_S, Steering
+from innerattn.scripted.steering import NEVER_S, Steering
 
 SCENARIO = Scenario.preset("mixed")
 DIRECTIONS = [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)]

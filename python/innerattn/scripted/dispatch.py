@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 from innerattn.errors import ConfigError
-from innerattn.evaluate.assignment import Needs, assign, pair_costs
-from innerattn.evaluate.episodes import Policy, View
-from innerattn.evaluate.steering import Steering
+from innerattn.scripted.assignment import Needs, assign, pair_costs
+from innerattn.scripted.policy import Policy, View
+from innerattn.scripted.steering import Steering
 
 
 class RandomPolicy:

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 from innerattn.config import Robot, Scenario, Task
-from innerattn.evaluate import assignment
-from innerattn.evaluate.assignment import FORBIDDEN, Needs, assign, pair_costs
+from innerattn.scripted import assignment
+from innerattn.scripted.assignment import FORBIDDEN, Needs, assign, pair_costs
 
 
 def priced(cost: np.ndarray, chosen: np.ndarray) -> tuple[int, float]:

@@ -5,14 +5,15 @@ import pytest
 
 from innerattn.config import Scenario
 from innerattn.errors import ConfigError
-from innerattn.evaluate.dispatch import (
+from innerattn.evaluate.episodes import run_episodes
+from innerattn.scripted import View
+from innerattn.scripted.dispatch import (
     SCRIPTED,
     GreedyPolicy,
     HungarianPolicy,
     RandomPolicy,
     scripted_policy,
 )
-from innerattn.evaluate.episodes import View, run_episodes
 
 VICTIM = np.dtype([("present", "?"), ("task", "i8"), ("x", "f4"), ("y", "f4")])
 
