@@ -1,4 +1,4 @@
-"""Everything that a training run needs, in six sections; a run is repeated from it alone.
+"""Everything that a training run needs, in seven sections; a run is repeated from it alone.
 
 Ranges of the sections below live here; those of a scenario live in the compiled module.
 """
@@ -19,6 +19,7 @@ BUDGETS = preset_names("budgets")
 
 Method = Literal["td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo"]
 Attention = Literal["inner", "uniform", "none"]
+WarmStart = Literal["none", "hungarian", "greedy"]
 
 
 class _Kind(NamedTuple):
@@ -174,12 +175,42 @@ class PPOConfig(Model):
     )
 
 
+class ImitationConfig(Model):
+    """How a warm start imitates a scripted policy, before anything is learnt from rewards."""
+
+    place: ClassVar[str] = "imitation"
+
+    env_steps: int = Field(
+        1_500_000, ge=1, description="length of imitation, all worlds counted [env-steps]"
+    )
+    critic_env_steps: int = Field(
+        200_000, ge=0, description="last part of it in which the critic learns too [env-steps]"
+    )
+    batch_size: int = Field(1_024, ge=1, description="labelled states per step of the actors")
+    update_every_env_steps: int = Field(
+        512, ge=1, description="one step of the actors per so many steps [env-steps]"
+    )
+    learning_rate: float = Field(0.001, gt=0.0, le=1.0, description="step size of Adam")
+    final_learning_rate_share: float = Field(
+        0.1,
+        ge=0.0,
+        le=1.0,
+        description="share of the step size left at the end of imitation; it falls evenly",
+    )
+    memory_env_steps: int = Field(
+        500_000, ge=1, description="newest labelled states that batches are drawn from [env-steps]"
+    )
+
+
 class TrainConfig(Model):
     """How long to train, where, and how often to log."""
 
     place: ClassVar[str] = "train"
 
     method: Method = Field("td-inner", description="learning algorithm and kind of critic")
+    warm_start: WarmStart = Field(
+        "none", description="scripted policy to imitate before learning from rewards"
+    )
     seed: int = Field(0, ge=0, lt=2**63, description="seed of everything random")
     device: str = Field("cpu", description="where networks run: cpu, cuda, cuda:0, ...")
     threads: int | None = Field(
@@ -193,7 +224,7 @@ class TrainConfig(Model):
     )
     num_envs: int = Field(64, ge=1, le=1_000_000, description="worlds stepped side by side")
     env_steps: int = Field(
-        150_000, ge=1, description="length of training, all worlds counted [env-steps]"
+        150_000, ge=1, description="length of learning from rewards, all worlds counted [env-steps]"
     )
     log_every_env_steps: int = Field(
         5_000, ge=1, description="one line of metrics per so many steps [env-steps]"
@@ -233,6 +264,9 @@ class RunConfig(Model):
     network: NetworkConfig = Field(default_factory=NetworkConfig, description="the networks")
     td: TDConfig = Field(default_factory=TDConfig, description="numbers of the TD methods")
     ppo: PPOConfig = Field(default_factory=PPOConfig, description="numbers of the PPO methods")
+    imitation: ImitationConfig = Field(
+        default_factory=ImitationConfig, description="numbers of a warm start"
+    )
     train: TrainConfig = Field(default_factory=TrainConfig, description="the run")
     evaluate: EvaluateConfig = Field(default_factory=EvaluateConfig, description="measuring")
 

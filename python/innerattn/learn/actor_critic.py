@@ -5,6 +5,7 @@ It acts, reports attention, saves and loads; when and how to update is each lear
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -47,6 +48,7 @@ class ActorCritic:
     Attributes:
         actor: The trained policies.
         critic: The trained critics.
+        actor_frozen: While set, updates leave the policies as they are; see `Learner`.
     """
 
     _step: Callable[..., Tensor]
@@ -111,6 +113,7 @@ class ActorCritic:
         else:
             critic = Critic(*team, attention, weights, critic_outputs)
         self.critic = critic.to(device, dtype)
+        self.actor_frozen = False
         self._actor_descent = Descent(self.actor, learning_rate, weight_decay=0.0)
         self._critic_descent = Descent(self.critic, learning_rate, critic_weight_decay)
         self._values = {
@@ -137,6 +140,20 @@ class ActorCritic:
         else:
             actions = sample_actions(logits, self._draw(logits.shape))
         return actions.t().contiguous().to(obs.device)
+
+    def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
+        """Step the policies towards given actions; see `Learner.imitate`."""
+        seen, wanted = self._robots_first(obs), actions.to(self._device).t()
+
+        def loss_of(actor: Network) -> tuple[Tensor, Tensor]:
+            loss = -losses.taken(actor(seen).log_softmax(dim=1), wanted).mean(dim=1)
+            return loss.sum(), loss.detach().mean()
+
+        own_rate = self._actor_descent.learning_rate
+        self._actor_descent.set_learning_rate(learning_rate)
+        _, loss = self._step_actor(loss_of, self._rate(), math.inf)
+        self._actor_descent.set_learning_rate(own_rate)
+        return float(loss)
 
     def reach(self, share: float) -> None:
         """Let the step size fall evenly from its first to its final value; see `Learner.reach`."""
@@ -241,7 +258,10 @@ class ActorCritic:
     ) -> tuple[Tensor, Kept]:
         """A step of the actors, each robot clipped alone; the norms (R,) before clipping."""
         return self._actor_descent.step(
-            loss_of, lambda gradients: clip_each_robot(gradients, limit), rate
+            loss_of,
+            lambda gradients: clip_each_robot(gradients, limit),
+            rate,
+            frozen=self.actor_frozen,
         )
 
     def _draw(self, shape: tuple[int, ...]) -> Tensor:

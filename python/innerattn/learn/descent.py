@@ -71,6 +71,8 @@ class Descent:
         loss_of: Callable[[Network], tuple[Tensor, Kept]],
         clip: Clip,
         learning_rate: Tensor,
+        *,
+        frozen: bool = False,
     ) -> tuple[Tensor, Kept]:
         """Step down the gradient of a loss.
 
@@ -80,12 +82,13 @@ class Descent:
             clip: Scales gradients, by name of the parameter, in place; returns norms before that.
             learning_rate: () the step size, as `learning_rate` has it; a compiled update needs it
                 as a tensor, because it would be compiled anew for another number.
+            frozen: Leave the network as it is.
 
         Returns:
             The norms, and what else ``loss_of`` gave.
         """
         if torch.compiler.is_compiling():
-            return self._compiled_step(loss_of, clip, learning_rate)
+            return self._compiled_step(loss_of, clip, learning_rate, frozen)
         names, parameters = zip(*self._trained.items(), strict=True)
         with torch.enable_grad():
             loss, kept = loss_of(self.network)
@@ -94,7 +97,8 @@ class Descent:
         norms = clip(dict(zip(names, found, strict=True)))
         for parameter, gradient in zip(parameters, found, strict=True):
             parameter.grad = gradient
-        self.adam.step()
+        if not frozen:
+            self.adam.step()
         return norms, kept
 
     def _compiled_step(
@@ -102,13 +106,14 @@ class Descent:
         loss_of: Callable[[Network], tuple[Tensor, Kept]],
         clip: Clip,
         learning_rate: Tensor,
+        frozen: bool,
     ) -> tuple[Tensor, Kept]:
         def loss_at(values: dict[str, Tensor]) -> tuple[Tensor, Kept]:
             return loss_of(lambda *inputs: functional_call(self.network, values, inputs))
 
         gradients, kept = grad(loss_at, has_aux=True)(self._values)
         norms = clip(gradients)
-        for name, value in self._values.items():
+        for name, value in self._values.items() if not frozen else ():
             moments = self.moments[name]
             gradient = gradients[name] + self._weight_decay * value
             step = moments["step"].add_(1.0)

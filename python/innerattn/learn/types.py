@@ -40,7 +40,13 @@ class Transitions(NamedTuple):
 
 
 class Learner(Protocol):
-    """A policy that improves from what it is shown."""
+    """A policy that improves from what it is shown.
+
+    Attributes:
+        actor_frozen: While set, `learn` trains all but the policy.
+    """
+
+    actor_frozen: bool
 
     def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
         """Choose actions.
@@ -59,6 +65,20 @@ class Learner(Protocol):
         Args:
             batch: The E transitions.
             truncated: (E,) bool, episodes that a time limit ended.
+        """
+
+    def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
+        """Do one step of Adam towards given actions, and nothing else.
+
+        The step goes down the cross-entropy -mean_b log pi_i(a_bi | o_bi), summed over robots i.
+
+        Args:
+            obs: (B, R, D) float32.
+            actions: (B, R) int64.
+            learning_rate: Step size.
+
+        Returns:
+            The cross-entropy before the step, its mean over robots [nats].
         """
 
     def reach(self, share: float) -> None:

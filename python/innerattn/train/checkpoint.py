@@ -51,6 +51,7 @@ class RunInfo:
     seconds: float
     compiled: bool = False
     products: str = "default"
+    warm_start: str = "none"
 
 
 class RunFolder:
@@ -89,6 +90,7 @@ class RunFolder:
             env_steps=0,
             updates=0,
             seconds=0.0,
+            warm_start=config.train.warm_start,
         )
         partial = path.with_name(f".{path.name}.{os.getpid()}")
         try:

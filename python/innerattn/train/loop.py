@@ -1,14 +1,15 @@
-"""The training loop: collect, learn, log, until the budget is spent; then save and stop.
+"""The training loop: imitate if asked to, then collect, learn, log; save when the budget is spent.
 
 It knows no algorithm, only the `Learner` protocol, and does not evaluate.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import torch
 
@@ -24,6 +25,7 @@ from innerattn.train.build import (
 from innerattn.train.checkpoint import RunFolder, State, refuse_existing
 from innerattn.train.collect import Collector
 from innerattn.train.compilation import compiles
+from innerattn.train.imitate import Imitation
 from innerattn.train.metrics import (
     Interval,
     Metrics,
@@ -33,21 +35,28 @@ from innerattn.train.metrics import (
 )
 from innerattn.train.products import best_products
 
+Stage = Literal["imitating", "training"]
+Step = Callable[[float], tuple[Transitions, Mapping[str, float] | None]]
+"""One control step of all worlds, given the share of the stage that is done; what was seen, and
+figures by name."""
+
 
 @dataclass(frozen=True)
 class Progress:
     """How far training is; reported after every control step."""
 
     env_steps: int
-    """Steps done, all worlds counted."""
+    """Steps done in this stage, all worlds counted."""
     total_env_steps: int
-    """Steps to do."""
+    """Steps to do in this stage."""
     updates: int
-    """Updates done."""
+    """Updates done in this stage; steps of imitation do not count."""
     seconds: float
-    """Time since training began [s]."""
+    """Time since this stage began [s]."""
     metrics: Metrics | None
     """The newest line of metrics, if there is one yet."""
+    stage: Stage = "training"
+    """A warm start imitates first; training is learning from rewards."""
 
 
 def train(
@@ -88,8 +97,11 @@ def train(
             compiled = compiles(config)
             if compiled:
                 learner.compile()
+            warm = config.train.warm_start != "none"
+            imitation = Imitation(config, env, learner, collector) if warm else None
             folder = RunFolder.create(path, config, threads, compiled, products)
-            _Loop(config, folder, learner, collector, env.robot_names, progress).run()
+            loop = _Loop(config, folder, learner, collector, env.robot_names, progress)
+            loop.run(imitation)
     return path
 
 
@@ -116,15 +128,16 @@ class _Loop:
         self._metrics: Metrics | None = None
         self._env_steps = 0
 
-    def run(self) -> None:
-        """Run to the end of the budget.
+    def run(self, imitation: Imitation | None) -> None:
+        """Imitate, if that is asked for, and learn to the end of the budget.
 
         Whatever ends the run early is written down; only what a user interrupts is worth keeping
         the weights of.
         """
         try:
-            while self._env_steps < self._config.env_steps:
-                self._step()
+            if imitation is not None:
+                self._do("imitating", imitation.env_steps, imitation.step)
+            self._do("training", self._config.env_steps, self._step)
             self._save()
             self._mark("done")
         except KeyboardInterrupt:
@@ -137,29 +150,37 @@ class _Loop:
             self._mark("interrupted")
             raise
 
-    def _step(self) -> None:
+    def _do(self, stage: Stage, total: int, step: Step) -> None:
+        """Repeat ``step`` until ``total`` env-steps are done."""
+        done, updates, began = 0, self._learner.updates, self._interval.seconds
+        every = self._config.log_every_env_steps
+        while done < total:
+            newest, figures = step(done / total)
+            before = self._env_steps
+            self._env_steps += self._config.num_envs
+            done += self._config.num_envs
+            refuse_divergence({"losses": figures or {}}, self._env_steps)
+            self._interval.add_losses(figures or {})
+            if done >= total or before // every < self._env_steps // every:
+                self._log(newest)
+            if self._progress is not None:
+                self._progress(
+                    Progress(
+                        env_steps=done,
+                        total_env_steps=total,
+                        updates=self._learner.updates - updates,
+                        seconds=self._interval.seconds - began,
+                        metrics=self._metrics,
+                        stage=stage,
+                    )
+                )
+
+    def _step(self, share: float) -> tuple[Transitions, dict[str, float] | None]:
+        """Collect and learn, with ``share`` of the budget spent."""
         transitions, truncated = self._collector.step()
         self._learner.observe(transitions, truncated)
-        self._learner.reach(min(self._env_steps / self._config.env_steps, 1.0))
-        losses = self._learner.learn() or {}
-        before = self._env_steps
-        self._env_steps += self._config.num_envs
-        refuse_divergence({"losses": losses}, self._env_steps)
-        self._interval.add_losses(losses)
-        every = self._config.log_every_env_steps
-        last = self._env_steps >= self._config.env_steps
-        if last or before // every < self._env_steps // every:
-            self._log(transitions)
-        if self._progress is not None:
-            self._progress(
-                Progress(
-                    env_steps=self._env_steps,
-                    total_env_steps=self._config.env_steps,
-                    updates=self._learner.updates,
-                    seconds=self._interval.seconds,
-                    metrics=self._metrics,
-                )
-            )
+        self._learner.reach(share)
+        return transitions, self._learner.learn()
 
     def _log(self, newest: Transitions) -> None:
         weights = self._learner.attention(newest.obs, newest.actions)

@@ -1,0 +1,103 @@
+"""Imitation of a scripted policy before learning from rewards: DAgger, after Ross et al. 2011.
+
+The learner drives the worlds itself and meets its own mistakes; a script, which sees the true
+state, says what it would have done there. It knows no algorithm, only the `Learner` protocol.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from innerattn.config import RunConfig
+from innerattn.envs import BatchEnv
+from innerattn.learn.types import Learner, Transitions
+from innerattn.scripted import View, scripted_policy
+from innerattn.train.collect import Collector
+
+
+class Imitation:
+    """One learner on its way to play like a script."""
+
+    def __init__(
+        self, config: RunConfig, env: BatchEnv, learner: Learner, collector: Collector
+    ) -> None:
+        """Get ready to imitate `train.warm_start`; ``collector`` steps ``learner`` in ``env``.
+
+        Raises:
+            ConfigError: no such script.
+        """
+        self._config = config.imitation
+        self._script = scripted_policy(config.train.warm_start, env.scenario)
+        self._env, self._learner, self._collector = env, learner, collector
+        capacity = min(self._config.memory_env_steps, self._config.env_steps + env.num_envs)
+        self._memory = _Memory(capacity, config.train.seed)
+        self._unpaid_env_steps = 0
+
+    @property
+    def env_steps(self) -> int:
+        """How long to imitate, all worlds counted."""
+        return self._config.env_steps
+
+    def step(self, share: float) -> tuple[Transitions, dict[str, float]]:
+        """One control step of all worlds, and the steps of the actors that it makes due.
+
+        Args:
+            share: Part of the imitation that is done, 0 to 1.
+
+        Returns:
+            The transitions, and figures by name: `agreement`, the share of the actions now drawn
+            that are the script's; `imitation_loss` [nats], the mean over the actors' steps, if
+            there were any; the learner's own, where its critic learnt.
+        """
+        wanted = torch.from_numpy(self._script.act(View.of(self._env, self._env.observe())))
+        transitions, truncated = self._collector.step()
+        self._memory.add(transitions.obs, wanted)
+        figures = {"agreement": float((transitions.actions.cpu() == wanted).float().mean())}
+        losses = self._imitate(share)
+        if losses:
+            figures["imitation_loss"] = sum(losses) / len(losses)
+        if (1.0 - share) * self._config.env_steps <= self._config.critic_env_steps:
+            self._learner.observe(transitions, truncated)
+            self._learner.actor_frozen = True
+            figures |= self._learner.learn() or {}
+            self._learner.actor_frozen = False
+        return transitions, figures
+
+    def _imitate(self, share: float) -> list[float]:
+        """Do the steps of the actors that are due; their losses."""
+        config = self._config
+        self._unpaid_env_steps += self._env.num_envs
+        due, self._unpaid_env_steps = divmod(self._unpaid_env_steps, config.update_every_env_steps)
+        rate = config.learning_rate * (1.0 - (1.0 - config.final_learning_rate_share) * share)
+        return [
+            self._learner.imitate(*self._memory.sample(config.batch_size), rate) for _ in range(due)
+        ]
+
+
+class _Memory:
+    """The newest labelled states, drawn uniformly with replacement."""
+
+    def __init__(self, capacity: int, seed: int) -> None:
+        self._capacity = capacity
+        self._seen = 0
+        self._obs = self._actions = torch.empty(0)
+        number = np.random.SeedSequence([seed, 1]).generate_state(1, np.uint64)[0]
+        self._generator = torch.Generator().manual_seed(int(number))
+
+    def add(self, obs: Tensor, actions: Tensor) -> None:
+        """Keep states (E, R, D) and what the script would do there (E, R)."""
+        if not self._seen:
+            self._obs = torch.empty(self._capacity, *obs.shape[1:])
+            self._actions = torch.empty(self._capacity, *actions.shape[1:], dtype=torch.uint8)
+        place = (self._seen + torch.arange(len(obs))) % self._capacity
+        self._obs[place] = obs.cpu()
+        self._actions[place] = actions.to(torch.uint8)
+        self._seen += len(obs)
+
+    def sample(self, count: int) -> tuple[Tensor, Tensor]:
+        """States (B, R, D) float32 and actions (B, R) int64."""
+        held = min(self._seen, self._capacity)
+        rows = torch.randint(held, (count,), generator=self._generator)
+        return self._obs[rows], self._actions[rows].long()
