@@ -1,6 +1,7 @@
 """The bar on a terminal, plain lines elsewhere."""
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
@@ -51,6 +52,24 @@ def test_terminal_shows_a_bar() -> None:
     assert "50%" in text
     assert "1:30 left" in text
     assert "0.6 updates/s" in text  # the whole line fits
+
+
+def test_imitation_is_a_stage_of_its_own() -> None:
+    imitating = replace(
+        progress(15.0, 250),
+        stage="imitating",
+        metrics={"rescues_per_episode": None, "losses": {"agreement": 0.82}},
+    )
+    training = replace(progress(10.0, 500), updates=20)
+    out = io.StringIO()
+    seconds = iter([0.0, 15.0, 15.0, 45.0, 45.0])
+    with Training(Console(file=out, width=120), clock=lambda: next(seconds)) as show:
+        show(imitating)
+        show(training)
+    assert out.getvalue().splitlines() == [
+        "imitating  25% | 0:45 left | no episode yet | 17 env-steps/s | 82% as the script",
+        "training  50% | 0:10 left | 1.50 rescues/episode | 50 env-steps/s | 2.0 updates/s",
+    ]
 
 
 def test_evaluation_counts_episodes() -> None:

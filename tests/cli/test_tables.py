@@ -76,6 +76,13 @@ def test_one_row_per_policy() -> None:
     assert rows["episodes"] == ["1,000", "1,000"]
 
 
+def test_a_warm_start_is_named() -> None:
+    warm = replace(summary(), warm_start="greedy")
+    text = " ".join(cell for row in printed(warm) for cell in row)
+    assert "td-inner was warm-started from greedy" in text
+    assert "warm" not in " ".join(cell for row in printed(summary()) for cell in row)
+
+
 def test_a_scripted_policy_has_one_row() -> None:
     names = [row[0] for row in printed(summary("greedy")) if row]
     assert names.count("greedy") == 1

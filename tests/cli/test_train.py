@@ -43,6 +43,22 @@ def test_options_reach_the_run(run_dir: Path) -> None:
     assert config == expected
 
 
+def test_a_warm_start_is_reported_apart(
+    tmp_path: Path, tiny: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    warm = ["--warm-start", "hungarian", "--imitation.env-steps", "200", "--imitation.batch-size"]
+    path = tmp_path / "run"
+    assert main(["train", "--run-dir", str(path), *tiny, *warm, "32"]) == 0
+    printed = capsys.readouterr().out
+    assert "Imitating hungarian first: 200 env-steps" in printed
+    assert "td-inner was warm-started from hungarian" in printed
+    assert json.loads((path / "run.json").read_text())["warm_start"] == "hungarian"
+    assert json.loads((path / "evaluation" / "summary.json").read_text())["warm_start"] == (
+        "hungarian"
+    )
+    assert tomllib.loads((path / "config.toml").read_text())["train"]["warm_start"] == "hungarian"
+
+
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[RunConfig, Path]]:
     """What training was asked for; it is noted, and not done."""
@@ -65,6 +81,12 @@ def test_defaults(asked: list[tuple[RunConfig, Path]]) -> None:
     config, run_dir = config_of(asked)
     assert config == load_run_config("mixed", "td-inner", "quick")
     assert re.fullmatch(r"runs/mixed-td-inner-quick-s0-\d{8}-\d{6}", run_dir.as_posix())
+
+
+def test_the_name_of_a_run_tells_its_warm_start(asked: list[tuple[RunConfig, Path]]) -> None:
+    config, run_dir = config_of(asked, "--method", "ppo-inner", "--warm-start", "greedy")
+    assert config.train.warm_start == "greedy"
+    assert run_dir.name.startswith("mixed-ppo-inner-from-greedy-quick-s0-")
 
 
 def test_sources_and_their_order(asked: list[tuple[RunConfig, Path]], tmp_path: Path) -> None:

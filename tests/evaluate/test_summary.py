@@ -91,6 +91,7 @@ def test_document() -> None:
     assert {
         "policy": "runs/x",
         "method": "td-inner",
+        "warm_start": "none",
         "situation": "double",
         "episodes": 2,
         "episode_steps": 25,

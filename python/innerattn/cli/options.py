@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from innerattn.config import RunConfig
 from innerattn.errors import InnerattnError
 
-_SHORT = ("method", "seed", "device", "compile")
+_SHORT = ("method", "warm_start", "seed", "device", "compile")
 """Keys of the section `train` that are options by their last word too."""
 
 _FILE_ONLY = frozenset({"scenario.robots", "scenario.tasks", "scenario.obstacles"})

@@ -81,15 +81,25 @@ class Training(Work):
     title = "training"
 
     def __call__(self, progress: TrainProgress) -> None:
-        """Show how far training is."""
+        """Show how far this stage of training is."""
+        if progress.stage != self.title:
+            self.title = progress.stage
+            self._start = self._clock() - progress.seconds
         seconds = max(progress.seconds, 1e-9)
         rescues = progress.metrics["rescues_per_episode"] if progress.metrics else None
         parts = [
             "no episode yet" if rescues is None else f"{rescues:.2f} rescues/episode",
             f"{progress.env_steps / seconds:,.0f} env-steps/s",
-            f"{progress.updates / seconds:,.1f} updates/s",
+            _agreement(progress)
+            if progress.stage == "imitating"
+            else f"{progress.updates / seconds:,.1f} updates/s",
         ]
         self.show(progress.env_steps, progress.total_env_steps, " | ".join(parts))
+
+
+def _agreement(progress: TrainProgress) -> str:
+    losses = progress.metrics["losses"] if progress.metrics else {}
+    return f"{losses['agreement']:.0%} as the script" if "agreement" in losses else "no figure yet"
 
 
 class Evaluating(Work):

@@ -37,6 +37,11 @@ def print_summary(console: Console, summary: Summary, scenario: Scenario) -> Non
     console.print(f"\nRescues per episode, situation {summary.situation}", style="bold")
     console.print(_rescues(summary))
     console.print(_KEY)
+    if summary.warm_start != "none":
+        console.print(
+            f"  {summary.method} was warm-started from {summary.warm_start}: it imitated that "
+            f"script,\n  then learnt from rewards\n"
+        )
     if any(summary.cooperation.values()):
         console.print(
             f"Who helped where several robots could: rescues in {summary.episodes:,} episodes "

@@ -69,7 +69,7 @@ class _Train(_Sources):
 
     run_dir: Path | None = None
     """Folder to make for the run; with --seeds one for each, RUN_DIR-s0, RUN_DIR-s1, ...; None:
-    runs/PRESET-METHOD-BUDGET-sSEED-TIME."""
+    runs/SITUATION-METHOD[-from-SCRIPT]-BUDGET-sSEED-TIME."""
     seeds: str | None = None
     """Train one run per seed, instead of --seed: 0..4 (both ends), 0,3,7 or 0..2,7.
     As many go side by side as there are cores, with one thread each unless --train.threads is
@@ -145,8 +145,9 @@ class _Train(_Sources):
 
     def _new_run_dir(self, config: RunConfig, stamp: str) -> Path:
         train = config.train
-        name = f"{config.scenario.situation}-{train.method}-{self.budget}-s{train.seed}-{stamp}"
-        return Path("runs") / name
+        warm = "" if train.warm_start == "none" else f"-from-{train.warm_start}"
+        name = f"{config.scenario.situation}-{train.method}{warm}-{self.budget}"
+        return Path("runs") / f"{name}-s{train.seed}-{stamp}"
 
 
 def _stamp() -> str:
@@ -154,9 +155,12 @@ def _stamp() -> str:
 
 
 def _what(config: RunConfig) -> str:
-    train = config.train
+    train, begin = config.train, "Training"
+    if train.warm_start != "none":
+        steps = f"{config.imitation.env_steps:,} env-steps"
+        begin = f"Imitating {train.warm_start} for {steps}, then training"
     return (
-        f"Training {train.method} on {config.scenario.situation}: "
+        f"{begin} {train.method} on {config.scenario.situation}: "
         f"{train.env_steps:,} env-steps in {train.num_envs} worlds"
     )
 

@@ -47,6 +47,7 @@ def evaluate_policy(
     settings: EvaluateConfig,
     *,
     label: str | None = None,
+    warm_start: str = "none",
     num_threads: int | None = None,
     progress: ProgressCall | None = None,
 ) -> Evaluation:
@@ -59,6 +60,7 @@ def evaluate_policy(
         scenario: the worlds.
         settings: how many episodes, how long, and the seed.
         label: what the policy was asked for as; none: its name.
+        warm_start: the scripted policy that its training began by imitating, or "none".
         num_threads: threads that step the worlds; none: all cores.
         progress: called each time some episodes are done.
     """
@@ -99,7 +101,8 @@ def evaluate_policy(
             standard[name] = [run(chosen, scenario, scored, 0, ())]
         long[name] = [run(chosen, long_worlds, settings.long_episodes, 0, ())]
     parts = [record for group in (standard, long) for all_ in group.values() for record in all_]
-    return Evaluation(summarise(label or policy.name, recorded, standard, long), tuple(parts))
+    summary = summarise(label or policy.name, recorded, standard, long, warm_start)
+    return Evaluation(summary, tuple(parts))
 
 
 def evaluate_run(
@@ -129,6 +132,7 @@ def evaluate_run(
             scenario or config.scenario,
             settings or config.evaluate,
             label=Path(run).resolve().name,
+            warm_start=config.train.warm_start,
             num_threads=config.train.threads,
             progress=progress,
         )

@@ -54,6 +54,7 @@ class Summary:
         cooperation_rates: eq. 5 by robot i and teammate j, for robots i that helped at all.
         attention_entropy: by robot and head [nats]; empty where there is no attention.
         attention_entropy_share: the same as a share of ln(R - 1); None below three robots.
+        warm_start: the scripted policy that training began by imitating, or "none".
     """
 
     policy: str
@@ -67,6 +68,7 @@ class Summary:
     cooperation_rates: dict[str, dict[str, float]]
     attention_entropy: dict[str, list[float]]
     attention_entropy_share: dict[str, list[float | None]]
+    warm_start: str = "none"
 
     def to_json(self) -> dict[str, Any]:
         """The document that `evaluate --json` and a run folder's summary.json hold."""
@@ -75,6 +77,7 @@ class Summary:
             "schema_version": SCHEMA_VERSION,
             "policy": self.policy,
             "method": self.method,
+            "warm_start": self.warm_start,
             "situation": self.situation,
             "episodes": self.episodes,
             "episode_steps": standard["episode_steps"],
@@ -96,6 +99,7 @@ def summarise(
     recorded: Record,
     standard: Mapping[str, Sequence[Record]],
     long: Mapping[str, Sequence[Record]],
+    warm_start: str = "none",
 ) -> Summary:
     """The figures of one policy.
 
@@ -105,6 +109,7 @@ def summarise(
         standard: by policy name, records of the standard length; holds ``recorded.policy`` and the
             scripted policies, all over the same worlds.
         long: the same for the second length.
+        warm_start: the scripted policy that training began by imitating, or "none".
     """
     scenario, names = recorded.scenario, recorded.robot_names
     entropy = entropy_of(recorded)
@@ -120,6 +125,7 @@ def summarise(
         cooperation_rates=_rates(recorded),
         attention_entropy=_rows(names, entropy),
         attention_entropy_share=_shares(names, entropy),
+        warm_start=warm_start,
     )
 
 
