@@ -85,6 +85,8 @@ def test_defaults(asked: list[tuple[RunConfig, Path]]) -> None:
 
 def test_the_name_of_a_run_tells_its_warm_start(asked: list[tuple[RunConfig, Path]]) -> None:
     config, run_dir = config_of(asked, "--method", "ppo-inner", "--warm-start", "greedy")
+    given = {"train.warm_start": "greedy"}
+    assert config == load_run_config(method="ppo-inner", overrides=given)
     assert config.train.warm_start == "greedy"
     assert run_dir.name.startswith("mixed-ppo-inner-from-greedy-quick-s0-")
 

@@ -84,6 +84,32 @@ def test_budgets_of_ppo_are_for_every_on_policy_method(budget: str) -> None:
         assert config.train.env_steps == configs[0].train.env_steps
 
 
+@pytest.mark.parametrize("budget", BUDGETS)
+def test_a_warm_start_has_numbers_of_its_own_for_ppo_alone(budget: str) -> None:
+    def changed(method: str) -> set[str]:
+        cold, warm = (
+            load_run_config("double", method, budget, overrides={"train.warm_start": script})
+            for script in ("none", "hungarian")
+        )
+        before, after = cold.model_dump(), warm.model_dump()
+        return {
+            f"{section}.{key}"
+            for section, table in before.items()
+            for key in table
+            if table[key] != after[section][key]
+        }
+
+    assert changed("td-inner") == {"train.warm_start"}
+    assert {"train.warm_start", "train.num_envs", "ppo.epochs"} <= changed("ppo-inner")
+
+
+def test_a_file_may_choose_a_warm_start(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text("[train]\nmethod = 'ppo-inner'\nwarm_start = 'greedy'\n")
+    given = {"train.warm_start": "greedy"}
+    assert load_run_config(config_file=file) == load_run_config(method="ppo-inner", overrides=given)
+
+
 def test_later_sources_win(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("[td]\ngamma = 0.5\nbatch_size = 7\n[train]\nmethod = 'td-uniform'\n")

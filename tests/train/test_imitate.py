@@ -99,7 +99,7 @@ def test_labels_are_of_the_states_that_the_learner_met(small_config: Configure) 
     assert min(ages) == 0
     assert 30 < max(ages) < 40
     rates = [rate for *_, rate in learner.lessons]
-    assert rates == pytest.approx(np.interp(range(1, 100, 2), [0, 100], [1e-3, 1e-4]))
+    assert rates == pytest.approx(np.interp(range(1, 100, 2), [0, 100], [2e-3, 4e-5]))
 
 
 def test_the_critic_learns_in_the_last_part_alone(small_config: Configure) -> None:

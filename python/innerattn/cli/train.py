@@ -18,7 +18,7 @@ from innerattn.cli.seeds import parse_seeds
 from innerattn.cli.several import Run, refuse_what_cannot_run, train_side_by_side
 from innerattn.cli.tables import print_seeds, print_summary
 from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
-from innerattn.config.run import Method
+from innerattn.config.run import Method, WarmStart
 from innerattn.cores import usable_cores
 
 if TYPE_CHECKING:
@@ -52,13 +52,15 @@ class _Choice(_Sources):
     """The options that must be known before all others, which take their defaults from them."""
 
     method: Annotated[Method | None, tyro.conf.arg(aliases=["--train.method"])] = None
+    warm_start: Annotated[WarmStart | None, tyro.conf.arg(aliases=["--train.warm-start"])] = None
     seed: Annotated[int | None, tyro.conf.arg(aliases=["--train.seed"])] = None
     seeds: str | None = None
 
     def defaults(self) -> RunConfig:
         if self.seed is not None and self.seeds is not None:
             raise UsageError(f"--seed {self.seed}, --seeds {self.seeds}: must be one of the two")
-        return self.load({} if self.method is None else {"train.method": self.method})
+        chosen = {"train.method": self.method, "train.warm_start": self.warm_start}
+        return self.load({key: value for key, value in chosen.items() if value is not None})
 
 
 @dataclass(kw_only=True)
@@ -85,7 +87,12 @@ class _Train(_Sources):
             InnerattnError: wrong configuration, or a run's folder exists.
             KeyboardInterrupt: the user stopped it; what was learnt is saved.
         """
-        overrides = {"train.method": self.defaults.train.method} | changed(self, self.defaults)
+        train = self.defaults.train
+        chosen: dict[str, object] = {
+            "train.method": train.method,
+            "train.warm_start": train.warm_start,
+        }
+        overrides = chosen | changed(self, self.defaults)
         console = Console(markup=False, highlight=False)
         if self.seeds is None:
             return self._train_one(console, self.load(overrides))

@@ -1,7 +1,7 @@
 """From presets, a file and single values to one `RunConfig`, and from there to TOML and back.
 
-Later sources win: scenario preset, budget, what the budget says for PPO, configuration file, single
-values.
+Later sources win: scenario preset, budget, what the budget says for PPO, what it says for PPO after
+a warm start, configuration file, single values.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ from innerattn.config.files import preset_table, toml_table, write_whole
 from innerattn.config.model import config_error
 from innerattn.config.run import RunConfig, on_policy
 from innerattn.errors import ConfigError
+
+_CHOOSING = ("method", "warm_start")
+"""Keys of the section `train` that choose among what a budget says."""
 
 
 def load_run_config(
@@ -42,16 +45,17 @@ def load_run_config(
     given: dict[str, Any] = {"train": {"method": method}}
     if config_file is not None:
         _merge(given, toml_table(config_file))
-    train = given["train"]
-    chosen = (overrides or {}).get(
-        "train.method", train.get("method") if isinstance(train, dict) else None
-    )
+    train = given["train"] if isinstance(given["train"], dict) else {}
+    single = overrides or {}
+    chosen = {name: single.get(f"train.{name}", train.get(name)) for name in _CHOOSING}
     table: dict[str, Any] = {"scenario": preset_table("scenarios", preset)}
     _merge(table, preset_table("budgets", budget))
-    if on_policy(chosen):
+    if on_policy(chosen["method"]):
         _merge(table, preset_table("budgets/ppo", budget))
+        if chosen["warm_start"] not in (None, "none"):
+            _merge(table, preset_table("budgets/ppo-warm", budget))
     _merge(table, given)
-    for key, value in (overrides or {}).items():
+    for key, value in single.items():
         section, dot, name = key.partition(".")
         if not dot or not isinstance(table.setdefault(section, {}), dict):
             raise ConfigError(f"{key}: unknown key; keys are written SECTION.KEY")

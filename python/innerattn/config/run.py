@@ -181,18 +181,18 @@ class ImitationConfig(Model):
     place: ClassVar[str] = "imitation"
 
     env_steps: int = Field(
-        1_500_000, ge=1, description="length of imitation, all worlds counted [env-steps]"
+        750_000, ge=1, description="length of imitation, all worlds counted [env-steps]"
     )
     critic_env_steps: int = Field(
-        200_000, ge=0, description="last part of it in which the critic learns too [env-steps]"
+        100_000, ge=0, description="last part of it in which the critic learns too [env-steps]"
     )
     batch_size: int = Field(1_024, ge=1, description="labelled states per step of the actors")
     update_every_env_steps: int = Field(
-        512, ge=1, description="one step of the actors per so many steps [env-steps]"
+        256, ge=1, description="one step of the actors per so many steps [env-steps]"
     )
-    learning_rate: float = Field(0.001, gt=0.0, le=1.0, description="step size of Adam")
+    learning_rate: float = Field(0.002, gt=0.0, le=1.0, description="step size of Adam")
     final_learning_rate_share: float = Field(
-        0.1,
+        0.02,
         ge=0.0,
         le=1.0,
         description="share of the step size left at the end of imitation; it falls evenly",
