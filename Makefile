@@ -15,7 +15,7 @@ train: setup ## train TD-innerATT on mixed rescue worlds, then evaluate it
 
 test: setup lint ## every check but the long one
 	cargo test --quiet
-	pytest
+	pytest -n auto
 
 test-slow: setup ## the long check: ten million env-steps of contacts
 	INNERATTN_SLOW=1 cargo test --quiet --test containment

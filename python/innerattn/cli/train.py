@@ -162,12 +162,11 @@ def _stamp() -> str:
 
 
 def _what(config: RunConfig) -> str:
-    train, begin = config.train, "Training"
+    train, first = config.train, ""
     if train.warm_start != "none":
-        steps = f"{config.imitation.env_steps:,} env-steps"
-        begin = f"Imitating {train.warm_start} for {steps}, then training"
+        first = f"Imitating {train.warm_start} first: {config.imitation.env_steps:,} env-steps\n"
     return (
-        f"{begin} {train.method} on {config.scenario.situation}: "
+        f"{first}Training {train.method} on {config.scenario.situation}: "
         f"{train.env_steps:,} env-steps in {train.num_envs} worlds"
     )
 
