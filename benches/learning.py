@@ -1,7 +1,7 @@
 """What methods learn: trains every missing run, one core each, and tabulates scores over seeds.
 
-`python benches/learning.py RUNS` fills its place in `docs/learning.md`. A second call goes on where
-the first stopped; a run that is there and done is not made again.
+`python benches/learning.py RUNS` fills its place in `docs/learning.md`, `--warm-start hungarian` another.
+A second call goes on where the first stopped; a run that is there and done is not made again.
 """
 
 from __future__ import annotations
@@ -20,17 +20,23 @@ from typing import Any
 
 from page import LEARNING, publish, table
 
+from innerattn.evaluate.statistics import student_interval
+
 PRESETS = ("mixed", "double", "single")
 
 
-def summary(runs: Path, preset: str, method: str, budget: str, seed: int) -> dict[str, Any]:
+def summary(
+    runs: Path, preset: str, method: str, script: str, budget: str, seed: int
+) -> dict[str, Any]:
     """The evaluation of a run, trained now if it is missing or was cut short."""
-    folder = runs / f"{preset}-{method}-{budget}-s{seed}"
+    begin = "" if script == "none" else f"-from-{script}"
+    folder = runs / f"{preset}-{method}{begin}-{budget}-s{seed}"
     record = folder / "evaluation" / "summary.json"
     if not record.exists():
         shutil.rmtree(folder, ignore_errors=True)
         command = ["innerattn", "train", "--preset", preset, "--method", method]
-        command += ["--budget", budget, "--seed", str(seed), "--train.threads", "1"]
+        command += ["--warm-start", script, "--budget", budget, "--seed", str(seed)]
+        command += ["--train.threads", "1"]
         environment = os.environ | {"OMP_NUM_THREADS": "1"}
         done = subprocess.run(
             [*command, "--run-dir", str(folder)], env=environment, capture_output=True, text=True
@@ -43,11 +49,15 @@ def summary(runs: Path, preset: str, method: str, budget: str, seed: int) -> dic
 
 
 def row(found: list[dict[str, Any]]) -> list[str]:
-    """Rescues per episode, score, score of long episodes: mean over seeds, and each seed's."""
+    """Rescues, score, score of long episodes: mean over seeds with interval, and each seed's."""
 
     def over_seeds(values: list[float]) -> str:
         each = ", ".join(f"{value:.2f}" for value in values)
-        return f"**{statistics.mean(values):.2f}** ({each})"
+        half = ""
+        if len(values) > 1:
+            interval = student_interval(values)
+            half = f" ± {interval.high - interval.mean:.2f}"
+        return f"**{statistics.mean(values):.2f}**{half} ({each})"
 
     return [
         over_seeds([one["rescues_per_episode"]["mean"] for one in found]),
@@ -60,6 +70,7 @@ def main() -> None:
     """Train what is missing and publish the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("runs", type=Path, help="folder of the runs")
+    parser.add_argument("--warm-start", default="none", choices=["none", "hungarian", "greedy"])
     parser.add_argument("--methods", nargs="+", default=["td-inner"])
     parser.add_argument("--budgets", nargs="+", default=["quick", "short"])
     parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2])
@@ -68,7 +79,9 @@ def main() -> None:
     cases = list(product(given.methods, given.budgets, PRESETS))
     with ThreadPoolExecutor(given.workers) as pool:
         runs = {
-            (case, seed): pool.submit(summary, given.runs, case[2], case[0], case[1], seed)
+            (case, seed): pool.submit(
+                summary, given.runs, case[2], case[0], given.warm_start, case[1], seed
+            )
             for case in cases
             for seed in given.seeds
         }
@@ -78,7 +91,8 @@ def main() -> None:
             for method, budget, preset in [case]
         ]
     head = ["", "rescues, 25 steps", "score, 25 steps", "score, 100 steps"]
-    publish("learning", table(head, rows), LEARNING)
+    section = "learning" if given.warm_start == "none" else "warm_start"
+    publish(section, table(head, rows), LEARNING)
 
 
 if __name__ == "__main__":
