@@ -64,6 +64,9 @@ class NetworkConfig(Model):
     mask_unavailable: bool = Field(
         False, description="keep unavailable teammates out of the attention"
     )
+    precision: Literal["float32", "bfloat16"] = Field(
+        "float32", description="of the products in an update; weights are float32 in any case"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -93,6 +93,7 @@ class ActorCritic:
             )
         self._availability_column = availability_column if network.mask_unavailable else None
         self._device, self._dtype = device, dtype
+        self._bfloat16 = network.precision == "bfloat16"
         self._learning_rate, self._final_share = learning_rate, final_learning_rate_share
         weights_seed, noise_seed, self._data_seed = (
             int(child.generate_state(1, np.uint64)[0])
@@ -263,6 +264,13 @@ class ActorCritic:
             rate,
             frozen=self.actor_frozen,
         )
+
+    def _update(self, *tensors: Tensor) -> Tensor:
+        """Do `_step`, with products of the precision that was asked for, and count it."""
+        with torch.autocast(self._device.type, torch.bfloat16, enabled=self._bfloat16):
+            values = self._step(*tensors)
+        self._updates += 1
+        return values
 
     def _draw(self, shape: tuple[int, ...]) -> Tensor:
         """Noise for `sample_actions`, of the shape of the logits."""

@@ -118,9 +118,7 @@ class PPO(ActorCritic):
         Returns:
             (8,) the values that `learn` names, in that order.
         """
-        values = self._step(*rows, self._rate())
-        self._updates += 1
-        return values
+        return self._update(*rows, self._rate())
 
     def _update_all(
         self,

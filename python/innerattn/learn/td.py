@@ -130,7 +130,7 @@ class TD(ActorCritic):
         reward = (batch.reward.to(self._device) - self.replay.reward_mean) / deviation
         continues = ~batch.terminated.to(self._device)
         shape = (self._team.num_robots, self._team.num_actions, len(batch.obs))
-        values = self._step(
+        return self._update(
             self._robots_first(batch.obs),
             batch.actions.to(self._device).t(),
             reward.t().to(self._dtype),
@@ -140,8 +140,6 @@ class TD(ActorCritic):
             self._draw(shape),
             self._rate(),
         )
-        self._updates += 1
-        return values
 
     def _networks(self) -> dict[str, nn.Module]:
         targets = {"target_actor": self.target_actor, "target_critic": self.target_critic}

@@ -55,12 +55,16 @@ class PerRobotLinear(nn.Module):
         width = left.shape[2]
         weight = self.weight.transpose(1, 2)
         partial = torch.baddbmm(self.bias.unsqueeze(1), left, weight[:, :width])
+        if partial.dtype != weight.dtype:  # autocast knows no products in place
+            return torch.baddbmm(partial, right, weight[:, width:])
         return partial.baddbmm_(right, weight[:, width:])
 
     def batch_last(self, x: Tensor) -> Tensor:
         """Map (R, B, in) to (R, out, B).
 
         For a handful of outputs this orientation is several times faster, and what follows (a
-        softmax over actions, say) then runs along whole rows of memory.
+        softmax over actions, say) then runs along whole rows of memory. The result has the
+        parameters' type, also where products are less precise.
         """
-        return torch.baddbmm(self.bias.unsqueeze(2), self.weight, x.transpose(1, 2))
+        outputs = torch.baddbmm(self.bias.unsqueeze(2), self.weight, x.transpose(1, 2))
+        return outputs.to(self.weight.dtype)
