@@ -140,9 +140,9 @@ class PPOConfig(Model):
 
     gamma: float = Field(0.95, ge=0.0, le=1.0, description="discount per control step")
     gae_lambda: float = Field(
-        0.95, ge=0.0, le=1.0, description="how far advantages look: 0 one step, 1 to the end"
+        0.9, ge=0.0, le=1.0, description="how far advantages look: 0 one step, 1 to the end"
     )
-    learning_rate: float = Field(0.001, gt=0.0, le=1.0, description="step size of Adam")
+    learning_rate: float = Field(0.003, gt=0.0, le=1.0, description="step size of Adam")
     final_learning_rate_share: float = Field(
         0.1,
         ge=0.0,
@@ -153,7 +153,7 @@ class PPOConfig(Model):
         25, ge=1, description="control steps of every world between updates [steps]"
     )
     epochs: int = Field(5, ge=1, description="passes over a rollout")
-    minibatch_size: int = Field(1_600, ge=1, description="rows of a rollout per update")
+    minibatch_size: int = Field(400, ge=1, description="rows of a rollout per update")
     clip: float = Field(0.2, gt=0.0, lt=1.0, description="how far a probability ratio counts")
     value_clip: float | None = Field(
         None, gt=0.0, description="how far a value may move per rollout; None: freely"
