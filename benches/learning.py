@@ -1,7 +1,7 @@
 """What methods learn: trains every missing run, one core each, and tabulates scores over seeds.
 
-`python benches/learning.py RUNS` fills its place in `docs/learning.md`, with `--warm-start hungarian`
-another. A second call goes on where the first stopped; a run that is there and done is not made again.
+`python benches/learning.py RUNS` fills its place in `docs/learning.md`, and another when given
+`--warm-start hungarian`. A second call goes on where the first stopped; finished runs are kept.
 """
 
 from __future__ import annotations
