@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,9 @@ import pytest
 from innerattn.cli import train as command
 from innerattn.cli.main import main
 from innerattn.cli.progress import SeveralRuns
-from innerattn.cli.several import Run, work
+from innerattn.cli.several import Run, trained_share, work
 from innerattn.config import RunConfig, load_run_config
+from innerattn.train import Progress
 from innerattn.train.weights import read_weights
 
 TIMES = ("seconds", "env_steps_per_s", "updates_per_s")
@@ -192,3 +194,15 @@ def test_processes_and_threads(
     assert processes == at_once
     stamps = {name.removeprefix(f"mixed-td-inner-quick-s{i}-") for i, name in enumerate(names)}
     assert len(stamps) == 1
+
+
+def test_the_share_done_grows_through_a_warm_start() -> None:
+    overrides = {"train.env_steps": 300, "imitation.env_steps": 100}
+    warm = load_run_config(overrides={**overrides, "train.warm_start": "greedy"})
+    imitating = Progress(50, 100, 0, 0.0, None, "imitating")
+    training = Progress(0, 300, 0, 0.0, None, "training")
+    assert trained_share(warm, imitating) == 0.125
+    assert trained_share(warm, training) == 0.25
+    assert trained_share(warm, replace(training, env_steps=300)) == 1.0
+    cold = load_run_config(overrides=overrides)
+    assert trained_share(cold, replace(training, env_steps=150)) == 0.5

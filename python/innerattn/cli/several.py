@@ -23,6 +23,7 @@ from innerattn.errors import InnerattnError
 
 if TYPE_CHECKING:
     from innerattn.evaluate import Summary
+    from innerattn.train import Progress
 
 _SPAWN = get_context("spawn")
 _TRAINING = 0.95
@@ -173,9 +174,7 @@ def work(config: RunConfig, folder: Path, pipe: Connection, debug: bool) -> None
         from innerattn.train import train
 
         report.show(0.0)  # ends here if all was stopped while torch was loaded
-        train(
-            config, folder, progress=lambda p: report(p.env_steps / p.total_env_steps * _TRAINING)
-        )
+        train(config, folder, progress=lambda p: report(_TRAINING * trained_share(config, p)))
         evaluation = evaluate_run(
             folder, progress=lambda done, total: report(_TRAINING + done / total * (1 - _TRAINING))
         )
@@ -187,6 +186,13 @@ def work(config: RunConfig, folder: Path, pipe: Connection, debug: bool) -> None
         pipe.send(" ".join(str(error).split()))
         if debug:
             raise
+
+
+def trained_share(config: RunConfig, progress: Progress) -> float:
+    """Part of the env-steps of a run that is done, imitation and learning from rewards together."""
+    before = config.imitation.env_steps if config.train.warm_start != "none" else 0
+    done = progress.env_steps + (before if progress.stage == "training" else 0)
+    return done / (before + config.train.env_steps)
 
 
 class _Report:

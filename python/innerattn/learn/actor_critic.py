@@ -22,7 +22,6 @@ from innerattn.learn.descent import (
     Network,
     clip_each_robot,
     clip_whole,
-    values_of,
 )
 from innerattn.learn.types import Team
 from innerattn.nn import (
@@ -118,7 +117,8 @@ class ActorCritic:
         self._actor_descent = Descent(self.actor, learning_rate, weight_decay=0.0)
         self._critic_descent = Descent(self.critic, learning_rate, critic_weight_decay)
         self._values = {
-            name: values_of(network) for name, network in ActorCritic._networks(self).items()
+            "actor": self._actor_descent.values,
+            "critic": self._critic_descent.values,
         }
         self._team = team
         self._updates = 0

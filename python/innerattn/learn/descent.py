@@ -28,6 +28,8 @@ class Descent:
         network: The network.
         adam: Its optimiser; the moments are there from the start.
         moments: Live tensors of the optimiser by name of the parameter, then by its own names.
+        values: The parameters' values by name: the same memory, unknown to autograd; what a
+            compiled update reads and writes.
     """
 
     def __init__(self, network: nn.Module, learning_rate: float, weight_decay: float) -> None:
@@ -48,9 +50,7 @@ class Descent:
                 "exp_avg": torch.zeros_like(parameter),
                 "exp_avg_sq": torch.zeros_like(parameter),
             }
-        # The same memory as the parameters, but no leaves of autograd: what a compiled update
-        # reads and writes.
-        self._values = {name: parameter.detach() for name, parameter in self._trained.items()}
+        self.values = values_of(network)
         self.moments: dict[str, dict[str, Tensor]] = {
             name: self.adam.state[parameter] for name, parameter in network.named_parameters()
         }
@@ -111,9 +111,10 @@ class Descent:
         def loss_at(values: dict[str, Tensor]) -> tuple[Tensor, Kept]:
             return loss_of(lambda *inputs: functional_call(self.network, values, inputs))
 
-        gradients, kept = grad(loss_at, has_aux=True)(self._values)
+        values = {name: self.values[name] for name in self._trained}
+        gradients, kept = grad(loss_at, has_aux=True)(values)
         norms = clip(gradients)
-        for name, value in self._values.items() if not frozen else ():
+        for name, value in values.items() if not frozen else ():
             moments = self.moments[name]
             gradient = gradients[name] + self._weight_decay * value
             step = moments["step"].add_(1.0)

@@ -13,8 +13,8 @@ from innerattn.config.run import on_policy
 _log = logging.getLogger(__name__)
 
 _WORTH_ROWS = 8_000_000
-"""Rows of training from which compiling pays: it takes about a minute of one core once, and then
-saves some 15 microseconds a row (`benches/compare_learner.py`)."""
+"""Rows of training from which compiling surely pays: the compiler takes up to a minute, and then
+some 15 to 30 microseconds a row are saved (`benches/compare_learner.py`)."""
 
 
 def compiles(config: RunConfig) -> bool:

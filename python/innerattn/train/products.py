@@ -1,8 +1,8 @@
 """Which library multiplies matrices: the faster one for this processor, if it is as exact.
 
 PyTorch multiplies float32 matrices on a CPU by MKL, which keeps to AVX2 on AMD processors that have
-AVX-512; oneDNN uses it and is about twice as fast there. The choice follows from the processor
-alone, never from a measured time, so that a run gives the same numbers every time.
+AVX-512; oneDNN uses it. The choice follows from the processor alone, never from a measured time, so
+that a run gives the same numbers every time.
 """
 
 from __future__ import annotations
