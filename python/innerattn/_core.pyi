@@ -102,6 +102,21 @@ class Batch:
     def set_motion(self, positions: NDArray[np.float32], velocities: NDArray[np.float32]) -> None:
         """Put the robots at positions (E, R, 2), m, with velocities (E, R, 2), m/s."""
 
+    @staticmethod
+    def fault_kinds() -> list[str]:
+        """Names of the kinds of faults, in the order of levels."""
+
+    def fault_state(self) -> NDArray[np.float32]:
+        """Levels of the faults in effect, (E, R, kinds)."""
+
+    def set_faults(self, levels: NDArray[np.float32], mask: NDArray[np.bool_] | None) -> None:
+        """Put levels (E, R, kinds) in place of the scenario's faults in the worlds of `mask` (E,).
+
+        Raises:
+            ValueError: wrong shape, or a level out of range (kind, env and robot are named).
+                Nothing has changed then.
+        """
+
     def snapshot(self) -> bytes:
         """Image of all worlds, with a checksum."""
 

@@ -5,6 +5,7 @@ use std::iter::zip;
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::{Error, Result};
+use crate::fault::{KINDS, Levels, NUM_KINDS};
 use crate::geometry::Vec2;
 use crate::physics::Workspace;
 use crate::pool::Pool;
@@ -285,6 +286,35 @@ impl Batch {
         for (world, (places, speeds)) in zip(worlds, rows) {
             world.positions = places.chunks_exact(2).map(vector).collect();
             world.velocities = speeds.chunks_exact(2).map(vector).collect();
+            world.hold(&self.rules);
+        }
+        Ok(())
+    }
+
+    /// Puts `levels` (E × R × kinds) in place of the scenario's faults in the worlds of `mask` (all if
+    /// absent), until their episodes end.
+    ///
+    /// # Errors
+    /// [`Error::Fault`] for a value out of range or not a number, in a world of the mask, and
+    /// [`Error::Argument`] for too many or few values; nothing has changed then.
+    pub fn set_faults(&mut self, levels: &[f32], mask: Option<&[bool]>) -> Result<()> {
+        let robots = self.rules.team.len();
+        let wanted = self.options.num_envs * robots * NUM_KINDS;
+        if levels.len() != wanted {
+            let value = format!("{} values", levels.len());
+            return Err(Error::Argument { name: "faults", value, rule: format!("must be {wanted} numbers") });
+        }
+        let chosen = |env: usize| mask.is_none_or(|mask| mask[env]);
+        let (levels, _) = levels.as_chunks::<NUM_KINDS>();
+        for (index, levels) in levels.iter().enumerate().filter(|(index, _)| chosen(index / robots)) {
+            check_levels(levels, index / robots, index % robots)?;
+        }
+        let rules = &self.rules;
+        let worlds = self.shards.iter_mut().flat_map(|shard| &mut shard.worlds);
+        for (env, (world, levels)) in zip(worlds, levels.chunks_exact(robots)).enumerate() {
+            if chosen(env) {
+                world.set_faults(rules, levels);
+            }
         }
         Ok(())
     }
@@ -315,6 +345,18 @@ impl Shard {
             }
         }
     }
+}
+
+/// Refuses levels of a fault that are out of range or not numbers.
+fn check_levels(levels: &Levels, env: usize, robot: usize) -> Result<()> {
+    for (kind, value) in zip(KINDS, levels) {
+        let (low, high, unit) = kind.range();
+        if !(low as f32..=high as f32).contains(value) {
+            let rule = format!("must be in {low}..={high} {unit}").trim_end().to_string();
+            return Err(Error::Fault { kind: kind.name(), env, robot, value: *value, rule });
+        }
+    }
+    Ok(())
 }
 
 fn argument(name: &'static str, value: usize, most: usize) -> Result<()> {

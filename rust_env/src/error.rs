@@ -39,6 +39,20 @@ pub enum Error {
         /// What is allowed.
         rule: &'static str,
     },
+    /// The level of a fault is out of range or not a number.
+    #[error("faults[{kind}, env {env}, robot {robot}] = {value}: {rule}")]
+    Fault {
+        /// Kind of the fault.
+        kind: &'static str,
+        /// Index of the env in the batch.
+        env: usize,
+        /// Index of the robot in the team.
+        robot: usize,
+        /// The level given.
+        value: f32,
+        /// What is allowed.
+        rule: String,
+    },
     /// A step was asked of a world whose episode is over, while autoreset is disabled.
     #[error("env {env}: its episode is over; reset it before the next step (autoreset is disabled)")]
     EpisodeOver {

@@ -5,6 +5,10 @@
 //! named above it here.
 
 pub mod error;
+
+pub mod check;
+
+pub mod fault;
 pub mod scenario;
 
 pub mod geometry;
@@ -21,6 +25,8 @@ pub mod observe;
 pub mod reward;
 
 pub mod rules;
+
+pub mod condition;
 
 pub mod world;
 

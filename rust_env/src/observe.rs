@@ -1,9 +1,40 @@
 //! Observations: world → one row of numbers for each robot, with named columns.
 
+use crate::fault::{HEALTHY, KINDS, Kind, Levels};
 use crate::geometry::Vec2;
 use crate::robot::{Body, bodies};
 use crate::scenario::{MAX_VICTIMS, Scenario, VictimOrder};
 use crate::task::{Needs, Victim};
+
+/// The true state of a world, as far as robots can see it.
+#[derive(Debug, Clone, Copy)]
+pub struct Scene<'a> {
+    /// The robots' constants.
+    pub team: &'a [Body],
+    /// What each task needs.
+    pub tasks: &'a [Needs],
+    /// Places of the robots, m.
+    pub positions: &'a [Vec2],
+    /// Velocities of the robots, m/s.
+    pub velocities: &'a [Vec2],
+    /// Victims by slot.
+    pub victims: &'a [Option<Victim>],
+}
+
+/// What stands between a robot and what there is to see.
+#[derive(Debug, Clone, Copy)]
+pub struct Senses<'a> {
+    /// How far from its place the robot takes itself to be, m.
+    pub position_error: Vec2,
+    /// How far from its velocity it takes its own to be, m/s.
+    pub velocity_error: Vec2,
+    /// Whether it hears nothing of its teammates.
+    pub deaf: bool,
+    /// Robots that are not available, as bits.
+    pub unavailable: u64,
+    /// The faults in effect, one for each robot; none while all are healthy.
+    pub levels: &'a [Levels],
+}
 
 /// The fixed order of an observation's columns, read off a valid scenario.
 #[derive(Debug, Clone)]
@@ -12,6 +43,8 @@ pub struct Layout {
     robots: usize,
     victims: usize,
     order: VictimOrder,
+    /// Whether each robot's block ends with the faults in effect.
+    faults: bool,
     /// For each task, how many of each ability it needs.
     needs: Vec<Vec<f32>>,
     /// The columns that never change, of all robots (R × D); zeros elsewhere.
@@ -32,6 +65,7 @@ impl Layout {
             robots: scenario.robots.len(),
             victims: scenario.num_victims(),
             order: scenario.victim_order,
+            faults: scenario.observe_faults,
             abilities,
             needs,
             fixed: vec![],
@@ -51,15 +85,29 @@ impl Layout {
                 for ability in 0..self.abilities.len() {
                     block[4 + ability] = (team[robot].abilities >> ability & 1) as f32;
                 }
-                block[self.robot_width() - 1] = 1.0;
+                block[self.availability()] = 1.0;
+                self.write_levels(&HEALTHY, block);
             }
         }
         fixed
     }
 
+    /// Column of availability in a robot's block.
+    fn availability(&self) -> usize {
+        4 + self.abilities.len()
+    }
+
+    /// Writes the faults in effect into the end of a robot's block, if they are to be seen.
+    fn write_levels(&self, levels: &Levels, block: &mut [f32]) {
+        let shown = KINDS.into_iter().filter(|kind| *kind != Kind::Unavailable);
+        for (column, kind) in block[self.availability() + 1..].iter_mut().zip(shown) {
+            *column = levels[kind as usize];
+        }
+    }
+
     /// Columns of one robot.
     fn robot_width(&self) -> usize {
-        5 + self.abilities.len()
+        self.availability() + if self.faults { KINDS.len() } else { 1 }
     }
 
     /// Columns of one victim.
@@ -90,6 +138,10 @@ impl Layout {
             }
             names.extend(self.abilities.iter().map(|ability| format!("{who}.ability.{ability}")));
             names.push(format!("{who}.available"));
+            if self.faults {
+                let shown = KINDS.iter().filter(|kind| **kind != Kind::Unavailable);
+                names.extend(shown.map(|kind| format!("{who}.fault.{}", kind.name())));
+            }
         }
         for victim in 0..self.victims {
             names.push(format!("victim_{victim}.present"));
@@ -99,32 +151,60 @@ impl Layout {
         names
     }
 
-    /// Writes the rows of all robots of one world into `rows` (R × D).
-    pub fn write(
-        &self,
-        team: &[Body],
-        tasks: &[Needs],
-        positions: &[Vec2],
-        velocities: &[Vec2],
-        victims: &[Option<Victim>],
-        rows: &mut [f32],
-    ) {
+    /// Writes the rows of all robots of one world into `rows` (R × D), as healthy robots see it.
+    pub fn write(&self, scene: Scene, rows: &mut [f32]) {
         rows.copy_from_slice(&self.fixed);
         for (own, row) in rows.chunks_exact_mut(self.width()).enumerate() {
-            let (robots, rest) = row.split_at_mut(self.robots * self.robot_width());
-            let mut blocks = robots.chunks_exact_mut(self.robot_width());
-            let (position, velocity) = (positions[own], velocities[own]);
-            let mut write = |position: Vec2, velocity: Vec2| {
-                if let Some(block) = blocks.next() {
-                    block[..4].copy_from_slice(&[position.x, position.y, velocity.x, velocity.y]);
-                }
-            };
-            write(position, velocity);
-            for other in (0..self.robots).filter(|other| *other != own) {
-                write(positions[other] - position, velocities[other] - velocity);
-            }
-            self.write_victims(&team[own], tasks, position, victims, rest);
+            self.write_row(scene, own, Vec2::zeros(), Vec2::zeros(), row);
         }
+    }
+
+    /// Writes what robot `own` sees through its `senses` into `row` (D).
+    pub fn write_through(&self, scene: Scene, own: usize, senses: &Senses, row: &mut [f32]) {
+        row.copy_from_slice(&self.fixed[own * self.width()..][..self.width()]);
+        self.write_row(scene, own, senses.position_error, senses.velocity_error, row);
+        let (robots, _) = row.split_at_mut(self.robots * self.robot_width());
+        let others = (0..self.robots).filter(|other| *other != own);
+        let order = std::iter::once(own).chain(others);
+        for (block, robot) in robots.chunks_exact_mut(self.robot_width()).zip(order) {
+            if senses.deaf && robot != own {
+                block.fill(0.0);
+                continue;
+            }
+            block[self.availability()] = (!senses.unavailable >> robot & 1) as f32;
+            self.write_levels(senses.levels.get(robot).unwrap_or(&HEALTHY), block);
+        }
+    }
+
+    /// Leaves a robot nothing of its row but what it knows of itself: abilities, availability, faults.
+    pub fn darken(&self, row: &mut [f32]) {
+        row[..4].fill(0.0);
+        row[self.robot_width()..].fill(0.0);
+    }
+
+    /// Writes what changes in a row, of a robot that takes itself to be elsewhere by these errors.
+    fn write_row(
+        &self,
+        scene: Scene,
+        own: usize,
+        position_error: Vec2,
+        velocity_error: Vec2,
+        row: &mut [f32],
+    ) {
+        let (robots, rest) = row.split_at_mut(self.robots * self.robot_width());
+        let mut blocks = robots.chunks_exact_mut(self.robot_width());
+        let position = scene.positions[own] + position_error;
+        let velocity = scene.velocities[own] + velocity_error;
+        let mut write = |position: Vec2, velocity: Vec2| {
+            if let Some(block) = blocks.next() {
+                block[..4].copy_from_slice(&[position.x, position.y, velocity.x, velocity.y]);
+            }
+        };
+        write(position, velocity);
+        for other in (0..self.robots).filter(|other| *other != own) {
+            write(scene.positions[other] - position, scene.velocities[other] - velocity);
+        }
+        self.write_victims(&scene.team[own], scene.tasks, position, scene.victims, rest);
     }
 
     fn write_victims(
@@ -192,7 +272,9 @@ mod tests {
         let (at, moving) =
             ([Vec2::new(0.1, 0.2), Vec2::new(0.4, 0.0)], [Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0)]);
         let mut rows = vec![f32::NAN; 2 * layout.width()];
-        layout.write(&team, &tasks, &at, &moving, &victims, &mut rows);
+        let scene =
+            Scene { team: &team, tasks: &tasks, positions: &at, velocities: &moving, victims: &victims };
+        layout.write(scene, &mut rows);
         (layout.names(), rows.split_off(layout.width()))
     }
 

@@ -77,14 +77,15 @@ impl Weights {
     }
 }
 
-/// Σ over victims and their needs of the distance of the nearest able robots, m.
+/// Σ over victims and their needs of the distance of the nearest able robots that are not `away`, m.
 pub fn total_distance<'a>(
     victims: impl Iterator<Item = &'a Victim>,
     tasks: &[Needs],
     team: &[Body],
     positions: &[Vec2],
+    away: u64,
 ) -> f32 {
-    victims.map(|victim| tasks[victim.task as usize].distance(victim.position, team, positions)).sum()
+    victims.map(|victim| tasks[victim.task as usize].distance(victim.position, team, positions, away)).sum()
 }
 
 #[cfg(test)]

@@ -11,6 +11,12 @@ pub enum Purpose {
     Start = 0,
     /// Kinds, numbers and places of victims.
     Victims = 1,
+    /// When random faults begin.
+    FaultOnsets = 2,
+    /// Which control steps a fault that comes and goes strikes.
+    FaultStrikes = 3,
+    /// Errors of sensors.
+    SensorNoise = 4,
 }
 
 /// A stream of random numbers whose state is its key and the count of words drawn.

@@ -93,12 +93,12 @@ impl Commands<'_> {
 }
 
 impl Body {
-    /// The velocity a control period starts with: damped, driven, and clipped to the speed cap.
+    /// The velocity a control period starts with: damped, driven, and clipped to `cap` of the speed cap.
     #[must_use]
-    pub fn driven(&self, velocity: Vec2, drive: Vec2, damping: f32) -> Vec2 {
+    pub fn driven(&self, velocity: Vec2, drive: Vec2, damping: f32, cap: f32) -> Vec2 {
         let wanted = velocity * (1.0 - damping) + drive * self.gain;
-        let speed = wanted.norm();
-        if speed > self.max_speed { wanted * (self.max_speed / speed) } else { wanted }
+        let (speed, most) = (wanted.norm(), self.max_speed * cap);
+        if speed > most { wanted * (most / speed) } else { wanted }
     }
 }
 
@@ -112,7 +112,7 @@ mod tests {
         for (body, robot) in bodies(&scenario).iter().zip(&scenario.robots) {
             let mut velocity = Vec2::zeros();
             for _ in 0..20 {
-                velocity = body.driven(velocity, Vec2::new(0.0, 1.0), scenario.damping as f32);
+                velocity = body.driven(velocity, Vec2::new(0.0, 1.0), scenario.damping as f32, 1.0);
                 assert!(velocity.norm() <= body.max_speed * (1.0 + 1e-6), "{}", robot.name);
             }
             assert!((velocity.norm() - body.max_speed).abs() < 1e-5, "{}", robot.name);

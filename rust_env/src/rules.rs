@@ -1,6 +1,7 @@
 //! A scenario made ready to play: every constant that worlds share, computed once.
 
 use crate::error::Result;
+use crate::fault::Kind;
 use crate::geometry::Solid;
 use crate::observe::Layout;
 use crate::physics::Physics;
@@ -9,6 +10,23 @@ use crate::reward::Weights;
 use crate::robot::{Body, bodies};
 use crate::scenario::Scenario;
 use crate::task::Needs;
+
+/// One of the scenario's faults, as numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Process {
+    /// Index of the robot.
+    pub robot: usize,
+    /// What goes wrong.
+    pub kind: Kind,
+    /// How badly.
+    pub value: f32,
+    /// Step at which it begins, or may begin.
+    pub onset: u32,
+    /// How often it begins in a control step, if at random.
+    pub rate: Option<f32>,
+    /// Steps it lasts; `u32::MAX` for ever.
+    pub duration: u32,
+}
 
 /// What all worlds of a batch share.
 pub struct Rules {
@@ -28,6 +46,8 @@ pub struct Rules {
     pub weights: Weights,
     /// Distances kept when placing things.
     pub placing: Placing,
+    /// The scenario's faults.
+    pub faults: Vec<Process>,
 }
 
 impl Rules {
@@ -45,10 +65,27 @@ impl Rules {
             layout: Layout::new(&scenario, &tasks),
             weights: Weights::new(&scenario),
             placing: Placing::new(&scenario)?,
+            faults: processes(&scenario),
             scenario,
             team,
             tasks,
             solids,
         })
     }
+}
+
+fn processes(scenario: &Scenario) -> Vec<Process> {
+    let index = |name: &String| scenario.robots.iter().position(|robot| robot.name == *name);
+    scenario
+        .faults
+        .iter()
+        .map(|fault| Process {
+            robot: index(&fault.robot).unwrap_or_default(),
+            kind: fault.kind,
+            value: fault.value as f32,
+            onset: fault.onset_step,
+            rate: fault.onset_rate_hz.map(|rate| (rate * scenario.dt_s) as f32),
+            duration: fault.duration_steps.unwrap_or(u32::MAX),
+        })
+        .collect()
 }

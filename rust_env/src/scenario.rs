@@ -1,11 +1,11 @@
 //! `Scenario`: what a rescue world is made of, as plain data, and the rules a valid one obeys.
 //! Nothing here moves or draws anything.
 
-use std::fmt::Display;
-
 use serde::{Deserialize, Serialize};
 
+use crate::check::{broken, counts, named, within};
 use crate::error::{Error, Result};
+use crate::fault::Fault;
 
 /// Most robots in a team.
 pub const MAX_ROBOTS: usize = 64;
@@ -15,6 +15,8 @@ pub const MAX_VICTIMS: usize = 32;
 pub const MAX_OBSTACLES: usize = 64;
 /// Most different abilities in a scenario.
 pub const MAX_ABILITIES: usize = 32;
+/// Most faults in a scenario.
+pub const MAX_FAULTS: usize = 256;
 /// Most helpers that one victim may need.
 pub const MAX_NEEDS: usize = 8;
 /// Most that the heaviest robot may weigh, in weights of the lightest: contacts are true up to here.
@@ -206,6 +208,10 @@ pub struct Scenario {
     pub action_cost: f64,
     /// The order in which a robot sees the victims.
     pub victim_order: VictimOrder,
+    /// What goes wrong with which robot, and when.
+    pub faults: Vec<Fault>,
+    /// Whether observations have columns for the faults in effect.
+    pub observe_faults: bool,
 }
 
 impl Default for Scenario {
@@ -254,6 +260,8 @@ impl Default for Scenario {
             contact_cost: 0.0,
             action_cost: 0.0,
             victim_order: VictimOrder::Relevant,
+            faults: vec![],
+            observe_faults: false,
         }
     }
 }
@@ -316,7 +324,8 @@ impl Scenario {
         self.validate_numbers()?;
         self.validate_robots()?;
         self.validate_tasks()?;
-        self.validate_obstacles()
+        self.validate_obstacles()?;
+        self.validate_faults()
     }
 
     fn validate_numbers(&self) -> Result<()> {
@@ -419,6 +428,15 @@ impl Scenario {
             .all(|need| fill(&self.robots, needs, need, &mut vec![false; self.robots.len()], &mut by))
     }
 
+    fn validate_faults(&self) -> Result<()> {
+        counts("faults (their number)", self.faults.len(), 0, MAX_FAULTS)?;
+        let names: Vec<&str> = self.robots.iter().map(|robot| robot.name.as_str()).collect();
+        let checked = |(index, fault): (usize, &Fault)| {
+            fault.validate(&format!("faults[{index}]"), &names, self.episode_steps)
+        };
+        self.faults.iter().enumerate().try_for_each(checked)
+    }
+
     fn validate_obstacles(&self) -> Result<()> {
         counts("obstacles (their number)", self.obstacles.len(), 0, MAX_OBSTACLES)?;
         for (index, obstacle) in self.obstacles.iter().enumerate() {
@@ -445,32 +463,6 @@ impl Scenario {
         }
         Ok(())
     }
-}
-
-fn broken(key: &str, value: &dyn Display, rule: &str) -> Result<()> {
-    Err(Error::Scenario { key: format!("scenario.{key}"), value: value.to_string(), rule: rule.into() })
-}
-
-fn within(key: &str, value: f64, low: f64, high: f64, unit: &str) -> Result<()> {
-    if (low..=high).contains(&value) {
-        return Ok(());
-    }
-    broken(key, &value, format!("must be in {low}..={high} {unit}").trim_end())
-}
-
-fn counts(key: &str, value: usize, low: usize, high: usize) -> Result<()> {
-    if (low..=high).contains(&value) {
-        return Ok(());
-    }
-    broken(key, &value, &format!("must be in {low}..={high}"))
-}
-
-fn named(key: &str, value: &str) -> Result<()> {
-    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if !value.is_empty() && value.len() <= 64 && value.chars().all(allowed) {
-        return Ok(());
-    }
-    broken(key, &format!("{value:?}"), "must be 1 to 64 letters, digits, '_' or '-'")
 }
 
 #[cfg(test)]

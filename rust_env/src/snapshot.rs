@@ -7,7 +7,7 @@ use crate::rules::Rules;
 use crate::world::World;
 
 const MAGIC: &[u8; 8] = b"innerATT";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const CHECKSUM_BYTES: usize = 4;
 
 #[derive(Serialize, Deserialize)]
@@ -72,6 +72,7 @@ fn fits(rules: &Rules, world: &World) -> bool {
         && world.velocities.len() == rules.team.len()
         && world.obstacles.len() == rules.solids.len()
         && world.victims.len() == rules.scenario.num_victims()
+        && world.condition.fits(rules)
         && victims().all(|victim| (victim.task as usize) < rules.tasks.len())
         && places
             .copied()
@@ -118,6 +119,6 @@ mod tests {
         let mut bytes = postcard::to_extend(&image, MAGIC.to_vec()).expect("plain data serialises");
         bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
         let error = load(&rules, 0, &bytes).expect_err("another version").to_string();
-        assert_eq!(error, "snapshot: version 2 was found; this version reads 1");
+        assert_eq!(error, "snapshot: version 3 was found; this version reads 2");
     }
 }

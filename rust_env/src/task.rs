@@ -46,13 +46,14 @@ impl Needs {
     }
 
     /// Sum over needs of the distance of the nearest able robot, m; a need repeated k times counts
-    /// the k nearest.
+    /// the k nearest. Robots of the mask `away` do not count, and a need that is left without a robot
+    /// adds nothing.
     #[must_use]
-    pub fn distance(&self, victim: Vec2, team: &[Body], positions: &[Vec2]) -> f32 {
+    pub fn distance(&self, victim: Vec2, team: &[Body], positions: &[Vec2], away: u64) -> f32 {
         let mut total = 0.0;
         for (index, need) in self.0.iter().enumerate() {
             let rank = self.0[..index].iter().filter(|earlier| *earlier == need).count();
-            total += kth_nearest(rank, *need, victim, team, positions);
+            total += kth_nearest(rank, *need, victim, team, positions, away);
         }
         total
     }
@@ -137,16 +138,18 @@ fn bits(mask: u64) -> impl Iterator<Item = usize> {
     (0..64).filter(move |robot| mask >> robot & 1 == 1)
 }
 
-/// Distance of the able robot with `rank` nearer ones, m.
-fn kth_nearest(rank: usize, need: u32, victim: Vec2, team: &[Body], positions: &[Vec2]) -> f32 {
-    let able = team.iter().zip(positions).filter(|(body, _)| body.abilities >> need & 1 == 1);
-    let squares = able.map(|(_, position)| (position - victim).norm_squared());
+/// Distance of the able robot with `rank` nearer ones, m; 0 if there is none.
+fn kth_nearest(rank: usize, need: u32, victim: Vec2, team: &[Body], positions: &[Vec2], away: u64) -> f32 {
+    let can = |robot: usize| (away >> robot | u64::from(!team[robot].abilities >> need)) & 1 == 0;
+    let able = (0..team.len()).filter(|robot| can(*robot));
+    let squares = able.map(|robot| (positions[robot] - victim).norm_squared());
     if rank == 0 {
-        return squares.fold(f32::INFINITY, f32::min).sqrt();
+        let nearest = squares.fold(f32::INFINITY, f32::min);
+        return if nearest.is_finite() { nearest.sqrt() } else { 0.0 };
     }
     let mut sorted: Vec<f32> = squares.collect();
     sorted.sort_unstable_by(f32::total_cmp);
-    sorted[rank].sqrt()
+    sorted.get(rank).map_or(0.0, |square| square.sqrt())
 }
 
 /// A rescue: which victim, when and by whom.
@@ -210,10 +213,13 @@ mod tests {
     #[test]
     fn distances_are_those_of_the_nearest_for_each_need() {
         let (team, tasks, at) = around();
-        assert!((tasks[0].distance(Vec2::zeros(), &team, &at) - 0.24).abs() < 1e-6);
+        assert!((tasks[0].distance(Vec2::zeros(), &team, &at, 0) - 0.24).abs() < 1e-6);
+        assert!((tasks[0].distance(Vec2::zeros(), &team, &at, 0b0001) - 0.26).abs() < 1e-6, "food_0 is away");
+        assert!((tasks[0].distance(Vec2::zeros(), &team, &at, 0b0011) - 0.14).abs() < 1e-6, "no food");
         let mut twice = Scenario::default();
         twice.tasks[0].needs = vec!["food".into(), "medicine".into(), "food".into()];
         let twice = Needs::of_tasks(&twice).remove(0);
-        assert!((twice.distance(Vec2::zeros(), &team, &at) - 0.36).abs() < 1e-6);
+        assert!((twice.distance(Vec2::zeros(), &team, &at, 0) - 0.36).abs() < 1e-6);
+        assert!((twice.distance(Vec2::zeros(), &team, &at, 0b0001) - 0.26).abs() < 1e-6);
     }
 }

@@ -2,8 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::condition::{Condition, Moment};
 use crate::error::{Error, Result};
+use crate::fault::Levels;
 use crate::geometry::Vec2;
+use crate::observe::Scene;
 use crate::physics::Workspace;
 use crate::place::Placed;
 use crate::reward::{Happened, total_distance};
@@ -59,6 +62,8 @@ pub struct World {
     pub obstacles: Vec<Vec2>,
     /// Victims by slot.
     pub victims: Vec<Option<Victim>>,
+    /// What is wrong with the robots.
+    pub condition: Condition,
 }
 
 /// What did not fit when an episode began.
@@ -87,6 +92,7 @@ impl World {
             velocities: vec![Vec2::zeros(); rules.team.len()],
             obstacles: vec![Vec2::zeros(); rules.solids.len()],
             victims: vec![None; rules.scenario.num_victims()],
+            condition: Condition::default(),
         };
         world.begin(rules, 0);
         world
@@ -111,6 +117,9 @@ impl World {
         let obstacles = self.place_obstacles(rules, &mut stream);
         let robots = self.place_robots(rules, &mut stream);
         let victims = self.fill_slots(rules);
+        let now = self.now();
+        self.condition.begin(rules, now);
+        self.hold(rules);
         if !obstacles {
             Some(Crowded::Obstacles)
         } else if !robots {
@@ -209,12 +218,14 @@ impl World {
     ) -> Ending {
         let shaping = rules.weights.shaping;
         let distance_before = if shaping == Shaping::None { 0.0 } else { self.distance(rules) };
+        let away = self.condition.unavailable();
         let mut effort = [0.0; MAX_ROBOTS];
         let damping = rules.scenario.damping as f32;
         for (robot, body) in rules.team.iter().enumerate() {
             let drive = commands.drive(env * rules.team.len() + robot);
-            self.velocities[robot] = body.driven(self.velocities[robot], drive, damping);
-            effort[robot] = drive.norm_squared();
+            effort[robot] = if away >> robot & 1 == 1 { 0.0 } else { drive.norm_squared() };
+            let (drive, cap) = self.condition.driven(robot, drive);
+            self.velocities[robot] = body.driven(self.velocities[robot], drive, damping, cap);
         }
         let touched =
             rules.physics.advance(workspace, &mut self.positions, &mut self.velocities, &self.obstacles);
@@ -224,6 +235,9 @@ impl World {
         self.settle(rules, env, rescues);
         self.step += 1;
         self.fill_slots(rules);
+        let now = self.now();
+        self.condition.update(rules, now);
+        self.hold(rules);
         let ending = Ending {
             terminated: rules.scenario.end_when_rescued.is_some_and(|goal| self.rescued >= goal),
             truncated: self.step >= rules.scenario.episode_steps,
@@ -246,7 +260,7 @@ impl World {
     /// Applies the rescue rule, slot by slot; no robot helps twice in one step.
     fn settle(&mut self, rules: &Rules, env: usize, rescues: &mut Vec<Rescue>) {
         let radius = rules.scenario.rescue_radius_m as f32;
-        let mut busy = 0_u64;
+        let mut busy = self.condition.unavailable();
         for (slot, place) in self.victims.iter_mut().enumerate() {
             let Some(victim) = *place else { continue };
             let needs = &rules.tasks[victim.task as usize];
@@ -268,13 +282,62 @@ impl World {
     }
 
     fn distance(&self, rules: &Rules) -> f32 {
-        total_distance(self.victims.iter().flatten(), &rules.tasks, &rules.team, &self.positions)
+        let away = self.condition.unavailable();
+        total_distance(self.victims.iter().flatten(), &rules.tasks, &rules.team, &self.positions, away)
     }
 
     /// Writes the observations of all robots into `rows` (R × D).
     pub fn observe(&self, rules: &Rules, rows: &mut [f32]) {
-        let (positions, velocities) = (&self.positions, &self.velocities);
-        rules.layout.write(&rules.team, &rules.tasks, positions, velocities, &self.victims, rows);
+        if self.condition.well() {
+            return rules.layout.write(self.scene(rules), rows);
+        }
+        self.sense(rules, rows);
+        for (robot, row) in rows.chunks_exact_mut(rules.layout.width()).enumerate() {
+            if let Some(held) = self.condition.held(robot) {
+                row.copy_from_slice(held);
+            }
+            if self.condition.dark(robot) {
+                rules.layout.darken(row);
+            }
+        }
+    }
+
+    /// Puts `levels` (one for each robot) in place of the scenario's faults until the episode ends.
+    pub fn set_faults(&mut self, rules: &Rules, levels: &[Levels]) {
+        let now = self.now();
+        self.condition.set(levels, now);
+        self.hold(rules);
+    }
+
+    /// Keeps what robots with frozen sensors see.
+    pub fn hold(&mut self, rules: &Rules) {
+        if self.condition.freezes() {
+            let mut rows = vec![0.0; rules.team.len() * rules.layout.width()];
+            self.sense(rules, &mut rows);
+            self.condition.hold(&rows);
+        }
+    }
+
+    /// What the robots' sensors take in now, of all robots (R × D).
+    fn sense(&self, rules: &Rules, rows: &mut [f32]) {
+        for (robot, row) in rows.chunks_exact_mut(rules.layout.width()).enumerate() {
+            let senses = self.condition.senses(robot, self.now());
+            rules.layout.write_through(self.scene(rules), robot, &senses, row);
+        }
+    }
+
+    fn scene<'a>(&'a self, rules: &'a Rules) -> Scene<'a> {
+        Scene {
+            team: &rules.team,
+            tasks: &rules.tasks,
+            positions: &self.positions,
+            velocities: &self.velocities,
+            victims: &self.victims,
+        }
+    }
+
+    fn now(&self) -> Moment {
+        Moment { seed: self.seed, stream: self.stream, episode: self.episode, step: self.step }
     }
 }
 

@@ -3,13 +3,14 @@
 
 mod common;
 
-use common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles};
+use common::{ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles};
 use innerattn_env::batch::Options;
 use innerattn_env::scenario::{Actions, Scenario, Shaping, Situation};
 
 const STEPS: usize = 150;
 
-/// Small arenas, so that most steps have contacts, in every situation and both kinds of actions.
+/// Small arenas, so that most steps have contacts, in every situation and both kinds of actions, with
+/// and without faults.
 fn scenarios() -> Vec<Scenario> {
     let tight = Scenario { arena_half_width_m: 0.6, spawn_clearance_m: 0.1, ..Scenario::default() };
     let scenarios = [
@@ -20,6 +21,7 @@ fn scenarios() -> Vec<Scenario> {
             obstacles: some_obstacles(),
             ..Scenario::default()
         },
+        Scenario { faults: coming_and_going(&tight.robots), observe_faults: true, ..tight.clone() },
         Scenario {
             situation: Situation::Single,
             robots: mixed_team(12),

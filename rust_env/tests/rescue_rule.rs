@@ -104,7 +104,7 @@ proptest! {
             distances.sort_by(f32::total_cmp);
             expected += distances.iter().take(needs.iter().filter(|need| **need == ability).count()).sum::<f32>();
         }
-        let found = rule.distance(Vec2::zeros(), &team, &positions);
+        let found = rule.distance(Vec2::zeros(), &team, &positions, 0);
         prop_assert!((found - expected).abs() < 1e-5, "{} for {}", found, expected);
     }
 }

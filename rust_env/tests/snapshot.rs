@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Table, chance, mixed_team, options, random_drive, some_obstacles};
+use common::{Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles};
 use innerattn_env::batch::{Autoreset, Options};
 use innerattn_env::scenario::{Scenario, Situation};
 use proptest::prelude::*;
@@ -15,6 +15,7 @@ fn scenarios() -> Vec<Scenario> {
     let tight = Scenario { arena_half_width_m: 0.5, spawn_clearance_m: 0.1, ..Scenario::default() };
     vec![
         tight.clone(),
+        Scenario { faults: coming_and_going(&tight.robots), ..tight.clone() },
         Scenario { situation: Situation::Double, obstacles: some_obstacles(), ..Scenario::default() },
         Scenario {
             robots: mixed_team(9),

@@ -1,7 +1,8 @@
 """A second, plain reading of the rescue world in float64, to hold the compiled one against.
 
-It covers motion without contacts, the rescue rule, rewards and observations. It draws nothing:
-starts, and the places of new victims, are taken from the world that is checked.
+It covers motion without contacts, the rescue rule, rewards, observations and the faults that need
+no random numbers. It draws nothing: starts, and the places of new victims, are taken from the world
+that is checked.
 """
 
 from __future__ import annotations
@@ -23,12 +24,18 @@ DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], dtype=np.float
 
 @dataclass
 class State:
-    """E worlds: places and velocities (E, R, 2), obstacles (E, O, 2), victims (E, V) structured."""
+    """E worlds: places and velocities (E, R, 2), obstacles (E, O, 2), victims (E, V) and faults
+    (E, R) structured."""
 
     positions: Array
     velocities: Array
     obstacles: Array
     victims: NDArray[np.void]
+    faults: NDArray[np.void]
+
+    @property
+    def available(self) -> Bools:
+        return np.asarray(self.faults["unavailable"] == 0)
 
     @property
     def present(self) -> Bools:
@@ -66,12 +73,17 @@ class Stepper:
 
     def fly(self, state: State, drive: Array) -> tuple[Array, Array]:
         """Places and velocities after a period in which nothing touches."""
-        dt = self.scenario.dt_s
+        dt, faults = self.scenario.dt_s, state.faults
+        sin, cos = (f(faults["heading_bias"].astype(np.float64)) for f in (np.sin, np.cos))
+        x, y = drive[..., 0], drive[..., 1]
+        drive = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+        drive = drive * (faults["motor_gain"] * state.available)[..., None]
         velocities = (1 - self.scenario.damping) * state.velocities
         velocities = velocities + self.acceleration[:, None] * dt * drive
         speed = np.linalg.norm(velocities, axis=-1)
-        too_fast = speed > self.max_speed
-        factor = np.where(too_fast, self.max_speed / np.where(too_fast, speed, 1.0), 1.0)
+        most = self.max_speed * faults["speed_limit"]
+        too_fast = speed > most
+        factor = np.where(too_fast, most / np.where(too_fast, speed, 1.0), 1.0)
         velocities = velocities * factor[..., None]
         return state.positions + velocities * dt, velocities
 
@@ -98,12 +110,14 @@ class Stepper:
     def total_distance(self, state: State, positions: Array) -> Array:
         """Σ over present victims and their needs of the nearest able robots' distances, (E,)."""
         distances = self.distances(state, positions)
+        distances = np.where(state.available[:, None], distances, np.inf)
         total = np.zeros(len(positions))
         for task, counts in enumerate(self.counts):
             mine = state.present & (state.victims["task"] == task)
             for ability, count in enumerate(counts):
                 able = distances[..., self.able[:, ability]]
-                nearest = np.sort(able, axis=-1)[..., :count].sum(-1)
+                nearest = np.sort(able, axis=-1)[..., :count]
+                nearest = np.where(np.isfinite(nearest), nearest, 0.0).sum(-1)
                 total += np.where(mine, nearest, 0.0).sum(-1)
         return total
 
@@ -116,7 +130,7 @@ class Stepper:
         tied = (np.diff(in_order, axis=-1) < 1e-5) & (in_order[..., 1:] < radius)
         unsure = (state.present & (close.any(-1) | tied.any(-1))).any(-1)
         found: list[tuple[int, ...]] = []
-        near = distances <= radius
+        near = (distances <= radius) & state.available[:, None]
         for env in np.flatnonzero((state.present & near.any(-1)).any(-1)):
             busy: set[int] = set()
             for slot in np.flatnonzero(state.present[env]):
@@ -163,23 +177,28 @@ class Stepper:
             end = np.where(terminated, 0.0, self.total_distance(after, after.positions))
             dense = start - scenario.shaping_discount * end
         reward[..., 1] = (scenario.shaping_weight * dense)[:, None]
-        reward[..., 3] = -scenario.action_cost * (drive**2).sum(-1)
+        reward[..., 3] = -scenario.action_cost * (drive**2).sum(-1) * before.available
         return reward
 
     def observations(self, state: State) -> tuple[Array, Bools]:
         """Rows of all robots, (E, R, D); where rounding might order victims otherwise, (E, R)."""
         envs, robots = state.positions.shape[:2]
-        able = self.able.astype(np.float64)
-        flags = np.concatenate([able, np.ones((robots, 1))], axis=-1)  # everyone is available
+        able = np.broadcast_to(self.able, (envs, *self.able.shape)).astype(np.float64)
+        flags = [able, state.available[..., None]]
+        if self.scenario.observe_faults:
+            shown = [kind for kind in state.faults.dtype.names or () if kind != "unavailable"]
+            flags += [state.faults[kind][..., None] for kind in shown]
+        known = np.concatenate(flags, axis=-1)
+        dark = (state.faults["blackout"] == 1)[..., None]
+        deaf = (state.faults["lost_communication"] == 1)[..., None]
         motion = np.concatenate([state.positions, state.velocities], axis=-1)
-        own = np.concatenate([motion, np.broadcast_to(flags, (envs, *flags.shape))], axis=-1)
-        blocks = [own]
+        blocks = [np.where(dark, 0.0, motion), known]
         if robots > 1:
             relative = motion[:, self.others] - motion[:, :, None]
-            seen = np.broadcast_to(flags[self.others], (envs, *self.others.shape, flags.shape[-1]))
-            blocks.append(np.concatenate([relative, seen], axis=-1).reshape(envs, robots, -1))
+            teammates = np.concatenate([relative, known[:, self.others]], axis=-1)
+            blocks.append(np.where(dark | deaf, 0.0, teammates.reshape(envs, robots, -1)))
         victims, unsure = self._victims_seen(state)
-        return np.concatenate([*blocks, victims], axis=-1), unsure
+        return np.concatenate([*blocks, np.where(dark, 0.0, victims)], axis=-1), unsure
 
     def _victims_seen(self, state: State) -> tuple[Array, Bools]:
         envs, robots = state.positions.shape[:2]

@@ -7,13 +7,20 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from innerattn import _core
-from innerattn.config import Obstacle, Robot, Scenario, Task
+from innerattn.config import Fault, Obstacle, Robot, Scenario, Task
+from innerattn.envs.batch import FAULT_KINDS
 
 ROBOT = {"name": "one", "kind": "any", "abilities": [], "max_speed_mps": 1.0, "mass_kg": 1.0}
 OBSTACLE = {"shape": "disc", "radius_m": 0.1}
 TASK = {"name": "task", "needs": ["food"]}
+FAULT = {"robot": "food_0", "kind": "motor_gain", "value": 0.5}
 TEAM = Scenario().model_dump(mode="json")["robots"]
-NESTED = {"robots": (Robot, ROBOT), "tasks": (Task, TASK), "obstacles": (Obstacle, OBSTACLE)}
+NESTED = {
+    "robots": (Robot, ROBOT),
+    "tasks": (Task, TASK),
+    "obstacles": (Obstacle, OBSTACLE),
+    "faults": (Fault, FAULT),
+}
 CHOICES = [
     (name, get_args(field.annotation))
     for name, field in Scenario.model_fields.items()
@@ -83,6 +90,13 @@ def test_choices_agree(key: str, values: tuple[str, ...]) -> None:
             Scenario.model_validate({key: wrong})
 
 
+def test_kinds_of_faults_agree() -> None:
+    kinds = get_args(Fault.model_fields["kind"].annotation)
+    assert kinds == FAULT_KINDS
+    for kind in kinds:
+        assert compiled({"faults": [FAULT | {"kind": kind}]})["faults"][0]["kind"] == kind
+
+
 def test_shapes_agree() -> None:
     shapes = {"disc": {"radius_m": 0.1}, "box": {"half_extents_m": [0.1, 0.2]}}
     assert {*get_args(Obstacle.model_fields["shape"].annotation)} == shapes.keys()
@@ -131,6 +145,8 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         "contact_cost": 0.1,
         "action_cost": 0.2,
         "victim_order": "slot",
+        "faults": [{**FAULT, "onset_step": 3, "onset_rate_hz": 0.5, "duration_steps": 7}],
+        "observe_faults": True,
     }
     assert changed.keys() == Scenario.model_fields.keys() - {"engine"}
     scenario = Scenario.model_validate(changed)

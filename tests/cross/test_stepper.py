@@ -22,6 +22,7 @@ def state_of(env: BatchEnv) -> State:
         env.velocities().astype(np.float64),
         env.obstacles().astype(np.float64),
         env.victims(),
+        env.fault_state(),
     )
 
 
@@ -41,6 +42,22 @@ def random_actions(rng: np.random.Generator, scenario: Scenario, state: State) -
     along_x = abs(goal[..., 0]) > abs(goal[..., 1])
     wanted = np.where(along_x, 1 + (goal[..., 0] < 0), 3 + (goal[..., 1] < 0))
     return np.where(toward, wanted, rng.integers(0, 5, shape))
+
+
+def random_faults(rng: np.random.Generator, healthy: np.ndarray) -> np.ndarray:
+    """Faults of each kind that needs no random numbers, each for some of the robots."""
+    faults = healthy.copy()
+    draws = {
+        "motor_gain": rng.uniform(0, 1, faults.shape),
+        "speed_limit": rng.uniform(0, 1, faults.shape),
+        "heading_bias": rng.uniform(-np.pi, np.pi, faults.shape),
+        "blackout": np.ones(faults.shape),
+        "unavailable": np.ones(faults.shape),
+        "lost_communication": np.ones(faults.shape),
+    }
+    for kind, values in draws.items():
+        faults[kind] = np.where(rng.random(faults.shape) < 0.2, values, faults[kind])
+    return faults
 
 
 def check_victims(
@@ -78,8 +95,11 @@ def check_victims(
     return int(fresh.sum())
 
 
-def compare(scenario: Scenario, seed: int, transitions: int) -> Counter[str]:
-    """Steps worlds of one scenario and compares every transition; counts what was seen."""
+def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = False) -> Counter[str]:
+    """Steps worlds of one scenario and compares every transition; counts what was seen.
+
+    If ``faulty``, every world meets new faults now and then.
+    """
     rng = np.random.default_rng(seed)
     robots = len(scenario.robots)
     num_envs = max(4, 256 // robots)
@@ -87,9 +107,12 @@ def compare(scenario: Scenario, seed: int, transitions: int) -> Counter[str]:
     plain = Stepper(scenario)
     seen: Counter[str] = Counter()
     env.reset()
+    healthy = env.fault_state()
     given = env.victims()["present"].sum(1)
     rescued = np.zeros(num_envs, dtype=int)
     for _ in range(-(-transitions // num_envs)):
+        if faulty:
+            env.set_faults(random_faults(rng, healthy), mask=rng.random(num_envs) < 0.2)
         before = state_of(env)
         steps = env.step_counts()
         actions = random_actions(rng, scenario, before)
@@ -138,6 +161,8 @@ def compare(scenario: Scenario, seed: int, transitions: int) -> Counter[str]:
         assert_close(parts, wanted, "reward components", scale=size)
         assert_close(result.reward, wanted.sum(-1), "reward", scale=size + scenario.rescue_reward)
 
+        ended = result.terminated | result.truncated
+        assert (after.faults[~ended] == before.faults[~ended]).all()
         rows, tied = plain.observations(after)
         block = rows.shape[-1] - before.victims.shape[1] * (3 + len(plain.abilities))
         scale = scenario.arena_half_width_m
@@ -151,6 +176,7 @@ def compare(scenario: Scenario, seed: int, transitions: int) -> Counter[str]:
         seen["together"] += len(found) - len({row[0] for row in found})
         seen["unsure"] += int(unsure.sum())
         seen["terminated"] += int(terminated.sum())
+        seen["unavailable"] += int((~before.available).sum())
         over = result.terminated | result.truncated
         if over.any():
             env.reset(mask=over)
@@ -167,11 +193,13 @@ def test_worlds_are_as_the_plain_stepper_says(chunk: int) -> None:
     while total["transitions"] < LEAST / CHUNKS:
         scenario = random_scenario(rng)
         some = min(LEAST // CHUNKS // 10, 20_000 // len(scenario.robots))
-        total += compare(scenario, int(rng.integers(2**32)), some)
+        seed = int(rng.integers(2**32))
+        scenario = scenario.replace(observe_faults=seed % 2 == 0)
+        total += compare(scenario, seed, some, faulty=seed % 3 == 0)
     # What was compared must have been worth comparing.
     assert total["free"] > 0.5 * total["transitions"]
     assert total["unsure"] < 0.02 * total["transitions"]
-    for what in ("touched", "rescues", "appeared", "together"):
+    for what in ("touched", "rescues", "appeared", "together", "unavailable"):
         assert total[what] > 50, (what, total)
 
 

@@ -17,7 +17,9 @@ from innerattn.errors import InnerattnError
 _SHORT = ("method", "warm_start", "seed", "device", "compile")
 """Keys of the section `train` that are options by their last word too."""
 
-_FILE_ONLY = frozenset({"scenario.robots", "scenario.tasks", "scenario.obstacles"})
+_FILE_ONLY = frozenset(
+    {"scenario.robots", "scenario.tasks", "scenario.obstacles", "scenario.faults"}
+)
 """Keys that hold lists of tables, which only a TOML file can say well."""
 
 OptionField = tuple[str, Any, Any]

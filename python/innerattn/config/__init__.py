@@ -12,12 +12,13 @@ from innerattn.config.run import (
     TDConfig,
     TrainConfig,
 )
-from innerattn.config.scenario import SCENARIOS, Obstacle, Robot, Scenario, Task
+from innerattn.config.scenario import SCENARIOS, Fault, Obstacle, Robot, Scenario, Task
 
 __all__ = [
     "BUDGETS",
     "SCENARIOS",
     "EvaluateConfig",
+    "Fault",
     "NetworkConfig",
     "Obstacle",
     "Robot",

@@ -54,6 +54,37 @@ class Obstacle(Model):
     )
 
 
+class Fault(Model):
+    """Something that goes wrong with a robot."""
+
+    robot: str = Field(description="name of the robot")
+    kind: Literal[
+        "motor_gain",
+        "speed_limit",
+        "heading_bias",
+        "position_noise",
+        "velocity_noise",
+        "frozen_sensor",
+        "blackout",
+        "unavailable",
+        "lost_communication",
+    ] = Field(description="what goes wrong")
+    value: float = Field(
+        description="how badly; motor_gain, speed_limit: share that is left; heading_bias [rad]; "
+        "position_noise [m], velocity_noise [m/s]: deviation on each axis; others: share of the "
+        "control steps that are struck"
+    )
+    onset_step: Count = Field(
+        0, description="control step at which it begins, or from which on it may begin at random"
+    )
+    onset_rate_hz: float | None = Field(
+        None, description="how often it begins at random while it is not there [1/s]; None: once"
+    )
+    duration_steps: Count | None = Field(
+        None, description="control steps it lasts; None: to the end of the episode"
+    )
+
+
 def _default_team() -> tuple[Robot, ...]:
     """The four robots of Table I."""
     slow: dict[str, Any] = {"kind": "food", "abilities": ("food",), "max_speed_mps": 1.0}
@@ -127,6 +158,10 @@ class Scenario(Model):
     victim_order: Literal["relevant", "slot"] = Field(
         "relevant",
         description="order of victims in an observation; relevant: helpable first, then nearest",
+    )
+    faults: tuple[Fault, ...] = Field((), description="what goes wrong with which robot, and when")
+    observe_faults: bool = Field(
+        False, description="let robots see the faults in effect, their own and their teammates'"
     )
 
     @model_validator(mode="after")

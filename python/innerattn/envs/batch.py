@@ -27,6 +27,11 @@ _VICTIM_DTYPE = np.dtype(
 )
 
 
+FAULT_KINDS: tuple[str, ...] = tuple(_core.Batch.fault_kinds())
+"""Kinds of faults; `BatchEnv.fault_state` has a field for each."""
+_FAULT_DTYPE = np.dtype([(kind, "f4") for kind in FAULT_KINDS])
+
+
 class Step(NamedTuple):
     """What one control step of E worlds with R robots gave."""
 
@@ -117,13 +122,7 @@ class BatchEnv:
         """
         if seed is not None:
             seed = _whole("seed", seed, 0, 2**64 - 1)
-        chosen = None if mask is None else np.asarray(mask)
-        if chosen is not None and (chosen.dtype != np.bool_ or chosen.ndim != 1):
-            raise TypeError(
-                f"mask has dtype {chosen.dtype} and shape {chosen.shape}: "
-                f"must be bool of shape ({self.num_envs},)"
-            )
-        return self._lend(self._core.reset(seed, chosen))
+        return self._lend(self._core.reset(seed, self._mask(mask)))
 
     def step(self, actions: ArrayLike) -> Step:
         """Do one control step in every world.
@@ -182,6 +181,41 @@ class BatchEnv:
         """Each world's episode, from 0, (E,) int64."""
         return self._core.episodes()
 
+    def fault_state(self) -> NDArray[np.void]:
+        """What is wrong with each robot now, (E, R) structured float32, a field for each kind.
+
+        motor_gain and speed_limit are shares of the healthy value (1 = healthy), heading_bias an
+        angle [rad], position_noise [m] and velocity_noise [m/s] deviations on each axis,
+        frozen_sensor, blackout, unavailable and lost_communication shares of the control steps
+        that are struck (0 = healthy, 1 = all).
+        """
+        return self._core.fault_state().view(_FAULT_DTYPE)[..., 0]
+
+    def set_faults(self, faults: NDArray[np.void], mask: ArrayLike | None = None) -> None:
+        """Put faults in place of the scenario's, from now to the end of the present episodes.
+
+        Args:
+            faults: (E, R) structured with the fields of `fault_state`: take that array, change what
+                is to change, and give it back.
+            mask: (E,) bool, the worlds to change; all if None.
+
+        Raises:
+            TypeError: other fields, or a mask that is not bool.
+            ValueError: wrong shape, or a value out of range or not a number in a world of the mask
+                (kind, env and robot are named). Nothing has changed then.
+        """
+        table = np.asarray(faults)
+        if table.dtype.names != FAULT_KINDS:
+            raise TypeError(
+                f"faults has dtype {table.dtype}: must have the fields {', '.join(FAULT_KINDS)}"
+            )
+        if table.ndim != 2:
+            raise ValueError(
+                f"faults has shape {table.shape}: must be ({self.num_envs}, {self.num_robots})"
+            )
+        levels = np.stack([table[kind].astype(np.float32) for kind in FAULT_KINDS], axis=-1)
+        self._core.set_faults(levels, self._mask(mask))
+
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
         """Put the robots somewhere else, for studies of motion; rules and victims are left alone.
 
@@ -228,6 +262,15 @@ class BatchEnv:
         if self._batch is None:
             raise RuntimeError("this environment is closed")
         return self._batch
+
+    def _mask(self, mask: ArrayLike | None) -> NDArray[np.bool_] | None:
+        chosen = None if mask is None else np.asarray(mask)
+        if chosen is not None and (chosen.dtype != np.bool_ or chosen.ndim != 1):
+            raise TypeError(
+                f"mask has dtype {chosen.dtype} and shape {chosen.shape}: "
+                f"must be bool of shape ({self.num_envs},)"
+            )
+        return chosen
 
     def _lend(self, array: Array) -> Array:
         return array.copy() if self._copy else array

@@ -1,6 +1,7 @@
 //! `_core.Batch`: the batch of worlds as a Python class. Every array is checked here once.
 
 use innerattn_env::batch::{Autoreset, Batch as Worlds, Options};
+use innerattn_env::fault::{KINDS, NUM_KINDS};
 use innerattn_env::reward::COMPONENTS;
 use innerattn_env::robot::Commands;
 use innerattn_env::scenario::{Actions, Scenario};
@@ -106,13 +107,7 @@ impl Batch {
         mask: Option<Bound<PyArray1<bool>>>,
     ) -> PyResult<Py<PyArray3<f32>>> {
         self.check_process()?;
-        let mask = mask.map(|mask| mask.to_vec()).transpose()?;
-        if let Some(found) = mask.as_ref().map(Vec::len)
-            && found != self.worlds.num_envs()
-        {
-            let wanted = self.worlds.num_envs();
-            return Err(PyValueError::new_err(format!("mask has shape ({found},): must be ({wanted},)")));
-        }
+        let mask = self.mask(mask)?;
         self.latest_look = 1 - self.latest_look;
         let look = &mut self.looks[self.latest_look];
         let (worlds, obs) = (&mut self.worlds, look.memory());
@@ -218,6 +213,40 @@ impl Batch {
         self.worlds.set_motion(&positions, &velocities).map_err(|error| value_error(&error))
     }
 
+    #[staticmethod]
+    fn fault_kinds() -> Vec<&'static str> {
+        KINDS.iter().map(|kind| kind.name()).collect()
+    }
+
+    fn fault_state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let robots = self.worlds.rules().team.len();
+        let of = |world: &'_ World| {
+            (0..robots).flat_map(|robot| world.condition.levels(robot)).collect::<Vec<_>>()
+        };
+        let numbers = self.worlds.worlds().flat_map(of);
+        shaped(py, numbers.collect(), [self.worlds.num_envs(), robots, NUM_KINDS])
+    }
+
+    #[pyo3(signature = (levels, mask))]
+    fn set_faults(
+        &mut self,
+        levels: &Bound<PyArray3<f32>>,
+        mask: Option<Bound<PyArray1<bool>>>,
+    ) -> PyResult<()> {
+        self.check_process()?;
+        let wanted = [self.worlds.num_envs(), self.worlds.rules().team.len(), NUM_KINDS];
+        if levels.shape() != wanted {
+            let (found, [envs, robots, _]) = (&levels.shape()[..2], wanted);
+            return Err(PyValueError::new_err(format!(
+                "faults has shape {found:?}: must be [{envs}, {robots}]"
+            )));
+        }
+        let mask = self.mask(mask)?;
+        let levels = levels.readonly();
+        let levels = contiguous(&levels.as_array());
+        self.worlds.set_faults(&levels, mask.as_deref()).map_err(|error| value_error(&error))
+    }
+
     fn snapshot<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         PyBytes::new(py, &py.detach(|| self.worlds.snapshot()))
     }
@@ -239,6 +268,18 @@ impl Batch {
             "this environment was made before a fork; make a new one in the child process, and \
              restore(snapshot()) to go on from the same state",
         ))
+    }
+
+    /// A mask with one flag for each env.
+    fn mask(&self, mask: Option<Bound<PyArray1<bool>>>) -> PyResult<Option<Vec<bool>>> {
+        let mask = mask.map(|mask| mask.to_vec()).transpose()?;
+        let wanted = self.worlds.num_envs();
+        match mask.as_ref().map(Vec::len) {
+            Some(found) if found != wanted => {
+                Err(PyValueError::new_err(format!("mask has shape ({found},): must be ({wanted},)")))
+            }
+            _ => Ok(mask),
+        }
     }
 
     fn advance(&mut self, py: Python, commands: Commands) -> PyResult<Vec<Rescue>> {

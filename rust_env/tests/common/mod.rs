@@ -3,6 +3,7 @@
 
 use innerattn_env::batch::{Autoreset, Batch, Options, StepBuffers};
 use innerattn_env::error::Result;
+use innerattn_env::fault::{Fault, KINDS, Kind};
 use innerattn_env::reward::NUM_COMPONENTS;
 use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
@@ -144,4 +145,23 @@ pub fn some_obstacles() -> Vec<Obstacle> {
     let block =
         |half, at| Obstacle { shape: Shape::Box, radius_m: None, half_extents_m: Some(half), position_m: at };
     vec![disc(0.12), disc(0.06), block([0.1, 0.04], None), block([0.04, 0.25], Some([-0.3, 0.2]))]
+}
+
+/// A fault of the default kind of onset: there from the first step to the last.
+pub fn fault(robot: &str, kind: Kind, value: f64) -> Fault {
+    Fault { robot: robot.into(), kind, value, onset_step: 0, onset_rate_hz: None, duration_steps: None }
+}
+
+/// Faults of every kind for every robot, which come and go at random.
+pub fn coming_and_going(robots: &[Robot]) -> Vec<Fault> {
+    let each = |robot: &Robot| {
+        let name = robot.name.clone();
+        KINDS.map(move |kind| Fault {
+            onset_step: 2,
+            onset_rate_hz: Some(0.5),
+            duration_steps: Some(7),
+            ..fault(&name, kind, 0.4)
+        })
+    };
+    robots.iter().flat_map(each).collect()
 }
