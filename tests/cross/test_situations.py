@@ -101,7 +101,7 @@ def driven(scenario: Scenario, worlds: int, steps: int):
     obs = env.reset()
     for _ in range(steps):
         before = env.victims()
-        result = env.step(policy.act(View(obs, env.positions(), env.velocities(), before)))
+        result = env.step(policy.act(View.of(env, obs)))
         yield env, result, before, env.victims()
         obs = result.obs
 

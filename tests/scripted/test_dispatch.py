@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from innerattn.config import Scenario
+from innerattn.config import Fault, Scenario
+from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
 from innerattn.evaluate.episodes import run_episodes
 from innerattn.scripted import View
@@ -11,10 +12,12 @@ from innerattn.scripted.dispatch import (
     SCRIPTED,
     GreedyPolicy,
     HungarianPolicy,
+    OraclePolicy,
     RandomPolicy,
     scripted_policy,
 )
 
+HEALTHY = BatchEnv("mixed", 1).fault_state()
 VICTIM = np.dtype([("present", "?"), ("task", "i8"), ("x", "f4"), ("y", "f4")])
 
 
@@ -22,7 +25,7 @@ def view(positions: list, victims: list) -> View:
     """One world at rest; a victim is (task, x, y), or None for an empty slot."""
     table = np.array([(v and (True, *v)) or (False, 0, 0, 0) for v in victims], VICTIM)[None]
     places = np.asarray([positions], np.float32)
-    return View(np.zeros((1, 4, 1), np.float32), places, np.zeros_like(places), table)
+    return View(np.zeros((1, 4, 1), np.float32), places, np.zeros_like(places), table, HEALTHY)
 
 
 def chosen(policy: GreedyPolicy | HungarianPolicy, seen: View) -> list[int]:
@@ -70,8 +73,8 @@ def test_random_actions_are_even_and_seeded() -> None:
 
 
 def test_an_unknown_name_is_refused() -> None:
-    with pytest.raises(ConfigError, match="'oracle': known are random, greedy, hungarian"):
-        scripted_policy("oracle", DOUBLE)
+    with pytest.raises(ConfigError, match="'best': known are random, greedy, hungarian, oracle"):
+        scripted_policy("best", DOUBLE)
 
 
 @pytest.mark.parametrize(
@@ -114,3 +117,39 @@ def test_a_large_team_is_served_world_by_world() -> None:
         for worlds in (small, scenario)
     )
     assert many > 2 * few
+
+
+def with_fault(kind: str, value: float) -> View:
+    """The world of `NEAR_THE_FIRST` with a fault of food_1, which hungarian sends to victim 0."""
+    faults = HEALTHY.copy()
+    faults[kind][:, 1] = value
+    return NEAR_THE_FIRST._replace(faults=faults)
+
+
+def test_the_oracle_of_a_healthy_team_is_hungarian() -> None:
+    for scenario in (DOUBLE, Scenario.preset("mixed"), DOUBLE.replace(actions="continuous")):
+        records = [
+            run_episodes(scripted_policy(name, scenario), scenario, 50, 5, record=("actions",))
+            for name in ("hungarian", "oracle")
+        ]
+        np.testing.assert_array_equal(*(record.steps["actions"] for record in records))
+
+
+@pytest.mark.parametrize("kind", ["unavailable", "motor_gain", "speed_limit"])
+def test_the_oracle_sends_whom_it_can(kind: str) -> None:
+    broken = with_fault(kind, 1.0 if kind == "unavailable" else 0.0)
+    assert chosen(HungarianPolicy(DOUBLE), broken) == [1, 0, 1, 0]
+    assert chosen(OraclePolicy(DOUBLE), broken)[0] == 0
+
+
+@pytest.mark.parametrize("actions", ["discrete", "continuous"])
+@pytest.mark.parametrize(("kind", "value"), [("heading_bias", 3.0), ("speed_limit", 0.0)])
+def test_the_oracle_lives_with_faults(actions: str, kind: str, value: float) -> None:
+    faults = (Fault(robot="food_0", kind=kind, value=value),)
+    scenario = DOUBLE.replace(actions=actions, faults=faults)
+    hungarian, oracle = (
+        run_episodes(scripted_policy(name, scenario), scenario, 300, 5).rescue_counts()
+        for name in ("hungarian", "oracle")
+    )
+    gain = oracle - hungarian
+    assert gain.mean() > 5 * gain.std() / len(gain) ** 0.5

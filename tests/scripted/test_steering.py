@@ -63,6 +63,26 @@ def test_arrival_times_match_a_straight_drive(robot: int, distance: float) -> No
     assert 0.1 * (periods - 1) - 1e-9 <= times[0, robot, 0] <= 0.1 * periods + 1e-9
 
 
+def test_faults_of_the_drive_by_hand() -> None:
+    healthy = np.zeros(
+        (2, 4), [(name, "f4") for name in ("motor_gain", "speed_limit", "heading_bias")]
+    )
+    healthy["motor_gain"] = healthy["speed_limit"] = 1.0
+    faults = healthy.copy()
+    faults["speed_limit"][1, 0] = 0.5  # food_0 of world 1 starts at its cap of 0.5 m/s
+    faults["motor_gain"][1, 2] = 0.25  # navigation_0 reaches 0.25 m/s a period / 0.25 = 1 m/s
+    steering, still = Steering(SCENARIO), np.zeros((2, 4, 2))
+    places = [[[0.65, 0.0]]] * 2
+    well = steering.arrival_times(still, still, places)
+    np.testing.assert_allclose(steering.arrival_times(still, still, places, healthy), well)
+    times = steering.arrival_times(still, still, places, faults)
+    np.testing.assert_allclose(times[0], well[0])
+    np.testing.assert_allclose(times[1, :, 0], [1.0, well[1, 1, 0], 0.5 + 0.3, well[1, 3, 0]], 1e-6)
+    faults["heading_bias"][1, 3] = np.pi / 2  # told to go +x it goes +y, told -y it goes +x
+    actions = steering.actions(still, still, np.tile([0.9, 0.0], (2, 4, 1)), faults)
+    assert actions.tolist() == [[1, 1, 1, 1], [1, 1, 1, 4]]
+
+
 coordinate = st.floats(-1, 1, width=32)
 
 

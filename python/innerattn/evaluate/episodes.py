@@ -18,7 +18,10 @@ from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.scripted import Policy, View
 
-FIELDS = ("obs", "actions", "rewards", "positions", "velocities", "victims", "attention")
+FIELDS = (
+    *("obs", "actions", "rewards", "positions", "velocities", "victims", "faults"),
+    "attention",
+)
 """What can be recorded step by step."""
 
 _WORLDS_AT_ONCE = 1024
@@ -52,7 +55,7 @@ class Record:
         rewards_total: (E, R, C) float64 sum over the episode.
         steps: by name, arrays (E, T, ...): obs (R, D) float32, actions (R,) int64 or (R, 2)
             float32, rewards (R, C) float32, positions and velocities (R, 2) float32, victims (V,)
-            structured, attention (H, R, R) float32.
+            structured, faults (R,) structured, attention (H, R, R) float32.
     """
 
     policy: str

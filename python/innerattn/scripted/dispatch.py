@@ -1,6 +1,7 @@
-"""Scripted policies to measure trained ones against: `random`, `greedy` and `hungarian`.
+"""Scripted policies to measure trained ones against: `random`, `greedy`, `hungarian` and `oracle`.
 
-They see the true state of the worlds and plan for all worlds of a batch at once; none learns.
+They see the true state of the worlds and plan for all worlds of a batch at once; none learns. Only
+`oracle` knows of faults.
 """
 
 from __future__ import annotations
@@ -39,6 +40,9 @@ class RandomPolicy:
 class _Dispatcher(ABC):
     """What both dispatching policies share: every step, targets first and then actions."""
 
+    knows_faults = False
+    """Whether the robots reckon with faults, or take all to be healthy."""
+
     def __init__(self, scenario: Scenario) -> None:
         """Take the team and the tasks from ``scenario``."""
         self.needs = Needs(scenario)
@@ -50,7 +54,10 @@ class _Dispatcher(ABC):
         chosen = self.choose(view, places)
         targets = np.take_along_axis(places, np.maximum(chosen, 0)[..., None], 1)
         targets = np.where(chosen[..., None] >= 0, targets, 0.0)
-        return self.steering.actions(view.positions, view.velocities, targets)
+        return self.steering.actions(view.positions, view.velocities, targets, self._faults(view))
+
+    def _faults(self, view: View) -> NDArray[np.void] | None:
+        return view.faults if self.knows_faults else None
 
     @abstractmethod
     def choose(self, view: View, places: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -78,13 +85,27 @@ class HungarianPolicy(_Dispatcher):
     def choose(self, view: View, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """See `_Dispatcher.choose`."""
         permitted = self.needs.permitted(view.victims["present"], view.victims["task"])
-        times = self.steering.arrival_times(view.positions, view.velocities, places)
+        faults = self._faults(view)
+        if faults is not None:
+            permitted &= (faults["unavailable"] < 1.0)[:, :, None, None]
+        times = self.steering.arrival_times(view.positions, view.velocities, places, faults)
         need = assign(pair_costs(times, permitted))
         return np.where(need >= 0, need // permitted.shape[-1], -1)
 
 
+class OraclePolicy(HungarianPolicy):
+    """As `hungarian`, and knows every fault.
+
+    It reckons with weak, slow and misled drives, steers against a bias, and sends nobody who is
+    never available.
+    """
+
+    name = "oracle"
+    knows_faults = True
+
+
 SCRIPTED = ("random", "greedy", "hungarian")
-"""Names of the scripted policies."""
+"""Names of the scripted policies that every evaluation measures."""
 
 
 def scripted_policy(name: str, scenario: Scenario, seed: int = 0) -> Policy:
@@ -99,4 +120,6 @@ def scripted_policy(name: str, scenario: Scenario, seed: int = 0) -> Policy:
         return GreedyPolicy(scenario)
     if name == "hungarian":
         return HungarianPolicy(scenario)
-    raise ConfigError(f"unknown policy {name!r}: known are {', '.join(SCRIPTED)}")
+    if name == "oracle":
+        return OraclePolicy(scenario)
+    raise ConfigError(f"unknown policy {name!r}: known are {', '.join((*SCRIPTED, 'oracle'))}")

@@ -18,17 +18,19 @@ class View(NamedTuple):
         positions: (E, R, 2) float32 [m].
         velocities: (E, R, 2) float32 [m/s].
         victims: (E, V) structured: present, task, id, appeared_step, x, y [m].
+        faults: (E, R) structured, the fields of `BatchEnv.fault_state`.
     """
 
     obs: NDArray[np.float32]
     positions: NDArray[np.float32]
     velocities: NDArray[np.float32]
     victims: NDArray[np.void]
+    faults: NDArray[np.void]
 
     @classmethod
     def of(cls, env: BatchEnv, obs: NDArray[np.float32]) -> Self:
         """The present view of the worlds of ``env``, whose observations are ``obs``."""
-        return cls(obs, env.positions(), env.velocities(), env.victims())
+        return cls(obs, env.positions(), env.velocities(), env.victims(), env.fault_state())
 
 
 class Policy(Protocol):

@@ -1,6 +1,7 @@
 """How a robot moves: when it can be somewhere, and which action brings it there.
 
-It follows the world's law of motion without contacts: each control period starts with
+Where faults of the drive are given, they are reckoned with. It follows the world's law of motion
+without contacts: each control period starts with
 v <- clip((1 - damping) v + F/m dt u, max_speed), and then p <- p + v dt.
 """
 
@@ -39,15 +40,21 @@ class Steering:
         self._limit = np.array([robot.max_speed_mps for robot in robots])
         self._push = np.array([robot.drive_force_n / robot.mass_kg for robot in robots]) * self._dt
         self._continuous = scenario.actions == "continuous"
-        speeds = np.zeros((_ENOUGH_PERIODS, len(robots)))
+        self.speed, self.lag = self._speed_and_lag(self._push, self._limit)
+
+    def _speed_and_lag(self, push: Array, limit: Array) -> tuple[Array, Array]:
+        """Final speeds [m/s] and lags [s] of robots that gain ``push`` a period up to ``limit``."""
+        speeds = np.zeros((_ENOUGH_PERIODS, *np.shape(push)))
         for period in range(1, _ENOUGH_PERIODS + 1):
             before = speeds[period - 2] if period > 1 else 0.0
-            speeds[period - 1] = np.minimum(self._keep * before + self._push, self._limit)
-        self.speed: Array = speeds[-1]
-        shortfall = 1.0 - speeds / np.maximum(self.speed, 1e-12)
-        self.lag: Array = np.where(self.speed > 0.0, shortfall.sum(0) * self._dt, 0.0)
+            speeds[period - 1] = np.minimum(self._keep * before + push, limit)
+        final = speeds[-1]
+        shortfall = 1.0 - speeds / np.maximum(final, 1e-12)
+        return final, np.where(final > 0.0, shortfall.sum(0) * self._dt, 0.0)
 
-    def arrival_times(self, positions: Any, velocities: Any, places: Any) -> Array:
+    def arrival_times(
+        self, positions: Any, velocities: Any, places: Any, faults: NDArray[np.void] | None = None
+    ) -> Array:
         """Estimated time until each robot is within the rescue radius of each place.
 
         The way at final speed, and the part of the lag that the present velocity has not made up
@@ -57,6 +64,7 @@ class Steering:
             positions: (E, R, 2) [m].
             velocities: (E, R, 2) [m/s].
             places: (E, V, 2) [m].
+            faults: (E, R) structured, the fields of `BatchEnv.fault_state`; None: all are healthy.
 
         Returns:
             (E, R, V) float64 [s]; 0 for a robot that is there, at most `NEVER_S`.
@@ -65,11 +73,20 @@ class Steering:
         distance = np.sqrt((way * way).sum(-1))
         gap = np.maximum(distance - self._radius, 0.0)
         towards = (way * np.asarray(velocities)[:, :, None]).sum(-1) / np.maximum(distance, 1e-9)
-        speed = np.maximum(self.speed, 1e-9)[:, None]
-        times = gap / speed + np.maximum(self.lag[:, None] * (1.0 - towards / speed), 0.0)
+        speed, lag = self.speed, self.lag
+        if faults is not None:
+            left = np.stack([faults["motor_gain"], faults["speed_limit"]], -1).astype(np.float64)
+            cases, case = np.unique(left.reshape(len(left), -1), axis=0, return_inverse=True)
+            gain, cap = np.moveaxis(cases.reshape(len(cases), -1, 2), -1, 0)
+            speed, lag = self._speed_and_lag(self._push * gain, self._limit * cap)
+            speed, lag = speed[case.reshape(-1)], lag[case.reshape(-1)]
+        speed, lag = np.maximum(speed, 1e-9)[..., None], lag[..., None]
+        times = gap / speed + np.maximum(lag * (1.0 - towards / speed), 0.0)
         return np.where(gap > 0.0, np.minimum(times, NEVER_S), 0.0)
 
-    def actions(self, positions: Any, velocities: Any, targets: Any) -> NDArray[Any]:
+    def actions(
+        self, positions: Any, velocities: Any, targets: Any, faults: NDArray[np.void] | None = None
+    ) -> NDArray[Any]:
         """Drive every robot to its target and let it come to rest there.
 
         The action chosen is the one after which, coasting for one period more, the robot is
@@ -80,6 +97,7 @@ class Steering:
             positions: (E, R, 2) [m].
             velocities: (E, R, 2) [m/s].
             targets: (E, R, 2) [m].
+            faults: (E, R) structured, the fields of `BatchEnv.fault_state`; None: all are healthy.
 
         Returns:
             (E, R) int64, or (E, R, 2) float32 in [-1, 1] where actions are continuous.
@@ -87,13 +105,26 @@ class Steering:
         way = np.asarray(targets, np.float64) - positions
         kept = self._keep * np.asarray(velocities, np.float64)
         reach = self._dt * (1.0 + self._keep)
+        push, limit, bias = self._push, self._limit, np.zeros(len(self._push))
+        if faults is not None:
+            push = push * faults["motor_gain"]
+            limit = limit * faults["speed_limit"]
+            bias = faults["heading_bias"].astype(np.float64)
         if self._continuous:
-            wish = (way / reach - kept) / np.maximum(self._push, 1e-12)[:, None]
+            wish = (way / reach - kept) / np.maximum(push, 1e-12)[..., None]
+            wish = _turned(wish, -bias)
             length = np.sqrt((wish * wish).sum(-1, keepdims=True))
             return np.asarray(wish / np.maximum(length, 1.0), np.float32)
-        drives = _DIRECTIONS[:, None] * self._push[:, None]
-        after = kept[:, :, None] + drives.transpose(1, 0, 2)
+        drives = _turned(_DIRECTIONS, np.expand_dims(bias, -1)) * push[..., None, None]
+        after = kept[:, :, None] + drives
         speed = np.sqrt((after * after).sum(-1, keepdims=True))
-        after *= np.minimum(1.0, self._limit[:, None, None] / np.maximum(speed, 1e-12))
+        after *= np.minimum(1.0, limit[..., None, None] / np.maximum(speed, 1e-12))
         miss = way[:, :, None] - reach * after
         return np.asarray((miss * miss).sum(-1).argmin(-1))
+
+
+def _turned(vectors: Array, angle: Array) -> Array:
+    """Vectors (..., 2), turned counterclockwise [rad]."""
+    sin, cos = np.sin(angle), np.cos(angle)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([cos * x - sin * y, sin * x + cos * y], -1)
