@@ -71,10 +71,26 @@ class Critic(nn.Module):
             available: (B, R) bool; unavailable robots are masked out of the attention. None: all
                 are available.
         """
+        return self.value(*self.encode(obs, actions), available)
+
+    def encode(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor]:
+        """The encodings e_i^s of observations alone and e_i of observations and actions.
+
+        Args:
+            obs: (R, B, D) observations.
+            actions: (R, B) int64 actions.
+
+        Returns:
+            Both (R, B, W).
+        """
         chosen = obs.new_zeros(*actions.shape, self.num_actions)
         chosen.scatter_(2, actions.unsqueeze(2), 1.0)
         own = functional.leaky_relu_(self.state_encoder(obs))
         others = functional.leaky_relu_(self.action_encoder(torch.cat([obs, chosen], dim=2)))
+        return own, others
+
+    def value(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> CriticOutput:
+        """Value every own action from the encodings that `encode` gives, (R, B, W) each."""
         attended = self.attention(own, others, available)
         hidden = functional.leaky_relu_(self.hidden.side_by_side(own, attended.mixed))
         return CriticOutput(self.output.batch_last(hidden), attended)
