@@ -60,7 +60,7 @@ def mean_interval(values: ArrayLike, seed: int) -> Interval:
     """
     columns = _columns(values)
     means = resampled_means(columns, seed)[:, 0]
-    return _interval(columns[:, 0].mean(), means)
+    return percentile_interval(columns[:, 0].mean(), means)
 
 
 def score_interval(
@@ -91,7 +91,7 @@ def score_interval(
     m, r, h = columns.mean(0)
     if h <= r or denominator.min() <= 0.0:
         return None
-    return _interval((m - r) / (h - r), numerator / denominator)
+    return percentile_interval((m - r) / (h - r), numerator / denominator)
 
 
 def resampled_means(
@@ -126,6 +126,7 @@ def _columns(*values: ArrayLike) -> NDArray[np.float64]:
     return np.stack(arrays, 1)
 
 
-def _interval(mean: float, resampled: NDArray[np.float64]) -> Interval:
+def percentile_interval(mean: float, resampled: NDArray[np.float64]) -> Interval:
+    """A value and the middle 95 % of what resampling makes of it."""
     low, high = np.percentile(resampled, (_LOW, _HIGH))
     return Interval(float(mean), float(low), float(high))

@@ -1,0 +1,156 @@
+"""`innerattn robustness`: what a trained team keeps when a robot fails, and its attention."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+from rich.console import Console
+
+from innerattn.cli.options import Command, UsageError
+from innerattn.cli.progress import Evaluating
+from innerattn.cli.robustness_tables import print_robustness
+from innerattn.config.files import write_whole
+from innerattn.envs.batch import FAULT_KINDS
+from innerattn.errors import RunError
+
+if TYPE_CHECKING:
+    from innerattn.evaluate.bound_figures import Bounds
+    from innerattn.evaluate.robustness import Grid, Kept
+
+_SCRIPTED = ("greedy", "hungarian", "oracle")
+
+
+@dataclass(kw_only=True)
+class Robustness(Command):
+    """Measure what a trained team keeps when a robot fails, beside scripted policies."""
+
+    runs: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="RUN [RUN ...]")]
+    """Folders of runs; all meet the worlds of the first, without the faults of its training."""
+    faults: str = "all"
+    """Kinds of faults, separated by commas."""
+    episodes: int = 100
+    """Worlds in which each fault is tried."""
+    episode_steps: int | None = None
+    """Length of an episode [control steps]; None: twice that of the run. Faults begin at the start,
+    or when half of it is over."""
+    seed: int | None = None
+    """Seed of the worlds; None: as the run says."""
+    json: Path | None = None
+    """Write the figures to this file too; - for standard output, and nothing else there."""
+    plot: Path | None = None
+    """Draw the first run's figures as a heat map into this file (.pdf, .png or .svg)."""
+
+    def run(self) -> int:
+        """Measure, print, write.
+
+        Returns:
+            The exit code, 0.
+
+        Raises:
+            InnerattnError: no such run, runs that do not fit each other, or wrong options.
+            OSError: a file cannot be written.
+        """
+        kinds = self._check()
+        if self.plot is not None:
+            from innerattn.report.heatmap import check_format
+
+            check_format(self.plot)
+        grid, found, methods = self._retention(kinds)
+        bounds = self._bounds()
+        if self.json is not None:
+            document = json.dumps(
+                _document(grid, found, methods, bounds), indent=1, allow_nan=False
+            )
+            if self.json == Path("-"):
+                print(document)
+            else:
+                write_whole(self.json, f"{document}\n".encode())
+        if self.json != Path("-"):
+            console = Console(markup=False, highlight=False)
+            print_robustness(console, grid, found, bounds)
+        if self.plot is not None:
+            from innerattn.report.heatmap import write_heatmap
+
+            first = next(iter(found))
+            write_heatmap(self.plot, first, found[first], grid)
+        return 0
+
+    def _check(self) -> tuple[str, ...]:
+        """The kinds asked for, once every option has been looked at."""
+        if not self.runs:
+            raise UsageError("RUN: at least one run is needed")
+        for name, least in (("episodes", 2), ("episode_steps", 2), ("seed", 0)):
+            value = getattr(self, name)
+            if value is not None and value < least:
+                flag = name.replace("_", "-")
+                raise UsageError(f"--{flag} = {value}: must be at least {least}")
+        for path in (self.json, self.plot):
+            if path is not None and not path.parent.is_dir():
+                raise RunError(f"{path.parent}: no such folder")
+        if self.faults == "all":
+            return FAULT_KINDS
+        kinds = tuple(dict.fromkeys(kind.strip() for kind in self.faults.split(",")))
+        unknown = [kind for kind in kinds if kind not in FAULT_KINDS]
+        if unknown:
+            known = ", ".join(FAULT_KINDS)
+            raise UsageError(f"--faults = {unknown[0]!r}: known are all, {known}")
+        return kinds
+
+    def _retention(self, kinds: tuple[str, ...]) -> tuple[Grid, dict[str, Kept], dict[str, str]]:
+        from innerattn.config import read_toml
+        from innerattn.evaluate.robustness import Grid, play_all
+        from innerattn.evaluate.trained import load_trained
+        from innerattn.scripted import scripted_policy
+        from innerattn.train import read_info
+        from innerattn.train.build import thread_count, torch_threads
+
+        read_info(self.runs[0])
+        config = read_toml(Path(self.runs[0]) / "config.toml")
+        steps = self.episode_steps or 2 * config.scenario.episode_steps
+        seed = config.evaluate.seed if self.seed is None else self.seed
+        scenario = config.scenario.replace(episode_steps=steps, faults=())
+        grid = Grid(scenario, kinds=kinds, episodes=self.episodes, seed=seed)
+        policies: list[tuple[str, Any]] = []
+        methods: dict[str, str] = {}
+        for name, run in zip(_names(self.runs), self.runs, strict=True):
+            trained, policy = load_trained(run, scenario)
+            policies.append((name, policy))
+            methods[name] = trained.train.method
+        policies += [(name, scripted_policy(name, scenario, seed)) for name in _SCRIPTED]
+        with torch_threads(thread_count(config)), Evaluating() as progress:
+            found = play_all(policies, grid, num_threads=config.train.threads, progress=progress)
+        return grid, found, methods
+
+    def _bounds(self) -> dict[str, Bounds]:
+        from innerattn.evaluate.bounds import bounds_of_run
+
+        return {
+            name: bounds_of_run(run, seed=self.seed)
+            for name, run in zip(_names(self.runs), self.runs, strict=True)
+        }
+
+
+def _names(runs: Iterable[str]) -> list[str]:
+    """A name for each run: that of its folder, with the folder above where two are alike."""
+    paths = [Path(run).resolve() for run in runs]
+    names = [path.name for path in paths]
+    return [
+        name if names.count(name) == 1 else f"{path.parent.name}/{name}"
+        for name, path in zip(names, paths, strict=True)
+    ]
+
+
+def _document(
+    grid: Grid, found: dict[str, Kept], methods: dict[str, str], bounds: dict[str, Bounds]
+) -> dict[str, Any]:
+    from innerattn.evaluate.robustness_figures import robustness_document
+
+    return {
+        **robustness_document(grid, found, methods),
+        "bounds": {name: one.to_json() for name, one in bounds.items()},
+    }

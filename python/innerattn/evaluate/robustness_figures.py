@@ -1,0 +1,108 @@
+"""The figures of robustness as one document; it runs nothing and prints nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from innerattn.evaluate.retention import Estimate
+from innerattn.evaluate.robustness import ONSETS, Grid, Kept, fault_value
+from innerattn.evaluate.statistics import Interval
+
+SCHEMA_VERSION = 1
+
+
+def robustness_document(grid: Grid, found: Mapping[str, Kept], runs: Mapping[str, str]) -> Any:
+    """What `robustness --json` holds about retention.
+
+    Args:
+        grid: the faults.
+        found: what each policy keeps, by name; the first is the one that others are compared with.
+        runs: training method by name, of those policies that are trained.
+    """
+    first = next(iter(found))
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "situation": grid.scenario.situation,
+        "robots": [robot.name for robot in grid.scenario.robots],
+        "episodes": grid.episodes,
+        "episode_steps": grid.scenario.episode_steps,
+        "seed": grid.seed,
+        "onset_steps": {"start": 0, "middle": grid.middle},
+        "severities": list(grid.severities),
+        "policies": [
+            {"policy": name, "method": runs.get(name, name), **_policy(grid, kept)}
+            for name, kept in found.items()
+        ],
+        "differences": [
+            {
+                "policy": first,
+                "minus": name,
+                "by_kind": _by_kind(grid, found[first].by_kind() - kept.by_kind()),
+            }
+            for name, kept in found.items()
+            if name != first
+        ],
+    }
+
+
+def worst_robot(grid: Grid, kept: Kept, kind: int, onset: int = 0) -> tuple[str, Interval]:
+    """The robot whose fault of a kind, at the last severity, costs most; and what is kept then."""
+    row = kept.cells[kind, -1, :, onset]
+    robot = int(row.value.argmin())
+    return grid.scenario.robots[robot].name, row[robot].interval()
+
+
+def number(interval: Interval) -> dict[str, float] | None:
+    """An interval as plain numbers; None where it, or one of its ends, is not defined."""
+    numbers = asdict(interval)
+    return numbers if all(map(math.isfinite, numbers.values())) else None
+
+
+def _policy(grid: Grid, kept: Kept) -> dict[str, Any]:
+    return {
+        "rescues_per_episode": number(kept.clean.interval()),
+        "by_kind": _by_kind(grid, kept.by_kind()),
+        "worst": [
+            {"kind": kind, "onset": onset, "robot": worst[0], "retention": number(worst[1])}
+            for k, kind in enumerate(grid.kinds)
+            for o, onset in enumerate(ONSETS)
+            for worst in [worst_robot(grid, kept, k, o)]
+        ],
+        "after_onset": {
+            kind: {
+                "early": number(kept.early.mean((1, 2))[k].interval()),
+                "late": number(kept.late.mean((1, 2))[k].interval()),
+                "late_minus_early": number((kept.late - kept.early).mean((1, 2))[k].interval()),
+            }
+            for k, kind in enumerate(grid.kinds)
+        },
+        "areas": [
+            {"kind": kind, "robot": robot.name, "onset": onset, "area": number(area)}
+            for k, kind in enumerate(grid.kinds)
+            for r, robot in enumerate(grid.scenario.robots)
+            for o, onset in enumerate(ONSETS)
+            for area in [kept.areas[k, r, o].interval()]
+        ],
+        "cells": [
+            {
+                "kind": kind,
+                "severity": severity,
+                "value": fault_value(grid.scenario, r, kind, severity),
+                "robot": robot.name,
+                "onset": onset,
+                "retention": number(kept.cells[k, s, r, o].interval()),
+            }
+            for k, kind in enumerate(grid.kinds)
+            for s, severity in enumerate(grid.severities)
+            for r, robot in enumerate(grid.scenario.robots)
+            for o, onset in enumerate(ONSETS)
+        ],
+    }
+
+
+def _by_kind(grid: Grid, estimate: Estimate) -> dict[str, Any]:
+    each = {kind: number(estimate[k].interval()) for k, kind in enumerate(grid.kinds)}
+    return {**each, "all": number(estimate.mean(0).interval())}

@@ -1,0 +1,1 @@
+"""Reports: draws what evaluation found; it measures nothing and trains nothing."""

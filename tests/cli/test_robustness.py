@@ -1,0 +1,69 @@
+"""`innerattn robustness`: the document, the tables, the picture, and what is refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from innerattn.cli.main import main
+
+FEW = ["--episodes", "4", "--episode-steps", "40", "--faults", "motor_gain, lost_communication"]
+
+
+def test_the_document_alone_on_standard_output(
+    run_dir: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["robustness", str(run_dir), *FEW, "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["schema_version"] == 1
+    names = [policy["policy"] for policy in found["policies"]]
+    assert names == [run_dir.name, "greedy", "hungarian", "oracle"]
+    assert found["policies"][0]["method"] == "td-inner"
+    assert (found["episodes"], found["episode_steps"]) == (4, 40)
+    assert found["policies"][0]["by_kind"].keys() == {"motor_gain", "lost_communication", "all"}
+    assert found["bounds"][run_dir.name]["violations"] == 0
+
+
+def test_tables_a_file_and_a_picture(
+    run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = {path: path.stat().st_mtime_ns for path in run_dir.rglob("*")}
+    files = {"--json": tmp_path / "found.json", "--plot": tmp_path / "found.png"}
+    options = [word for option, path in files.items() for word in (option, str(path))]
+    assert main(["robustness", str(run_dir), str(run_dir), *FEW, "--seed", "1", *options]) == 0
+    shown = capsys.readouterr().out
+    for words in ("motor gain", "lost communication", "all kinds", "oracle", "0 violations"):
+        assert words in shown
+    assert all(len(line.rstrip()) <= 80 for line in shown.splitlines())
+    assert json.loads(files["--json"].read_text())["seed"] == 1
+    assert files["--plot"].read_bytes().startswith(b"\x89PNG")
+    assert {path: path.stat().st_mtime_ns for path in run_dir.rglob("*")} == before
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "message"),
+    [
+        (["--faults", "rust"], 2, "--faults = 'rust': known are all, motor_gain"),
+        (["--episodes", "1"], 2, "--episodes = 1: must be at least 2"),
+        (["--episode-steps", "1"], 2, "--episode-steps = 1: must be at least 2"),
+        (["--plot", "map.jpeg"], 1, "must end in .pdf, .png, .svg"),
+        (["--json", "nowhere/a.json"], 1, "nowhere: no such folder"),
+    ],
+)
+def test_refusals_are_one_line(
+    run_dir: Path,
+    options: list[str],
+    code: int,
+    message: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["robustness", str(run_dir), *FEW, *options]) == code
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert message in captured.err
+
+
+def test_a_run_that_is_not_there_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["robustness", "no-such-run", *FEW]) == 1
+    assert "no-such-run" in capsys.readouterr().err
