@@ -1,6 +1,7 @@
 """The scenario model: presets, defaults, files, and errors that name the key."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -38,7 +39,18 @@ def test_presets(name: str, victims: int) -> None:
 
 
 def test_preset_names_are_complete() -> None:
-    assert set(SCENARIOS) == {"single", "double", "mixed"}
+    teams = {"mixed-1-food": 3, "mixed-4-food": 6, "mixed-8": 8, "mixed-16": 16}
+    assert set(SCENARIOS) == {"single", "double", "mixed", "mixed-faults", *teams}
+    assert {name: Scenario.preset(name).num_robots for name in teams} == teams
+
+
+def test_the_preset_with_faults_is_mixed_with_faults_that_come_in_most_episodes() -> None:
+    scenario = Scenario.preset("mixed-faults")
+    assert scenario.replace(faults=()) == Scenario.preset("mixed")
+    rates = [fault.onset_rate_hz or 0.0 for fault in scenario.faults]
+    onsets = sum(rates) * scenario.episode_steps * scenario.dt_s
+    assert 1 - math.exp(-onsets) == pytest.approx(0.6, abs=0.01)
+    assert {fault.robot for fault in scenario.faults} == {r.name for r in scenario.robots}
 
 
 def test_victim_slots_follow_the_situation() -> None:
