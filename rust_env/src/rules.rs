@@ -1,7 +1,7 @@
 //! A scenario made ready to play: every constant that worlds share, computed once.
 
 use crate::error::Result;
-use crate::fault::Kind;
+use crate::fault::{HEALTHY, Kind};
 use crate::geometry::Solid;
 use crate::observe::Layout;
 use crate::physics::Physics;
@@ -46,7 +46,7 @@ pub struct Rules {
     pub weights: Weights,
     /// Distances kept when placing things.
     pub placing: Placing,
-    /// The scenario's faults.
+    /// The scenario's faults, but for those that leave their robot healthy.
     pub faults: Vec<Process>,
 }
 
@@ -74,11 +74,13 @@ impl Rules {
     }
 }
 
+#[allow(clippy::float_cmp)] // the healthy value itself, not one near it
 fn processes(scenario: &Scenario) -> Vec<Process> {
     let index = |name: &String| scenario.robots.iter().position(|robot| robot.name == *name);
     scenario
         .faults
         .iter()
+        .filter(|fault| fault.value as f32 != HEALTHY[fault.kind as usize]) // it would do nothing
         .map(|fault| Process {
             robot: index(&fault.robot).unwrap_or_default(),
             kind: fault.kind,
