@@ -9,43 +9,17 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import shutil
 import statistics
-import subprocess
-import sys
-from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 from page import LEARNING, publish, table
+from runs import Run, train_all
 
 from innerattn.evaluate.statistics import student_interval
 
 PRESETS = ("mixed", "double", "single")
-
-
-def summary(
-    runs: Path, preset: str, method: str, script: str, budget: str, seed: int
-) -> dict[str, Any]:
-    """The evaluation of a run, trained now if it is missing or was cut short."""
-    begin = "" if script == "none" else f"-from-{script}"
-    folder = runs / f"{preset}-{method}{begin}-{budget}-s{seed}"
-    record = folder / "evaluation" / "summary.json"
-    if not record.exists():
-        shutil.rmtree(folder, ignore_errors=True)
-        command = ["innerattn", "train", "--preset", preset, "--method", method]
-        command += ["--warm-start", script, "--budget", budget, "--seed", str(seed)]
-        command += ["--train.threads", "1"]
-        environment = os.environ | {"OMP_NUM_THREADS": "1"}
-        done = subprocess.run(
-            [*command, "--run-dir", str(folder)], env=environment, capture_output=True, text=True
-        )
-        if done.returncode:
-            sys.exit(f"{folder}: {done.stderr.strip()}")
-        print(f"{folder} done", file=sys.stderr)
-    found: dict[str, Any] = json.loads(record.read_text())
-    return found
 
 
 def row(found: list[dict[str, Any]]) -> list[str]:
@@ -77,19 +51,17 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     given = parser.parse_args()
     cases = list(product(given.methods, given.budgets, PRESETS))
-    with ThreadPoolExecutor(given.workers) as pool:
-        runs = {
-            (case, seed): pool.submit(
-                summary, given.runs, case[2], case[0], given.warm_start, case[1], seed
-            )
-            for case in cases
-            for seed in given.seeds
-        }
-        rows = [
-            [f"{method}, {budget}, {preset}", *row([runs[case, s].result() for s in given.seeds])]
-            for case in cases
-            for method, budget, preset in [case]
-        ]
+    wanted = [
+        Run(preset, method, budget, seed, given.warm_start)
+        for method, budget, preset in cases
+        for seed in given.seeds
+    ]
+    folders = iter(train_all(wanted, given.runs, given.workers))
+    rows = []
+    for method, budget, preset in cases:
+        records = [next(folders) / "evaluation" / "summary.json" for _ in given.seeds]
+        found = [json.loads(record.read_text()) for record in records]
+        rows.append([f"{method}, {budget}, {preset}", *row(found)])
     head = ["", "rescues, 25 steps", "score, 25 steps", "score, 100 steps"]
     section = "learning" if given.warm_start == "none" else "warm_start"
     publish(section, table(head, rows), LEARNING)

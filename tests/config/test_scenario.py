@@ -64,7 +64,7 @@ def test_victim_slots_follow_the_situation() -> None:
 
 @pytest.mark.parametrize("name", ["quick", "Mixed", "", "../scenario"])
 def test_unknown_preset_names_the_known(name: str) -> None:
-    with pytest.raises(ConfigError, match="double, mixed, .*single"):
+    with pytest.raises(ConfigError, match=r"double, mixed, .*single"):
         Scenario.preset(name)
 
 
