@@ -7,6 +7,7 @@ import pytest
 
 from innerattn.evaluate.statistics import (
     mean_interval,
+    resampled_counts,
     resampled_means,
     score_interval,
     student_interval,
@@ -39,6 +40,20 @@ def test_columns_stay_paired() -> None:
     columns = np.random.default_rng(0).normal(size=(50, 1)) * [1.0, -2.0] + [0.0, 3.0]
     means = resampled_means(columns, seed=0)
     np.testing.assert_allclose(means[:, 1], 3.0 - 2.0 * means[:, 0], atol=1e-12)
+
+
+def test_counts_of_a_resample_are_those_of_drawing_one_by_one() -> None:
+    counts = resampled_counts(5, seed=0, resamples=40_000)
+    assert counts.shape == (40_000, 5)
+    np.testing.assert_array_equal(counts.sum(1), 5)
+    rows = np.random.default_rng(1).integers(0, 5, (40_000, 5))
+    plain = np.stack([np.bincount(row, minlength=5) for row in rows])
+    for count in range(6):
+        share, expected = np.mean(counts == count, 0), np.mean(plain == count, 0)
+        np.testing.assert_allclose(share, expected, atol=0.012)
+    np.testing.assert_allclose(np.cov(counts.T), np.cov(plain.T), atol=0.03)
+    np.testing.assert_array_equal(counts, resampled_counts(5, seed=0, resamples=40_000))
+    assert not np.array_equal(counts, resampled_counts(5, seed=1, resamples=40_000))
 
 
 def test_score_against_a_plain_loop() -> None:

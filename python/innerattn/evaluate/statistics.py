@@ -118,15 +118,33 @@ def resampled_means(
     return means
 
 
+def resampled_counts(n: int, seed: int, resamples: int = _RESAMPLES) -> NDArray[np.float64]:
+    """How often each of ``n`` episodes is drawn in each resample of a bootstrap.
+
+    The mean of a resample is ``counts @ values / n``. It is faster than `resampled_means` where
+    many figures are of the same episodes, and keeps them all paired.
+
+    Args:
+        n: number of episodes.
+        seed: seed of the resampling.
+        resamples: how many, S.
+
+    Returns:
+        (S, n) float64 whole numbers; every row sums to n.
+    """
+    drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1.0 / n), resamples)
+    return drawn.astype(np.float64)
+
+
+def percentile_interval(mean: float, resampled: NDArray[np.float64]) -> Interval:
+    """A mean, and the middle 95 % of what resampling (S,) made of it."""
+    low, high = np.percentile(resampled, (_LOW, _HIGH))
+    return Interval(float(mean), float(low), float(high))
+
+
 def _columns(*values: ArrayLike) -> NDArray[np.float64]:
     arrays = [np.asarray(value, np.float64) for value in values]
     shapes = {array.shape for array in arrays}
     if len(shapes) != 1 or arrays[0].ndim != 1 or not arrays[0].size:
         raise ValueError(f"values of shapes {sorted(shapes)}: must be (n,) for one n >= 1")
     return np.stack(arrays, 1)
-
-
-def percentile_interval(mean: float, resampled: NDArray[np.float64]) -> Interval:
-    """A value and the middle 95 % of what resampling makes of it."""
-    low, high = np.percentile(resampled, (_LOW, _HIGH))
-    return Interval(float(mean), float(low), float(high))
