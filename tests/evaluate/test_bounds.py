@@ -1,7 +1,6 @@
 """Robustness bounds of small networks and of runs: what must stay, stays; a check can fail."""
 
 import json
-from contextlib import closing
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
@@ -9,18 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from fresh_run import config_of_team, make_run, run_config
 from plain_critic import D, W, generator, make_actor, make_critic, make_states
 
-from innerattn.config import RunConfig, Scenario, load_run_config
-from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.evaluate import bounds, disturb, inequalities
 from innerattn.evaluate.bound_figures import Bounds
 from innerattn.evaluate.bounds import bounds_of_run, measure_bounds, played_states
 from innerattn.evaluate.perturbation import random_directions, rms_norm
 from innerattn.nn import Critic, JointCritic, UniformAttention
-from innerattn.train import RunFolder, load_policy
-from innerattn.train.build import build_learner
+from innerattn.train import load_policy
 
 
 def measured(robots: int = 3, seed: int = 0, critic: Critic | JointCritic | None = None) -> Bounds:
@@ -166,19 +163,6 @@ def test_sizes_are_relative_to_what_is_changed() -> None:
     assert list(found.observation_norms) == pytest.approx(expected)
 
 
-def run_config(method: str, **values: object) -> RunConfig:
-    small = {"train.method": method, "train.threads": 1, "network.hidden_width": 8}
-    return load_run_config("mixed", overrides={**small, **values})
-
-
-def make_run(folder: Path, config: RunConfig) -> Path:
-    """A run folder with the weights that training begins with."""
-    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
-        learner = build_learner(config, env)
-    RunFolder.create(folder, config, threads=1).save_weights(learner.state(), 0)
-    return folder
-
-
 @pytest.mark.parametrize(
     ("method", "attention"),
     [("td-inner", "inner"), ("ppo-inner", "inner"), ("td-uniform", "uniform"), ("mappo", "none")],
@@ -223,12 +207,6 @@ def test_masked_attention(tmp_path: Path) -> None:
 
 
 def test_a_team_of_one_is_refused(tmp_path: Path) -> None:
-    team = Scenario()
-    alone = Scenario(
-        situation="single",
-        robots=team.robots[:1],
-        tasks=(team.tasks[0].model_copy(update={"needs": ("food",)}),),
-    )
-    config = RunConfig.model_validate({"scenario": alone, "train": {"threads": 1}})
+    run = make_run(tmp_path / "run", config_of_team(1))
     with pytest.raises(RunError, match="one robot"):
-        bounds_of_run(make_run(tmp_path / "run", config))
+        bounds_of_run(run)
