@@ -1,0 +1,173 @@
+"""Where a trained critic's attention goes when a robot fails: plays the worlds of the question.
+
+The same worlds are played without a fault and with each fault of each robot; what the figures mean
+is in `attention_shift` and docs/robustness.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from innerattn.config import Scenario
+from innerattn.config.scenario import Fault, Robot
+from innerattn.envs.batch import FAULT_KINDS
+from innerattn.errors import RunError
+from innerattn.evaluate.attention_shift import (
+    Pooled,
+    Twins,
+    areas_by_head,
+    by_head,
+    pooled_kinds,
+    pooled_robots,
+    shift_of,
+)
+from innerattn.evaluate.episodes import Record, run_episodes
+from innerattn.evaluate.label_shuffle import SHUFFLES
+from innerattn.evaluate.shift_figures import FaultAttention, KindShift
+from innerattn.evaluate.statistics import resampled_counts
+from innerattn.evaluate.trained import load_trained
+from innerattn.train.build import thread_count, torch_threads
+
+EPISODES = 100
+"""Worlds that each fault is played in."""
+
+ProgressCall = Callable[[int, int], None]
+"""Called with the plays done and the plays to do; one play is of all worlds."""
+
+_MOST_NOISE = 10.0  # what a scenario takes, m and m/s
+
+
+def worst_fault(kind: str, robot: Robot, scenario: Scenario, onset_step: int) -> Fault:
+    """The worst fault of a kind: no drive, the wrong way round, or sight that tells nothing.
+
+    Args:
+        kind: one of `FAULT_KINDS`.
+        robot: the robot that has it.
+        scenario: the world; noise of positions is as large as its arena.
+        onset_step: the step at which it begins.
+    """
+    values = {
+        "motor_gain": 0.0,
+        "speed_limit": 0.0,
+        "heading_bias": math.pi,
+        "position_noise": min(scenario.arena_half_width_m, _MOST_NOISE),
+        "velocity_noise": min(robot.max_speed_mps, _MOST_NOISE),
+    }
+    value = values.get(kind, 1.0)
+    return Fault.model_validate(
+        {"robot": robot.name, "kind": kind, "value": value, "onset_step": onset_step}
+    )
+
+
+def fault_attention_of_run(
+    run: str | Path,
+    *,
+    kinds: Sequence[str] = FAULT_KINDS,
+    episodes: int = EPISODES,
+    steps: int | None = None,
+    seed: int | None = None,
+    progress: ProgressCall | None = None,
+) -> FaultAttention:
+    """Let each robot fail in each way at half-time, and see where attention goes.
+
+    Args:
+        run: the run folder; nothing is written into it.
+        kinds: of faults.
+        episodes: worlds that each fault is played in, E >= 1; areas take time in E squared.
+        steps: length of an episode, T >= 2; none: twice that of training.
+        seed: of the worlds, the bootstrap and the lots; none: as the configuration says.
+        progress: called after each play.
+
+    Raises:
+        RunError: there is no readable run at ``run``, its critic has no attention, its team has
+            fewer than three robots, or no episode goes on until the onset.
+        ConfigError: its configuration is not valid.
+        ValueError: an unknown kind or none, no episodes, or too few steps.
+    """
+    unknown = set(kinds) - set(FAULT_KINDS)
+    if unknown or not kinds:
+        raise ValueError(f"kinds = {sorted(unknown)}: must be some of {', '.join(FAULT_KINDS)}")
+    if episodes < 1:
+        raise ValueError(f"episodes = {episodes}: must be at least 1")
+    config, _ = load_trained(run)
+    robots = config.scenario.robots
+    if config.network.attention == "none":
+        raise RunError(f"{run}: the critic of {config.train.method} has no attention")
+    if len(robots) < 3:
+        raise RunError(f"{run}: attention has no choice in a team of {len(robots)}; 3 are needed")
+    steps = 2 * config.scenario.episode_steps if steps is None else steps
+    if steps < 2:
+        raise ValueError(f"steps = {steps}: must be at least 2")
+    seed = config.evaluate.seed if seed is None else seed
+    worlds = config.scenario.replace(faults=(), episode_steps=steps)
+    onset = steps // 2
+    plays, total = 0, 1 + len(kinds) * len(robots)
+
+    def play(*faults: Fault) -> Record:
+        nonlocal plays
+        record = _play(run, worlds.replace(faults=faults), episodes, seed)
+        plays += 1
+        if progress is not None:
+            progress(plays, total)
+        return record
+
+    with torch_threads(thread_count(config)):
+        healthy = play()
+        counted = int((healthy.lengths > onset).sum())
+        if not counted:
+            raise RunError(f"{run}: no episode goes on until step {onset}, when the faults begin")
+        draws = resampled_counts(counted, seed)
+        found: list[KindShift] = []
+        pools: list[Pooled] = []
+        for kind in kinds:
+            received, shifts = [], []
+            for index, robot in enumerate(robots):
+                fault = worst_fault(kind, robot, worlds, onset)
+                twins = twins_of(play(fault), healthy, index, onset)
+                received.append(twins.received())
+                shifts.append(shift_of(robot.name, fault.value, twins, draws, seed))
+            pools.append(pooled_robots(received))
+            effect = by_head(pools[-1].effects, draws)
+            auc = areas_by_head(pools[-1].comparison, draws)
+            found.append(KindShift(kind, effect, auc, tuple(shifts)))
+    overall = pooled_kinds(pools)
+    return FaultAttention(
+        attention=config.network.attention,
+        seed=seed,
+        episodes=episodes,
+        counted=counted,
+        episode_steps=steps,
+        onset_step=onset,
+        shuffles=SHUFFLES,
+        even_share=1.0 / (len(robots) - 1),
+        effect=by_head(overall.effects, draws),
+        auc=areas_by_head(overall.comparison, draws),
+        kinds=tuple(found),
+    )
+
+
+def _play(run: str | Path, worlds: Scenario, episodes: int, seed: int) -> Record:
+    """Episodes of a run's policy; loaded anew, it draws the same actions as long as it can."""
+    config, policy = load_trained(run, worlds)
+    threads = config.train.threads
+    return run_episodes(policy, worlds, episodes, seed, record=("attention",), num_threads=threads)
+
+
+def twins_of(faulty: Record, healthy: Record, robot: int, onset: int) -> Twins:
+    """The attention of two records of the same worlds, in the episodes that reach the onset.
+
+    Args:
+        faulty: with a fault of one robot; attention is recorded.
+        healthy: without; likewise.
+        robot: the failing robot j.
+        onset: the step at which its fault begins.
+    """
+    lengths = np.minimum(faulty.lengths, healthy.lengths)
+    reached = lengths > onset
+    happened = np.arange(faulty.scenario.episode_steps) < lengths[reached, None]
+    with_fault, without = (record.steps["attention"][reached] for record in (faulty, healthy))
+    return Twins(robot, onset, with_fault, without, happened)
