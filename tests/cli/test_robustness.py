@@ -22,6 +22,8 @@ def test_the_document_alone_on_standard_output(
     assert (found["episodes"], found["episode_steps"]) == (4, 40)
     assert found["policies"][0]["by_kind"].keys() == {"motor_gain", "lost_communication", "all"}
     assert found["bounds"][run_dir.name]["violations"] == 0
+    kinds = found["attention"][run_dir.name]["kinds"]
+    assert [kind["kind"] for kind in kinds] == ["motor_gain", "lost_communication"]
 
 
 def test_tables_a_file_and_a_picture(
@@ -32,7 +34,7 @@ def test_tables_a_file_and_a_picture(
     options = [word for option, path in files.items() for word in (option, str(path))]
     assert main(["robustness", str(run_dir), str(run_dir), *FEW, "--seed", "1", *options]) == 0
     shown = capsys.readouterr().out
-    for words in ("motor gain", "lost communication", "all kinds", "oracle", "0 violations"):
+    for words in ("motor gain", "lost communication", "all kinds", "oracle", "0 violations", "AUC"):
         assert words in shown
     assert all(len(line.rstrip()) <= 80 for line in shown.splitlines())
     assert json.loads(files["--json"].read_text())["seed"] == 1

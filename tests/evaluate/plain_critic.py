@@ -8,8 +8,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from innerattn.evaluate.perturbation import random_directions
-from innerattn.evaluate.response import States
+from innerattn.evaluate.bounds.perturbation import random_directions
+from innerattn.evaluate.bounds.response import States
 from innerattn.nn import Actor, Critic, InnerAttention
 
 B, D, A, W, H, DRAWS = 2, 3, 4, 6, 2, 3

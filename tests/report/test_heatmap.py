@@ -7,8 +7,8 @@ import pytest
 
 from innerattn.config import Scenario
 from innerattn.errors import RunError
-from innerattn.evaluate.retention import Estimate
-from innerattn.evaluate.robustness import Grid, Kept
+from innerattn.evaluate.faults.grid import Grid, Kept
+from innerattn.evaluate.faults.retention import Estimate
 from innerattn.report.heatmap import check_format, draw_heatmap, write_heatmap
 
 GRID = Grid(Scenario(), kinds=("motor_gain", "blackout"), severities=(0.5, 1.0))

@@ -112,6 +112,26 @@ class Evaluating(Work):
         self.show(done, total, f"{done:,} of {total:,} episodes")
 
 
+class CheckingBounds(Work):
+    """Shows the check of bounds; call it with the levels done and the levels to do."""
+
+    title = "checking bounds"
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show how far the check of one run is."""
+        self.show(done, total, f"{done} of {total} kinds and sizes of changes")
+
+
+class WatchingAttention(Work):
+    """Shows plays for attention; call it with the plays done and the plays to do."""
+
+    title = "watching attention"
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show how far the plays of one run are."""
+        self.show(done, total, f"{done} of {total} plays of all worlds")
+
+
 class SeveralRuns(Work):
     """Shows runs side by side, their evaluation included; call it with all of them."""
 

@@ -12,15 +12,16 @@ import tyro
 from rich.console import Console
 
 from innerattn.cli.options import Command, UsageError
-from innerattn.cli.progress import Evaluating
+from innerattn.cli.progress import CheckingBounds, Evaluating, WatchingAttention
 from innerattn.cli.robustness_tables import print_robustness
 from innerattn.config.files import write_whole
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.errors import RunError
 
 if TYPE_CHECKING:
-    from innerattn.evaluate.bound_figures import Bounds
-    from innerattn.evaluate.robustness import Grid, Kept
+    from innerattn.evaluate.bounds.figures import Bounds
+    from innerattn.evaluate.faults.grid import Grid, Kept
+    from innerattn.evaluate.faults.shift_figures import FaultAttention
 
 _SCRIPTED = ("greedy", "hungarian", "oracle")
 
@@ -62,17 +63,17 @@ class Robustness(Command):
             check_format(self.plot)
         grid, found, methods = self._retention(kinds)
         bounds = self._bounds()
+        attention = self._attention(kinds, bounds)
         if self.json is not None:
-            document = json.dumps(
-                _document(grid, found, methods, bounds), indent=1, allow_nan=False
-            )
+            parts = _document(grid, found, methods, bounds, attention)
+            document = json.dumps(parts, indent=1, allow_nan=False)
             if self.json == Path("-"):
                 print(document)
             else:
                 write_whole(self.json, f"{document}\n".encode())
         if self.json != Path("-"):
             console = Console(markup=False, highlight=False)
-            print_robustness(console, grid, found, bounds)
+            print_robustness(console, grid, found, bounds, attention)
         if self.plot is not None:
             from innerattn.report.heatmap import write_heatmap
 
@@ -103,7 +104,7 @@ class Robustness(Command):
 
     def _retention(self, kinds: tuple[str, ...]) -> tuple[Grid, dict[str, Kept], dict[str, str]]:
         from innerattn.config import read_toml
-        from innerattn.evaluate.robustness import Grid, play_all
+        from innerattn.evaluate.faults.grid import Grid, play_all
         from innerattn.evaluate.trained import load_trained
         from innerattn.scripted import scripted_policy
         from innerattn.train import read_info
@@ -127,12 +128,33 @@ class Robustness(Command):
         return grid, found, methods
 
     def _bounds(self) -> dict[str, Bounds]:
-        from innerattn.evaluate.bounds import bounds_of_run
+        from innerattn.evaluate.bounds.measure import bounds_of_run
 
-        return {
-            name: bounds_of_run(run, seed=self.seed)
-            for name, run in zip(_names(self.runs), self.runs, strict=True)
-        }
+        with CheckingBounds() as progress:
+            return {
+                name: bounds_of_run(run, seed=self.seed, progress=progress)
+                for name, run in zip(_names(self.runs), self.runs, strict=True)
+            }
+
+    def _attention(
+        self, kinds: tuple[str, ...], bounds: dict[str, Bounds]
+    ) -> dict[str, FaultAttention]:
+        """Of the runs with learnt attention; weights that are not learnt do not move."""
+        from innerattn.evaluate.faults.attention import fault_attention_of_run
+
+        with WatchingAttention() as progress:
+            return {
+                name: fault_attention_of_run(
+                    run,
+                    kinds=kinds,
+                    episodes=self.episodes,
+                    steps=self.episode_steps,
+                    seed=self.seed,
+                    progress=progress,
+                )
+                for name, run in zip(_names(self.runs), self.runs, strict=True)
+                if bounds[name].attention == "inner"
+            }
 
 
 def _names(runs: Iterable[str]) -> list[str]:
@@ -146,11 +168,16 @@ def _names(runs: Iterable[str]) -> list[str]:
 
 
 def _document(
-    grid: Grid, found: dict[str, Kept], methods: dict[str, str], bounds: dict[str, Bounds]
+    grid: Grid,
+    found: dict[str, Kept],
+    methods: dict[str, str],
+    bounds: dict[str, Bounds],
+    attention: dict[str, FaultAttention],
 ) -> dict[str, Any]:
-    from innerattn.evaluate.robustness_figures import robustness_document
+    from innerattn.evaluate.faults.document import robustness_document
 
     return {
         **robustness_document(grid, found, methods),
         "bounds": {name: one.to_json() for name, one in bounds.items()},
+        "attention": {name: one.to_json() for name, one in attention.items()},
     }

@@ -12,8 +12,9 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from innerattn.evaluate import Interval
-    from innerattn.evaluate.bound_figures import Bounds
-    from innerattn.evaluate.robustness import Grid, Kept
+    from innerattn.evaluate.bounds.figures import Bounds
+    from innerattn.evaluate.faults.grid import Grid, Kept
+    from innerattn.evaluate.faults.shift_figures import FaultAttention
 
 _KEY = """\
   kept: rescues with a fault / rescues without it, in the same worlds, since its
@@ -27,10 +28,19 @@ _BOUNDS_KEY = """\
   teammates; flips: another action is best by Q, or is taken by the actor of the
   disturbed robot, which no bound is about
 """
+_ATTENTION_KEY = """\
+  mean over teammates, heads and robots, of {even:.2f} where attention is even; beside
+  the same worlds without the fault; AUC: how often a faulty robot gets more weight
+  than a healthy one, 0.5 tells nothing, below 0.5 faults turn attention away
+"""
 
 
 def print_robustness(
-    console: Console, grid: Grid, found: Mapping[str, Kept], bounds: Mapping[str, Bounds]
+    console: Console,
+    grid: Grid,
+    found: Mapping[str, Kept],
+    bounds: Mapping[str, Bounds],
+    attention: Mapping[str, FaultAttention],
 ) -> None:
     """Print what was measured, for a reader who knows the task but not the program.
 
@@ -39,6 +49,7 @@ def print_robustness(
         grid: the faults.
         found: what each policy keeps, by name, the first one first.
         bounds: of each run's critic, by name.
+        attention: of each run with learnt attention, by name.
     """
     scenario = grid.scenario
     console.print(
@@ -55,6 +66,8 @@ def print_robustness(
     console.print(_after_onset(grid, kept))
     for name, of_run in bounds.items():
         _print_bounds(console, name, of_run)
+        if name in attention:
+            _print_attention(console, name, attention[name])
 
 
 def _by_kind(grid: Grid, found: Mapping[str, Kept]) -> Table:
@@ -71,7 +84,7 @@ def _by_kind(grid: Grid, found: Mapping[str, Kept]) -> Table:
 
 
 def _by_severity(grid: Grid, kept: Kept) -> Table:
-    from innerattn.evaluate.robustness_figures import worst_robot
+    from innerattn.evaluate.faults.document import worst_robot
 
     table = _table("severity", *(f"{severity:g}" for severity in grid.severities))
     table.add_column(f"worst robot at {grid.severities[-1]:g}", justify="right")
@@ -126,6 +139,26 @@ def _print_bounds(console: Console, name: str, bounds: Bounds) -> None:
         )
     console.print(table)
     console.print(_BOUNDS_KEY)
+
+
+def _print_attention(console: Console, name: str, found: FaultAttention) -> None:
+    """Where the critic's attention goes when a robot fails for good."""
+    console.print(
+        f"{name}: attention paid to a robot that fails at step {found.onset_step}", style="bold"
+    )
+    table = _table("worst fault", "weight, no fault", "change by the fault", "AUC")
+    for kind in found.kinds:
+        after = [shift.after.mean.mean - shift.effect.mean.mean for shift in kind.robots]
+        table.add_row(
+            _words(kind.kind),
+            f"{sum(after) / len(after):.2f}",
+            _text(kind.effect.mean),
+            _text(kind.auc.mean),
+        )
+    table.add_section()
+    table.add_row("all kinds", "", _text(found.effect.mean), _text(found.auc.mean), style="bold")
+    console.print(table)
+    console.print(_ATTENTION_KEY.format(even=found.even_share))
 
 
 def _table(first: str, *columns: str) -> Table:

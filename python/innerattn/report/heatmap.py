@@ -11,7 +11,7 @@ import numpy as np
 
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
-from innerattn.evaluate.robustness import ONSETS, Grid, Kept
+from innerattn.evaluate.faults.grid import ONSETS, Grid, Kept
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from innerattn.config import Robot, Scenario, Task
 from innerattn.evaluate.episodes import Record, rescue_dtype
-from innerattn.evaluate.handover import HANDOVER, handovers
+from innerattn.evaluate.sharing.handover import HANDOVER, handovers
 
 # food_0, food_1, navigation_0, medical_0 are 0 to 3; task 0 needs food and medicine.
 PARTNER = {0: 3, 1: 2}

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.config import Fault, Scenario
+from innerattn.config import Scenario
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.evaluate.episodes import Record, run_episodes
-from innerattn.evaluate.retention import Estimate, area, resampling, retention
+from innerattn.evaluate.faults.retention import Estimate, area, retention
+from innerattn.evaluate.faults.severity import fault_of
+from innerattn.evaluate.statistics import resampled_counts
 from innerattn.scripted import Policy
 
 SEVERITIES = (0.25, 0.5, 0.75, 1.0)
@@ -24,29 +26,11 @@ SEVERITIES = (0.25, 0.5, 0.75, 1.0)
 ONSETS = ("start", "middle")
 """When a fault begins: with the episode, or when half of it is over."""
 
+RESAMPLES = 2000
+"""Of the bootstrap that all policies of a grid share."""
+
 ProgressCall = Callable[[int, int], None]
 """Called with the episodes done and the episodes to do."""
-
-
-def fault_value(scenario: Scenario, robot: int, kind: str, severity: float) -> float:
-    """The value of a fault of some severity.
-
-    Args:
-        scenario: the worlds.
-        robot: index of the robot.
-        kind: of `innerattn.envs.batch.FAULT_KINDS`.
-        severity: 0 leaves the robot as it is; 1 is the worst: no force, no speed, the opposite
-            direction, an error of position as wide as half the arena, an error of velocity as large
-            as the robot's top speed, or every control step struck.
-    """
-    worst = {
-        "heading_bias": math.pi,
-        "position_noise": scenario.arena_half_width_m,
-        "velocity_noise": scenario.robots[robot].max_speed_mps,
-    }
-    if kind in ("motor_gain", "speed_limit"):
-        return 1.0 - severity
-    return severity * worst.get(kind, 1.0)
 
 
 @dataclass(frozen=True)
@@ -79,12 +63,8 @@ class Grid:
 
     def worlds(self, kind: str, severity: float, robot: int, onset: str) -> Scenario:
         """The scenario with one fault."""
-        fault = Fault(
-            robot=self.scenario.robots[robot].name,
-            kind=kind,
-            value=fault_value(self.scenario, robot, kind, severity),
-            onset_step=self.middle if onset == "middle" else 0,
-        )
+        onset_step = self.middle if onset == "middle" else 0
+        fault = fault_of(self.scenario, robot, kind, severity, onset_step)
         return self.scenario.replace(faults=(fault,))
 
 
@@ -171,7 +151,7 @@ class Kept:
 
 def kept(played: Played, grid: Grid) -> Kept:
     """The retention of one policy; all policies of a grid share the resamples."""
-    weights = resampling(grid.episodes, grid.seed)
+    weights = resampled_counts(grid.episodes, grid.seed, RESAMPLES)
     steps = played.clean.shape[1]
     half = grid.middle + (steps - grid.middle) // 2
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from innerattn.evaluate import attention_shift
-from innerattn.evaluate.attention_shift import (
+from innerattn.evaluate.faults import shift as attention_shift
+from innerattn.evaluate.faults.shift import (
     Twins,
     areas_by_head,
     by_head,
@@ -12,7 +12,7 @@ from innerattn.evaluate.attention_shift import (
     pooled_robots,
     shift_of,
 )
-from innerattn.evaluate.shift_figures import CURVE_STEPS, ByHead, Shift
+from innerattn.evaluate.faults.shift_figures import CURVE_STEPS, ByHead, Shift
 from innerattn.evaluate.statistics import Interval, resampled_counts
 
 

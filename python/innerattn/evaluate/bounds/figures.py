@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from innerattn.evaluate.disturb import ASCENT_STEPS, Changed, Direction, Found
-from innerattn.evaluate.inequalities import TOLERANCE, violated
+from innerattn.evaluate.bounds.disturb import ASCENT_STEPS, Changed, Direction, Found
+from innerattn.evaluate.bounds.inequalities import TOLERANCE, violated
 
 SCHEMA_VERSION = 1
 

@@ -1,7 +1,6 @@
 """Attention of fresh runs when robots fail: the worlds that are played, and what is refused."""
 
 import json
-import math
 from pathlib import Path
 
 import numpy as np
@@ -9,16 +8,11 @@ import pytest
 from fresh_run import config_of_team, make_run, run_config
 
 from innerattn.config import Scenario
-from innerattn.envs import BatchEnv
-from innerattn.envs.batch import FAULT_KINDS
 from innerattn.errors import RunError
 from innerattn.evaluate.episodes import Record, run_episodes
-from innerattn.evaluate.fault_attention import (
-    fault_attention_of_run,
-    twins_of,
-    worst_fault,
-)
-from innerattn.evaluate.shift_figures import FaultAttention
+from innerattn.evaluate.faults.attention import fault_attention_of_run, twins_of
+from innerattn.evaluate.faults.severity import fault_of
+from innerattn.evaluate.faults.shift_figures import FaultAttention
 from innerattn.evaluate.statistics import Interval
 from innerattn.evaluate.trained import load_trained
 
@@ -33,7 +27,7 @@ def played(run: Path, kind: str | None, robot: int, greedy: bool | None = None) 
     """8 steps of 6 worlds, in which a robot fails at the fourth in the worst way."""
     worlds = run_config("td-inner").scenario.replace(episode_steps=8)
     if kind is not None:
-        worlds = worlds.replace(faults=(worst_fault(kind, worlds.robots[robot], worlds, 4),))
+        worlds = worlds.replace(faults=(fault_of(worlds, robot, kind, 1.0, 4),))
     _, policy = load_trained(run, worlds, greedy=greedy)
     return run_episodes(
         policy, worlds, 6, 5, record=("attention", "actions", "faults"), num_threads=1
@@ -145,25 +139,6 @@ def test_faults_of_training_are_left_out(tmp_path: Path) -> None:
     assert one == other
 
 
-@pytest.mark.parametrize("kind", FAULT_KINDS)
-def test_the_worst_fault_is_worse_than_health(kind: str) -> None:
-    scenario = Scenario().replace(arena_half_width_m=0.7)
-    slow, fast = scenario.robots[0], scenario.robots[2]
-    values = {"heading_bias": math.pi, "position_noise": 0.7, "velocity_noise": slow.max_speed_mps}
-    values |= {"motor_gain": 0.0, "speed_limit": 0.0}
-    fault = worst_fault(kind, slow, scenario, 3)
-    assert (fault.robot, fault.kind, fault.onset_step) == ("food_0", kind, 3)
-    assert fault.value == values.get(kind, 1.0)
-    if kind == "velocity_noise":
-        assert worst_fault(kind, fast, scenario, 3).value == fast.max_speed_mps
-    huge = scenario.replace(arena_half_width_m=80.0, faults=(fault,))
-    racer = fast.model_copy(update={"max_speed_mps": 90.0})
-    worst = worst_fault(kind, racer, huge, 0)
-    with BatchEnv(huge.replace(faults=(worst,)), 1, num_threads=1) as env:
-        env.reset()
-        assert env.fault_state()[kind][0, 2] == pytest.approx(worst.value)
-
-
 def test_what_cannot_be_asked(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", run_config("td-inner"))
     with pytest.raises(ValueError, match="smell"):
@@ -193,6 +168,6 @@ def test_episodes_that_are_all_too_short_are_refused(
     run = make_run(tmp_path / "run", run_config("td-inner"))
     record = played(run, None, 0)
     record.lengths[:] = 4
-    monkeypatch.setattr("innerattn.evaluate.fault_attention.run_episodes", lambda *_, **__: record)
+    monkeypatch.setattr("innerattn.evaluate.faults.attention.run_episodes", lambda *_, **__: record)
     with pytest.raises(RunError, match="until step 4"):
         small(run)

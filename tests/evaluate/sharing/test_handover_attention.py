@@ -7,10 +7,10 @@ import pytest
 from scipy.stats import t as student
 
 from innerattn.config import Scenario
-from innerattn.evaluate import handover_attention as module
 from innerattn.evaluate.episodes import Record, rescue_dtype, run_episodes
-from innerattn.evaluate.handover import HANDOVER, handovers
-from innerattn.evaluate.handover_attention import aligned_weights, handover_attention
+from innerattn.evaluate.sharing import handover_attention as module
+from innerattn.evaluate.sharing.handover import HANDOVER, handovers
+from innerattn.evaluate.sharing.handover_attention import aligned_weights, handover_attention
 from innerattn.scripted import scripted_policy
 
 STEPS, HEADS = 25, 2

@@ -18,12 +18,12 @@ from torch import Tensor
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
-from innerattn.evaluate.bound_figures import Attention, Bounds, Level, level_of
-from innerattn.evaluate.disturb import Changed, Direction, disturb
+from innerattn.evaluate.bounds.disturb import Changed, Direction, disturb
+from innerattn.evaluate.bounds.figures import Attention, Bounds, Level, level_of
+from innerattn.evaluate.bounds.inequalities import head_norms
+from innerattn.evaluate.bounds.perturbation import random_directions, rms_norm
+from innerattn.evaluate.bounds.response import States
 from innerattn.evaluate.episodes import run_episodes
-from innerattn.evaluate.inequalities import head_norms
-from innerattn.evaluate.perturbation import random_directions, rms_norm
-from innerattn.evaluate.response import States
 from innerattn.evaluate.trained import TrainedPolicy
 from innerattn.learn.actor_critic import ActorCritic
 from innerattn.learn.types import Learner

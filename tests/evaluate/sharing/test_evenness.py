@@ -10,7 +10,7 @@ from scipy.stats import ttest_1samp
 from innerattn.config import Scenario
 from innerattn.evaluate.cooperation import count_cooperation
 from innerattn.evaluate.episodes import run_episodes
-from innerattn.evaluate.evenness import (
+from innerattn.evaluate.sharing.evenness import (
     EvennessOfRuns,
     counts_by_episode,
     evenness,
@@ -225,7 +225,7 @@ def test_runs_that_tell_nothing() -> None:
 
 
 def test_verdict_over_runs_is_false_as_rarely_as_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("innerattn.evaluate.evenness._RESAMPLES", 2)
+    monkeypatch.setattr("innerattn.evaluate.sharing.evenness._RESAMPLES", 2)
     rng, draws = np.random.default_rng(8), 400
     found = [runs_of(rng, 4, 0.6, 0.05) for _ in range(draws)]
     rate = np.mean([x.verdict == "even" for x in found])

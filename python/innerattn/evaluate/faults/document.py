@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from innerattn.evaluate.retention import Estimate
-from innerattn.evaluate.robustness import ONSETS, Grid, Kept, fault_value
+from innerattn.evaluate.faults.grid import ONSETS, Grid, Kept
+from innerattn.evaluate.faults.retention import Estimate
+from innerattn.evaluate.faults.severity import fault_of
 from innerattn.evaluate.statistics import Interval
 
 SCHEMA_VERSION = 1
@@ -90,7 +91,7 @@ def _policy(grid: Grid, kept: Kept) -> dict[str, Any]:
             {
                 "kind": kind,
                 "severity": severity,
-                "value": fault_value(grid.scenario, r, kind, severity),
+                "value": fault_of(grid.scenario, r, kind, severity).value,
                 "robot": robot.name,
                 "onset": onset,
                 "retention": number(kept.cells[k, s, r, o].interval()),

@@ -1,22 +1,24 @@
 """Where a trained critic's attention goes when a robot fails: plays the worlds of the question.
 
 The same worlds are played without a fault and with each fault of each robot; what the figures mean
-is in `attention_shift` and docs/robustness.md.
+is in `shift` and docs/robustness.md.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from innerattn.config import Scenario
-from innerattn.config.scenario import Fault, Robot
+from innerattn.config.scenario import Fault
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.errors import RunError
-from innerattn.evaluate.attention_shift import (
+from innerattn.evaluate.episodes import Record, run_episodes
+from innerattn.evaluate.faults.label_shuffle import SHUFFLES
+from innerattn.evaluate.faults.severity import fault_of
+from innerattn.evaluate.faults.shift import (
     Pooled,
     Twins,
     areas_by_head,
@@ -25,9 +27,7 @@ from innerattn.evaluate.attention_shift import (
     pooled_robots,
     shift_of,
 )
-from innerattn.evaluate.episodes import Record, run_episodes
-from innerattn.evaluate.label_shuffle import SHUFFLES
-from innerattn.evaluate.shift_figures import FaultAttention, KindShift
+from innerattn.evaluate.faults.shift_figures import FaultAttention, KindShift
 from innerattn.evaluate.statistics import resampled_counts
 from innerattn.evaluate.trained import load_trained
 from innerattn.train.build import thread_count, torch_threads
@@ -37,30 +37,6 @@ EPISODES = 100
 
 ProgressCall = Callable[[int, int], None]
 """Called with the plays done and the plays to do; one play is of all worlds."""
-
-_MOST_NOISE = 10.0  # what a scenario takes, m and m/s
-
-
-def worst_fault(kind: str, robot: Robot, scenario: Scenario, onset_step: int) -> Fault:
-    """The worst fault of a kind: no drive, the wrong way round, or sight that tells nothing.
-
-    Args:
-        kind: one of `FAULT_KINDS`.
-        robot: the robot that has it.
-        scenario: the world; noise of positions is as large as its arena.
-        onset_step: the step at which it begins.
-    """
-    values = {
-        "motor_gain": 0.0,
-        "speed_limit": 0.0,
-        "heading_bias": math.pi,
-        "position_noise": min(scenario.arena_half_width_m, _MOST_NOISE),
-        "velocity_noise": min(robot.max_speed_mps, _MOST_NOISE),
-    }
-    value = values.get(kind, 1.0)
-    return Fault.model_validate(
-        {"robot": robot.name, "kind": kind, "value": value, "onset_step": onset_step}
-    )
 
 
 def fault_attention_of_run(
@@ -126,7 +102,7 @@ def fault_attention_of_run(
         for kind in kinds:
             received, shifts = [], []
             for index, robot in enumerate(robots):
-                fault = worst_fault(kind, robot, worlds, onset)
+                fault = fault_of(worlds, index, kind, 1.0, onset)
                 twins = twins_of(play(fault), healthy, index, onset)
                 received.append(twins.received())
                 shifts.append(shift_of(robot.name, fault.value, twins, draws, seed))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from innerattn.config import Robot, Scenario, Task
-from innerattn.evaluate.dispatch_quality import choices_of, dispatch_quality
 from innerattn.evaluate.episodes import Record, rescue_dtype, run_episodes
+from innerattn.evaluate.sharing.dispatch_quality import choices_of, dispatch_quality
 from innerattn.scripted import scripted_policy
 from innerattn.scripted.steering import Steering
 

@@ -3,7 +3,7 @@
 import pytest
 from scipy.stats import chisquare
 
-from innerattn.evaluate.printed import (
+from innerattn.evaluate.sharing.printed import (
     COMMON_RESCUES,
     TABLE_II,
     checked_table,

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from innerattn.evaluate.inequalities import largest_weight_change, violated
+from innerattn.evaluate.bounds.inequalities import largest_weight_change, violated
 
 
 @pytest.mark.parametrize("teammates", [1, 2, 4])

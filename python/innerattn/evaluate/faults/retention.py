@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from innerattn.evaluate.statistics import Interval, percentile_interval
 
-RESAMPLES = 2000
-
 Array = NDArray[np.float64]
 
 
@@ -51,19 +49,13 @@ class Estimate:
         return percentile_interval(float(self.value), self.resampled)
 
 
-def resampling(episodes: int, seed: int, resamples: int = RESAMPLES) -> NDArray[np.int64]:
-    """How often each world is in each resample, (B, E) int64; rows sum to E."""
-    rng = np.random.default_rng(seed)
-    return rng.multinomial(episodes, np.full(episodes, 1.0 / episodes), size=resamples)
-
-
-def retention(faulty: Array, clean: Array, weights: NDArray[np.int64]) -> Estimate:
+def retention(faulty: Array, clean: Array, weights: Array) -> Estimate:
     """Rescues with a fault over rescues without.
 
     Args:
         faulty: (..., E) rescues by world with a fault.
         clean: (E,) rescues by world without, over the same steps.
-        weights: (B, E) from `resampling`.
+        weights: (B, E) from `resampled_counts`.
 
     Returns:
         The ratios of means (...); NaN where nobody is rescued without faults.

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from innerattn.evaluate.label_shuffle import shuffled_labels
+from innerattn.evaluate.faults.label_shuffle import shuffled_labels
 
 
 def changes(episodes: int, robots: int, seed: int, common: float = 0.0) -> np.ndarray:

@@ -20,10 +20,10 @@ from plain_critic import (
 )
 from torch import Tensor
 
-from innerattn.evaluate.disturb import disturb
-from innerattn.evaluate.inequalities import logit_slopes, violated
-from innerattn.evaluate.perturbation import strongest_change
-from innerattn.evaluate.response import respond_to_embedding, respond_to_observation
+from innerattn.evaluate.bounds.disturb import disturb
+from innerattn.evaluate.bounds.inequalities import logit_slopes, violated
+from innerattn.evaluate.bounds.perturbation import strongest_change
+from innerattn.evaluate.bounds.response import respond_to_embedding, respond_to_observation
 
 
 @pytest.mark.parametrize("changed", ["embedding", "observation"])

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.evaluate.detection import Comparison, areas, compare
-from innerattn.evaluate.label_shuffle import shuffled_labels
-from innerattn.evaluate.shift_figures import CURVE_STEPS, ByHead, Shift
+from innerattn.evaluate.faults.detection import Comparison, areas, compare
+from innerattn.evaluate.faults.label_shuffle import shuffled_labels
+from innerattn.evaluate.faults.shift_figures import CURVE_STEPS, ByHead, Shift
 from innerattn.evaluate.statistics import Interval, percentile_interval
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from innerattn.config import Scenario
 from innerattn.evaluate.episodes import Record, run_episodes
-from innerattn.evaluate.waiting import waiting
+from innerattn.evaluate.sharing.waiting import waiting
 from innerattn.scripted import scripted_policy
 
 

@@ -1,32 +1,26 @@
 """The grid of faults: what is played, and what of it is kept."""
 
-import math
-
 import numpy as np
 import pytest
 
 from innerattn.config import Scenario
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.evaluate.episodes import run_episodes
-from innerattn.evaluate.robustness import Grid, fault_value, kept, play, play_all, rescues_by_step
-from innerattn.evaluate.robustness_figures import robustness_document, worst_robot
+from innerattn.evaluate.faults.document import robustness_document, worst_robot
+from innerattn.evaluate.faults.grid import Grid, kept, play, play_all, rescues_by_step
 from innerattn.scripted import scripted_policy
 
 WORLDS = Scenario.preset("double").replace(episode_steps=20, rescue_radius_m=0.3)
 SMALL = Grid(WORLDS, kinds=("unavailable", "blackout"), severities=(0.5, 1.0), episodes=12, seed=4)
 
 
-def test_every_severity_of_every_kind_is_a_valid_fault() -> None:
-    grid = Grid(WORLDS)
-    for kind in FAULT_KINDS:
-        for severity in (0.0, *grid.severities):
-            for robot in range(4):
-                (fault,) = grid.worlds(kind, severity, robot, "middle").faults
-                assert (fault.robot, fault.onset_step) == (WORLDS.robots[robot].name, 10)
-    assert fault_value(WORLDS, 0, "motor_gain", 0.25) == 0.75
-    assert fault_value(WORLDS, 0, "heading_bias", 0.5) == pytest.approx(math.pi / 2)
-    assert fault_value(WORLDS, 2, "velocity_noise", 1.0) == 1.5
-    assert fault_value(WORLDS, 0, "blackout", 0.5) == 0.5
+def test_each_cell_is_one_fault_of_one_robot() -> None:
+    scenario = SMALL.worlds("blackout", 0.5, 2, "middle")
+    (fault,) = scenario.faults
+    assert (fault.robot, fault.kind, fault.value) == ("navigation_0", "blackout", 0.5)
+    assert fault.onset_step == SMALL.middle == 10
+    assert scenario.replace(faults=()) == WORLDS
+    assert SMALL.worlds("blackout", 0.5, 2, "start").faults[0].onset_step == 0
 
 
 def test_rescues_by_step_are_those_of_the_record() -> None:

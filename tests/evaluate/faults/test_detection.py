@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata
 
-from innerattn.evaluate.detection import Comparison, areas, compare
+from innerattn.evaluate.faults.detection import Comparison, areas, compare
 from innerattn.evaluate.statistics import resampled_counts
 
 

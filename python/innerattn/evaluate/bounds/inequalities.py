@@ -11,7 +11,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from innerattn.evaluate.response import Response
+from innerattn.evaluate.bounds.response import Response
 
 TOLERANCE = 1e-10
 """Excess over a bound, as a share of 1 + bound, that is taken for float64 rounding."""

@@ -10,14 +10,14 @@ from typing import Literal, NamedTuple
 import torch
 from torch import Tensor
 
-from innerattn.evaluate.inequalities import (
+from innerattn.evaluate.bounds.inequalities import (
     Sides,
     logit_slopes,
     own_row_sides,
     teammates_sides,
 )
-from innerattn.evaluate.perturbation import strongest_change
-from innerattn.evaluate.response import (
+from innerattn.evaluate.bounds.perturbation import strongest_change
+from innerattn.evaluate.bounds.response import (
     Response,
     States,
     actor_flips,
