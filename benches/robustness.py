@@ -162,6 +162,29 @@ def _share(values: Sequence[float | None]) -> str:
     return f"{statistics.mean(known):.0%}" if known else "-"
 
 
+def attention(documents: Sequence[Document]) -> str:
+    """What each kind of fault does to the weight on the robot that has it."""
+    names = [name for name in METHODS if name.endswith("inner")]
+    found: dict[str, list[Document]] = {name: [] for name in names}
+    for document in documents:
+        methods = {one["policy"]: one["method"] for one in document["policies"]}
+        for run, one in document["attention"].items():
+            found[methods[run]].append(one)
+    kinds = [kind["kind"] for kind in found[names[0]][0]["kinds"]]
+
+    def cell(kind: str, column: int) -> str:
+        of_method = found[names[column // 3]]
+        parts = [one["kinds"][kinds.index(kind)] for one in of_method]
+        if column % 3 < 2:
+            key = ("effect", "auc")[column % 3]
+            return over_seeds([part[key]["mean"]["mean"] for part in parts])
+        each = [robot["effect"]["mean"]["mean"] for part in parts for robot in part["robots"]]
+        return f"{min(each):+.2f} to {max(each):+.2f}"
+
+    head = ["worst fault", *(f"{n}, {x}" for n in names for x in ("effect", "AUC", "by robot"))]
+    return kinds_table(head, kinds, cell)
+
+
 def training(documents: Sequence[Document]) -> str:
     """Trained with faults, the same with unavailable robots masked, and without faults."""
     kinds = list(documents[0]["policies"][0]["by_kind"])
@@ -236,6 +259,7 @@ def main() -> None:
     publish("deployment", f"{machine('torch')}.\n\n{deployment(of_seed)}", ROBUSTNESS)
     publish("recovery", recovery(of_seed), ROBUSTNESS)
     publish("bounds", bounds(of_seed), ROBUSTNESS)
+    publish("attention", attention(of_seed), ROBUSTNESS)
 
     with_faults = []
     for seed in given.seeds:

@@ -29,9 +29,9 @@ _BOUNDS_KEY = """\
   disturbed robot, which no bound is about
 """
 _ATTENTION_KEY = """\
-  mean over teammates, heads and robots, of {even:.2f} where attention is even; beside
-  the same worlds without the fault; AUC: how often a faulty robot gets more weight
-  than a healthy one, 0.5 tells nothing, below 0.5 faults turn attention away
+  mean over teammates, heads and robots ({even:.2f} where attention is even), beside
+  the same worlds without the fault; AUC: how often a faulty robot gets more
+  weight than a healthy one; 0.5 tells nothing, below 0.5 faults turn it away
 """
 
 
