@@ -21,6 +21,11 @@ Clip = Callable[[dict[str, Tensor]], Tensor]
 _BETA_1, _BETA_2, _EPSILON = 0.9, 0.999, 1e-8  # torch's defaults, the paper's Adam
 
 
+_UNROLLED = 8
+"""Norms that are put together at a time. Torch's compiler (2.15) writes so short a sum out; of a
+longer one it makes a loop, which it then fails to fuse with Adam."""
+
+
 class Descent:
     """A network with its Adam.
 
@@ -157,6 +162,11 @@ def clip_each_robot(gradients: dict[str, Tensor], limit: float) -> Tensor:
     per_robot = [
         torch.linalg.vector_norm(gradient.flatten(1), dim=1) for gradient in gradients.values()
     ]
+    while len(per_robot) > _UNROLLED:
+        per_robot = [
+            torch.linalg.vector_norm(torch.stack(per_robot[first : first + _UNROLLED]), dim=0)
+            for first in range(0, len(per_robot), _UNROLLED)
+        ]
     norms: Tensor = torch.linalg.vector_norm(torch.stack(per_robot), dim=0)
     factors = (limit / (norms + 1e-6)).clamp_max(1.0)
     torch._foreach_mul_(
