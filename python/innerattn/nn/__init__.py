@@ -7,6 +7,7 @@ It knows nothing of environments, losses or files.
 from innerattn.nn.actor import Actor, action_noise, sample_actions
 from innerattn.nn.attention import Attended, InnerAttention, UniformAttention
 from innerattn.nn.critic import Critic, CriticOutput
+from innerattn.nn.encoder import EntityColumns, EntityEncoder
 from innerattn.nn.joint_critic import JointCritic
 from innerattn.nn.linear import PerRobotLinear
 
@@ -15,6 +16,8 @@ __all__ = [
     "Attended",
     "Critic",
     "CriticOutput",
+    "EntityColumns",
+    "EntityEncoder",
     "InnerAttention",
     "JointCritic",
     "PerRobotLinear",

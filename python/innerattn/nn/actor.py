@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from innerattn.nn.encoder import EntityColumns, observation_encoder
 from innerattn.nn.linear import PerRobotLinear
 
 
@@ -22,6 +23,7 @@ class Actor(nn.Module):
         num_actions: int,
         hidden_width: int,
         generator: torch.Generator,
+        entities: EntityColumns | None = None,
     ) -> None:
         """Draw the parameters.
 
@@ -31,10 +33,11 @@ class Actor(nn.Module):
             num_actions: A.
             hidden_width: Width of both hidden layers.
             generator: Source of the initial parameters, on the CPU.
+            entities: Columns of the entities that are encoded apart; None: none are.
         """
         super().__init__()
         self.num_robots = num_robots
-        self.first = PerRobotLinear(num_robots, obs_width, hidden_width, generator)
+        self.first = observation_encoder(num_robots, obs_width, hidden_width, generator, entities)
         self.second = PerRobotLinear(num_robots, hidden_width, hidden_width, generator)
         self.output = PerRobotLinear(num_robots, hidden_width, num_actions, generator)
 

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from innerattn.nn.attention import Attended, InnerAttention, UniformAttention
+from innerattn.nn.encoder import EntityColumns, observation_encoder
 from innerattn.nn.linear import PerRobotLinear
 
 
@@ -40,6 +41,7 @@ class Critic(nn.Module):
         attention: InnerAttention | UniformAttention,
         generator: torch.Generator,
         outputs: int | None = None,
+        entities: EntityColumns | None = None,
     ) -> None:
         """Draw the parameters.
 
@@ -50,12 +52,15 @@ class Critic(nn.Module):
             attention: The attention over teammates; its width is the width of every layer.
             generator: Source of the initial parameters, on the CPU.
             outputs: Values for each robot; None: one for each own action.
+            entities: Columns of the entities that are encoded apart; None: none are.
         """
         super().__init__()
         width = attention.query.shape[0]
         self.num_actions = num_actions
-        self.state_encoder = PerRobotLinear(num_robots, obs_width, width, generator)
-        self.action_encoder = PerRobotLinear(num_robots, obs_width + num_actions, width, generator)
+        self.state_encoder = observation_encoder(num_robots, obs_width, width, generator, entities)
+        self.action_encoder = observation_encoder(
+            num_robots, obs_width, width, generator, entities, extra_width=num_actions
+        )
         self.attention = attention
         self.hidden = PerRobotLinear(num_robots, 2 * width, width, generator)
         self.output = PerRobotLinear(num_robots, width, outputs or num_actions, generator)
