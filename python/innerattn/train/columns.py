@@ -1,0 +1,55 @@
+"""Whose the columns of an observation are, read off their names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import zip_longest
+
+from innerattn.errors import ConfigError
+from innerattn.nn import EntityColumns
+
+
+def entity_columns(names: Sequence[str]) -> EntityColumns:
+    """The columns of the robot itself, of its teammates and of the victims.
+
+    Args:
+        names: Of all columns: ``own.*``, then ``teammate_0.*``, ``teammate_1.*`` and so on, then
+            ``victim_0.*`` and so on. All teammates have the same columns, and so have all victims,
+            ``victim_k.present`` among them.
+
+    Raises:
+        ConfigError: The names are not of that form; the message names the first column that is not.
+    """
+    quantities: dict[str, list[str]] = {"own": [], "teammate_0": [], "victim_0": []}
+    for name in names:
+        owner, _, quantity = name.partition(".")
+        quantities.setdefault(owner, []).append(quantity)
+    own, teammate, victim = (quantities[first] for first in ("own", "teammate_0", "victim_0"))
+    teammates = _count(quantities, "teammate_") if teammate else 0
+    victims = _count(quantities, "victim_") if victim else 0
+    expected = [f"own.{quantity}" for quantity in own]
+    expected += [f"teammate_{k}.{quantity}" for k in range(teammates) for quantity in teammate]
+    expected += [f"victim_{k}.{quantity}" for k in range(victims) for quantity in victim]
+    for place, (found, wanted) in enumerate(zip_longest(names, expected)):
+        if found != wanted:
+            raise _unsuitable(f"column {place} of an observation is {found!r}, not {wanted!r}")
+    if not own:
+        raise _unsuitable("an observation has no column own.*")
+    if "present" not in victim:
+        raise _unsuitable("an observation has no column victim_0.present")
+    return EntityColumns(
+        own=len(own),
+        teammates=teammates,
+        teammate=len(teammate),
+        victims=victims,
+        victim=len(victim),
+        present=victim.index("present"),
+    )
+
+
+def _count(owners: dict[str, list[str]], prefix: str) -> int:
+    return sum(owner.startswith(prefix) for owner in owners)
+
+
+def _unsuitable(reason: str) -> ConfigError:
+    return ConfigError(f"network.encoder = 'entities': {reason}; must be 'flat' here")
