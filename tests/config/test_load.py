@@ -138,6 +138,7 @@ def test_tables_in_a_file_replace_lists(tmp_path: Path) -> None:
         ({"td.gamma": 2}, r"^td\.gamma = 2: must be less than or equal to 1$"),
         ({"scenario.colour": 1}, r"^scenario\.colour: unknown key$"),
         ({"scenario.episode_steps": 0}, r"^scenario\.episode_steps = 0: must be"),
+        ({"network.encoder": "rows"}, r"^network\.encoder = 'rows': must be 'flat' or 'entities'$"),
         ({"network.attention": "uniform"}, r"^network\.attention = 'uniform': train\.method"),
     ],
 )
@@ -194,7 +195,10 @@ CONFIGS = st.builds(
         shaping_weight=st.floats(0.0, 10.0),
     ),
     network=st.builds(
-        NetworkConfig, hidden_width=st.sampled_from([4, 64]), mask_unavailable=st.booleans()
+        NetworkConfig,
+        hidden_width=st.sampled_from([4, 64]),
+        mask_unavailable=st.booleans(),
+        encoder=st.sampled_from(["flat", "entities"]),
     ),
     td=st.builds(
         TDConfig,

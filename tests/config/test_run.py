@@ -52,6 +52,7 @@ def test_advantage_follows_method(method: str, advantage: str) -> None:
     [
         ("network", "attention", "inner", "none"),
         ("network", "mask_unavailable", True, False),
+        ("network", "encoder", "entities", "flat"),
         ("ppo", "advantage", "counterfactual", "value"),
     ],
 )
@@ -74,6 +75,7 @@ def test_only_mappo_goes_without_attention(method: str) -> None:
     [
         ("network", "hidden_width", 0),
         ("network", "attention_heads", 0),
+        ("network", "encoder", "rows"),
         ("td", "gamma", 1.5),
         ("td", "gamma", float("nan")),
         ("td", "polyak", 0.0),

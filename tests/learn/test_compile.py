@@ -7,14 +7,25 @@ from torch import Tensor
 from innerattn.config.run import NetworkConfig, PPOConfig, TDConfig
 from innerattn.learn import PPO, TD, Team, Transitions
 from innerattn.learn.actor_critic import ActorCritic
+from innerattn.nn import EntityColumns
 
 NETWORK = {"hidden_width": 8, "attention_heads": 2}
 AVAILABLE = 4  # column of the observation
+ENTITIES = {"attention": "inner", "encoder": "entities"}
 ENVS, STEPS = 6, 4
 
 
+@pytest.fixture(autouse=True)
+def _nothing_compiled() -> None:
+    torch.compiler.reset()  # beyond a few forms of one function torch gives up
+
+
+def columns(robots: int) -> EntityColumns:
+    return EntityColumns(5, robots - 1, 2, 2, 2, 0)
+
+
 def make(algorithm: str, robots: int, network: dict, numbers: dict) -> ActorCritic:
-    team = Team(robots, 5, 3)
+    team = Team(robots, columns(robots).width, 3)
     given = NetworkConfig(**NETWORK, **network)
     common = {"critic_weight_decay": 0.01, "attention_logit_penalty": 0.1, **numbers}
     extra = {
@@ -22,6 +33,7 @@ def make(algorithm: str, robots: int, network: dict, numbers: dict) -> ActorCrit
         "device": torch.device("cpu"),
         "dtype": torch.float64,
         "availability_column": AVAILABLE,
+        "entities": columns(robots),
     }
     if algorithm == "td":
         few = {"batch_size": 7, "warmup_env_steps": 0, "update_every_env_steps": 12}
@@ -31,12 +43,12 @@ def make(algorithm: str, robots: int, network: dict, numbers: dict) -> ActorCrit
 
 
 def transitions(robots: int, seed: int) -> Transitions:
-    source = torch.Generator().manual_seed(seed)
+    source, width = torch.Generator().manual_seed(seed), columns(robots).width
     return Transitions(
-        torch.randn(ENVS, robots, 5, generator=source),
+        torch.randn(ENVS, robots, width, generator=source),
         torch.randint(3, (ENVS, robots), generator=source),
         torch.randn(ENVS, robots, generator=source) + 0.3,
-        torch.randn(ENVS, robots, 5, generator=source),
+        torch.randn(ENVS, robots, width, generator=source),
         torch.arange(ENVS) % 3 == 0,
     )
 
@@ -90,6 +102,15 @@ def test_the_traced_update_agrees_without_attention() -> None:
     agree("ppo", 4, "aot_eager", {"attention": "none"}, {"advantage": "value"})
 
 
+@pytest.mark.parametrize(("algorithm", "robots"), [("td", 1), ("td", 4), ("ppo", 4)])
+def test_the_traced_update_agrees_by_entities(algorithm: str, robots: int) -> None:
+    agree(algorithm, robots, "aot_eager", ENTITIES, {})
+
+
 @pytest.mark.parametrize("algorithm", ["td", "ppo"])
 def test_the_compiled_update_agrees(algorithm: str) -> None:
     agree(algorithm, 4, "inductor", {"attention": "inner"}, {})
+
+
+def test_the_compiled_update_agrees_by_entities() -> None:
+    agree("td", 4, "inductor", ENTITIES, {})

@@ -14,7 +14,7 @@ import torch
 from innerattn.config import RunConfig, read_toml
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
-from innerattn.train import RunFolder, checkpoint, load_policy, read_info
+from innerattn.train import RunFolder, checkpoint, load_policy, read_info, train
 
 Configure = Callable[..., RunConfig]
 
@@ -179,3 +179,26 @@ def test_damaged_weights_are_refused(run: Path) -> None:
     assert "weights.safetensors" in refusal(run)
     weights.write_bytes(whole[:-1] + bytes([whole[-1] ^ 0xFF]))
     assert "altered" in refusal(run)
+
+
+def test_a_folder_from_before_encoders_were_a_choice_is_read(
+    small_config: Configure, run: Path
+) -> None:
+    text = (run / "config.toml").read_text()
+    assert text.count('encoder = "flat"\n') == 1
+    (run / "config.toml").write_text(text.replace('encoder = "flat"\n', ""))
+    assert load_policy(run)[0] == small_config()
+
+
+@pytest.mark.parametrize("method", ["td-inner", "ppo-inner"])
+def test_networks_by_entities_come_back(
+    small_config: Configure, tmp_path: Path, method: str
+) -> None:
+    config = small_config(**{"network.encoder": "entities", "train.method": method})
+    run = train(config, tmp_path / "run")
+    found, learner = load_policy(run)
+    assert found == config
+    assert "actor.first.victim.weight" in learner.state()
+    text = (run / "config.toml").read_text()
+    (run / "config.toml").write_text(text.replace('"entities"', '"flat"'))
+    assert "weights.safetensors" in refusal(run)

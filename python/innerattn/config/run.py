@@ -37,7 +37,7 @@ _KINDS = {
     "mappo": _Kind(
         True,
         {
-            "network": {"attention": "none", "mask_unavailable": False},
+            "network": {"attention": "none", "mask_unavailable": False, "encoder": "flat"},
             "ppo": {"advantage": "value"},
         },
     ),
@@ -63,6 +63,11 @@ class NetworkConfig(Model):
     )
     mask_unavailable: bool = Field(
         False, description="keep unavailable teammates out of the attention"
+    )
+    encoder: Literal["flat", "entities"] = Field(
+        "flat",
+        description="first layer of actors and critic: of whole observations, or of teammates and "
+        "victims apart, whatever their order; mappo needs the former",
     )
     precision: Literal["float32", "bfloat16"] = Field(
         "float32", description="of the products in an update; weights are float32 in any case"

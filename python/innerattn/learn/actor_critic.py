@@ -23,22 +23,9 @@ from innerattn.learn.descent import (
     clip_each_robot,
     clip_whole,
 )
+from innerattn.learn.networks import draw_networks
 from innerattn.learn.types import Team
-from innerattn.nn import (
-    Actor,
-    Critic,
-    CriticOutput,
-    InnerAttention,
-    JointCritic,
-    UniformAttention,
-    action_noise,
-    sample_actions,
-)
-
-_ATTENTIONS: dict[str, type[InnerAttention] | type[UniformAttention]] = {
-    "inner": InnerAttention,
-    "uniform": UniformAttention,
-}
+from innerattn.nn import CriticOutput, EntityColumns, action_noise, sample_actions
 
 
 class ActorCritic:
@@ -66,6 +53,7 @@ class ActorCritic:
         dtype: torch.dtype = torch.float32,
         availability_column: int | None = None,
         critic_outputs: int | None = None,
+        entities: EntityColumns | None = None,
     ) -> None:
         """Build networks and optimisers.
 
@@ -81,9 +69,11 @@ class ActorCritic:
             availability_column: Column of a robot's observation that says whether it is available
                 (above 0.5); needed only where `network.mask_unavailable` is set.
             critic_outputs: Values that the critic gives for each robot; None: one for each action.
+            entities: As in `draw_networks`.
 
         Raises:
-            ValueError: `network.mask_unavailable` is set without a column of the observation.
+            ValueError: `network.mask_unavailable` is set without a column of the observation, or
+                `network.encoder` is "entities" without columns that are those of the observation.
         """
         if network.mask_unavailable and availability_column not in range(team.obs_width):
             raise ValueError(
@@ -101,18 +91,8 @@ class ActorCritic:
         self._noise = torch.Generator(device).manual_seed(noise_seed)
         # Drawn on the CPU in float32 and then moved: a seed gives the same weights everywhere.
         weights = torch.Generator().manual_seed(weights_seed)
-        width = network.hidden_width
-        attention = None
-        if network.attention != "none":
-            attention = _ATTENTIONS[network.attention](width, network.attention_heads, weights)
-        self.actor = Actor(*team, width, weights).to(device, dtype)
-        critic: Critic | JointCritic
-        if attention is None:
-            outputs = critic_outputs or team.num_actions
-            critic = JointCritic(team.num_robots, team.obs_width, outputs, width, weights)
-        else:
-            critic = Critic(*team, attention, weights, critic_outputs)
-        self.critic = critic.to(device, dtype)
+        actor, critic = draw_networks(team, network, weights, critic_outputs, entities)
+        self.actor, self.critic = actor.to(device, dtype), critic.to(device, dtype)
         self.actor_frozen = False
         self._actor_descent = Descent(self.actor, learning_rate, weight_decay=0.0)
         self._critic_descent = Descent(self.critic, learning_rate, critic_weight_decay)

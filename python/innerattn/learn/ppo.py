@@ -17,7 +17,7 @@ from innerattn.learn.actor_critic import ActorCritic
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
 from innerattn.learn.descent import Network
 from innerattn.learn.types import Team, Transitions
-from innerattn.nn import sample_actions
+from innerattn.nn import EntityColumns, sample_actions
 
 _METRICS = (
     "critic_loss",
@@ -54,11 +54,12 @@ class PPO(ActorCritic):
         device: torch.device,
         dtype: torch.dtype = torch.float32,
         availability_column: int | None = None,
+        entities: EntityColumns | None = None,
     ) -> None:
         """Build networks and optimisers; arguments as in `ActorCritic`, numbers in ``ppo``.
 
         Raises:
-            ValueError: `network.mask_unavailable` is set without a column of the observation.
+            ValueError: As in `ActorCritic`.
         """
         super().__init__(
             team,
@@ -70,6 +71,7 @@ class PPO(ActorCritic):
             device=device,
             dtype=dtype,
             availability_column=availability_column,
+            entities=entities,
             critic_outputs=None if ppo.advantage == "counterfactual" else 1,
         )
         self._config = ppo

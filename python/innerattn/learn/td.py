@@ -17,7 +17,7 @@ from innerattn.learn.actor_critic import ActorCritic
 from innerattn.learn.descent import Network, values_of
 from innerattn.learn.replay import Replay
 from innerattn.learn.types import Team, Transitions
-from innerattn.nn import sample_actions
+from innerattn.nn import EntityColumns, sample_actions
 
 _TARGETS = {"consistent": losses.consistent_target, "maac": losses.maac_target}
 _POLICY_LOSSES = {
@@ -53,6 +53,7 @@ class TD(ActorCritic):
         device: torch.device,
         dtype: torch.dtype = torch.float32,
         availability_column: int | None = None,
+        entities: EntityColumns | None = None,
     ) -> None:
         """Build networks, optimisers and replay.
 
@@ -64,9 +65,10 @@ class TD(ActorCritic):
             device: Where networks and replay live.
             dtype: Floating-point type of the networks.
             availability_column: As in `ActorCritic`.
+            entities: As in `ActorCritic`.
 
         Raises:
-            ValueError: `network.mask_unavailable` is set without a column of the observation.
+            ValueError: As in `ActorCritic`.
         """
         super().__init__(
             team,
@@ -78,6 +80,7 @@ class TD(ActorCritic):
             device=device,
             dtype=dtype,
             availability_column=availability_column,
+            entities=entities,
         )
         self._config = td
         self._step = self._update_all

@@ -17,6 +17,7 @@ from innerattn.errors import ConfigError
 from innerattn.learn.ppo import PPO
 from innerattn.learn.td import TD
 from innerattn.learn.types import Learner, Team
+from innerattn.train.columns import entity_columns
 
 
 def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
@@ -32,13 +33,29 @@ def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
         )
     team = Team(env.num_robots, env.obs_width, env.num_actions)
     device = _device(config.train.device)
-    column = env.observation_names().index("own.available")
+    names = env.observation_names()
+    column = names.index("own.available")
+    entities = entity_columns(names) if config.network.encoder == "entities" else None
     seed = config.train.seed
     if on_policy(config.train.method):
         return PPO(
-            team, config.network, config.ppo, seed=seed, device=device, availability_column=column
+            team,
+            config.network,
+            config.ppo,
+            seed=seed,
+            device=device,
+            availability_column=column,
+            entities=entities,
         )
-    return TD(team, config.network, config.td, seed=seed, device=device, availability_column=column)
+    return TD(
+        team,
+        config.network,
+        config.td,
+        seed=seed,
+        device=device,
+        availability_column=column,
+        entities=entities,
+    )
 
 
 _ROWS_PER_THREAD = 512

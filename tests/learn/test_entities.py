@@ -1,0 +1,87 @@
+"""Learners whose networks encode observations by entities."""
+
+import pytest
+import torch
+
+from innerattn.config import NetworkConfig, TDConfig
+from innerattn.config.run import PPOConfig
+from innerattn.learn import PPO, TD, Team, Transitions
+from innerattn.learn.actor_critic import ActorCritic
+from innerattn.nn import EntityColumns
+
+ENVS, STEPS, ACTIONS = 8, 4, 5
+
+
+def columns(robots: int) -> EntityColumns:
+    return EntityColumns(3, robots - 1, 4, 2, 3, 0)
+
+
+def make(algorithm: str, robots: int, encoder: str = "entities", **network: object) -> ActorCritic:
+    given = NetworkConfig(hidden_width=32, attention_heads=2, encoder=encoder, **network)
+    team = Team(robots, columns(robots).width, ACTIONS)
+    extra = {"seed": 1, "device": torch.device("cpu"), "entities": columns(robots)}
+    if algorithm == "td":
+        few = TDConfig(batch_size=8, warmup_env_steps=0, update_every_env_steps=8)
+        return TD(team, given, few, **extra)
+    few = PPOConfig(rollout_steps=STEPS, minibatch_size=16, epochs=2)
+    return PPO(team, given, few, **extra)
+
+
+def observations(robots: int, seed: int) -> torch.Tensor:
+    shape = (ENVS, robots, columns(robots).width)
+    return torch.randn(shape, generator=torch.Generator().manual_seed(seed))
+
+
+def transitions(robots: int, seed: int) -> Transitions:
+    source = torch.Generator().manual_seed(seed)
+    return Transitions(
+        observations(robots, seed),
+        torch.randint(ACTIONS, (ENVS, robots), generator=source),
+        torch.randn(ENVS, robots, generator=source),
+        observations(robots, seed + 1),
+        torch.arange(ENVS) % 3 == 0,
+    )
+
+
+@pytest.mark.parametrize("precision", ["float32", "bfloat16"])
+@pytest.mark.parametrize("robots", [1, 4])
+@pytest.mark.parametrize("algorithm", ["td", "ppo"])
+def test_updates_change_every_parameter(algorithm: str, robots: int, precision: str) -> None:
+    learner = make(algorithm, robots, precision=precision)
+    before = learner.state()
+    for step in range(STEPS):
+        learner.observe(transitions(robots, step), torch.zeros(ENVS, dtype=torch.bool))
+        learner.learn()
+    assert learner.updates == 4
+    for name, tensor in learner.state().items():
+        assert tensor.isfinite().all(), name
+        idle = robots == 1 and name.startswith(("critic.attention.", "critic.action_encoder."))
+        if name.startswith(("actor.", "critic.")) and not idle:  # nobody to attend to
+            assert not torch.equal(tensor, before[name]), name
+
+
+def test_the_policy_heeds_no_order_of_teammates_and_victims() -> None:
+    learner = make("td", 3)
+    own, first, second, *victims = observations(3, 0).split([3, 4, 4, 3, 3], dim=2)
+    obs = torch.cat([own, first, second, *victims], dim=2)
+    other = torch.cat([own, second, first, *reversed(victims)], dim=2)
+    for given in (obs, other):
+        torch.testing.assert_close(
+            learner.actor(given.transpose(0, 1)), learner.actor(obs.transpose(0, 1))
+        )
+
+
+def test_flat_networks_ignore_whose_the_columns_are() -> None:
+    given = make("td", 3, encoder="flat").state()
+    network = NetworkConfig(hidden_width=32, attention_heads=2)
+    team = Team(3, columns(3).width, ACTIONS)
+    plain = TD(team, network, TDConfig(), seed=1, device=torch.device("cpu")).state()
+    assert given.keys() == plain.keys()
+    assert all(torch.equal(tensor, plain[name]) for name, tensor in given.items())
+
+
+@pytest.mark.parametrize("entities", [None, columns(2)])
+def test_columns_must_be_those_of_the_observation(entities: EntityColumns | None) -> None:
+    network, team = NetworkConfig(encoder="entities"), Team(3, columns(3).width, ACTIONS)
+    with pytest.raises(ValueError, match=r"entities = .*'entities' needs the 17 columns"):
+        TD(team, network, TDConfig(), seed=1, device=torch.device("cpu"), entities=entities)
