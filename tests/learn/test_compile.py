@@ -102,7 +102,7 @@ def test_the_traced_update_agrees_without_attention() -> None:
     agree("ppo", 4, "aot_eager", {"attention": "none"}, {"advantage": "value"})
 
 
-@pytest.mark.parametrize(("algorithm", "robots"), [("td", 1), ("td", 4), ("ppo", 4)])
+@pytest.mark.parametrize(("algorithm", "robots"), [("td", 4), ("ppo", 4)])
 def test_the_traced_update_agrees_by_entities(algorithm: str, robots: int) -> None:
     agree(algorithm, robots, "aot_eager", ENTITIES, {})
 
