@@ -7,8 +7,8 @@ from pathlib import Path
 from rich.console import Console
 
 from innerattn.cli.progress import Evaluating, SeveralRuns, Training
-from innerattn.cli.several import Run
 from innerattn.config import RunConfig
+from innerattn.study.several import Run
 from innerattn.train import Progress
 
 

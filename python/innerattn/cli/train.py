@@ -15,11 +15,11 @@ from rich.console import Console
 from innerattn.cli.options import Command, UsageError, changed, run_options
 from innerattn.cli.progress import Evaluating, SeveralRuns, Training
 from innerattn.cli.seeds import parse_seeds
-from innerattn.cli.several import Run, refuse_what_cannot_run, train_side_by_side
 from innerattn.cli.tables import print_seeds, print_summary
 from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
 from innerattn.config.run import Method, WarmStart
 from innerattn.cores import usable_cores
+from innerattn.study.several import Run, refuse_what_cannot_run, train_side_by_side
 
 if TYPE_CHECKING:
     Preset: TypeAlias = str

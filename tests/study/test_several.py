@@ -15,8 +15,8 @@ import pytest
 from innerattn.cli import train as command
 from innerattn.cli.main import main
 from innerattn.cli.progress import SeveralRuns
-from innerattn.cli.several import Run, trained_share, work
 from innerattn.config import RunConfig, load_run_config
+from innerattn.study.several import Run, trained_share, work
 from innerattn.train import Progress
 from innerattn.train.weights import read_weights
 

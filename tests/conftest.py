@@ -1,4 +1,4 @@
-"""A finished run, trained once by the command itself."""
+"""A finished run, trained once by the command itself, for tests of more than one room."""
 
 from pathlib import Path
 

@@ -1,0 +1,1 @@
+"""Studies: many runs that belong together, trained side by side; it prints nothing."""
