@@ -105,5 +105,19 @@ def test_several_runs_share_one_display() -> None:
         "training   0% | -:-- left | 0 of 5 runs done, 2 running",
         "training  20% | 3:20 left | 0 of 5 runs done, 2 running",
         "training  40% | 2:40 left | 2 of 5 runs done, 2 running",
-        "training  60% | 2:40 left | 2 of 5 runs done, 1 running, 1 failed",
+        "training  60% | 1:20 left | 2 of 5 runs done, 1 running, 1 failed",
     ]
+
+
+def test_runs_one_after_the_other_leave_a_place_free_between_them() -> None:
+    out = io.StringIO()
+    now = [0.0]
+    runs = [Run(RunConfig(), Path(f"run-s{seed}")) for seed in range(3)]
+    with SeveralRuns(Console(file=out, width=120), clock=lambda: now[0]) as show:
+        runs[0].state, runs[0].share = "running", 0.1
+        show(runs)
+        now[0] += 45.0
+        runs[0].state, runs[0].share = "done", 1.0
+        show(runs)
+    (line,) = out.getvalue().splitlines()
+    assert line == "training  33% | 1:30 left | 1 of 3 runs done, 0 running"

@@ -143,7 +143,7 @@ class SeveralRuns(Work):
         """As `Work`."""
         super().__init__(console, clock)
         self._last_call = self._start
-        self._training = 0
+        self._training = self._at_once = 0
         self._spent = 0.0  # on all runs together, without the time that they take to start [s]
 
     def __call__(self, runs: Sequence[Run]) -> None:
@@ -153,6 +153,7 @@ class SeveralRuns(Work):
         self._last_call = now
         self._training = sum(run.state == "running" and run.share > 0.0 for run in runs)
         count = {state: sum(run.state == state for run in runs) for state in _STATES}
+        self._at_once = max(self._at_once, count["running"])
         done = sum(1.0 if run.state == "failed" else run.share for run in runs)
         note = f"{count['done']} of {len(runs)} runs done, {count['running']} running"
         if count["failed"]:
@@ -166,6 +167,7 @@ class SeveralRuns(Work):
             return None
         a_run = self._spent / progress
         places = [(1.0 - run.share) * a_run for run in runs if run.state == "running"]
+        places += [0.0] * (self._at_once - len(places))  # free until the next run is started
         heapq.heapify(places)
         for run in runs:
             if run.state == "waiting":
