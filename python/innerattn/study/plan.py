@@ -1,0 +1,97 @@
+"""Which runs a study needs, what each is made of and where it lies; it looks at no folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from innerattn.config import RunConfig, load_run_config
+
+METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform")
+"""The methods that are compared."""
+SITUATIONS = ("single", "double", "mixed")
+"""The built-in scenarios that they are compared in."""
+TARGETS: Mapping[str, tuple[str, ...]] = {
+    "table2": METHODS,
+    "fig4": METHODS,
+    "fig5": tuple(method for method in METHODS if method.endswith("-inner")),
+    "all": METHODS,
+}
+"""What can be reproduced, with the methods that it needs, in every situation."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What tells the runs of one study apart."""
+
+    situation: str
+    method: str
+    seed: int
+
+    def __str__(self) -> str:
+        return f"{self.situation} {self.method} seed {self.seed}"
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """A run that a study needs.
+
+    Attributes:
+        case: which one it is.
+        config: what it is trained with.
+        folder: where it lies, or will.
+    """
+
+    case: Case
+    config: RunConfig
+    folder: Path
+
+
+def plan(
+    methods: Sequence[str],
+    situations: Sequence[str],
+    seeds: Sequence[int],
+    budget: str,
+    out: Path,
+    overrides: Mapping[str, object] | None = None,
+) -> list[PlannedRun]:
+    """The runs of a study, in the order in which they are trained.
+
+    Each is what ``innerattn train --preset SITUATION --method METHOD --budget BUDGET --seed SEED
+    --train.threads 1`` trains. All runs of one seed come before those of the next, so that a study
+    that is stopped has whole seeds.
+
+    Args:
+        methods: values of `train.method`.
+        situations: names of built-in scenarios.
+        seeds: seeds of training.
+        budget: name of a built-in budget.
+        out: folder of the study; its runs lie in ``runs``.
+        overrides: values by dotted key that all runs share, e.g. to make them small.
+
+    Raises:
+        ConfigError: an unknown name, or a value that is not allowed.
+    """
+    return [
+        PlannedRun(
+            Case(situation, method, seed),
+            load_run_config(
+                situation,
+                method,
+                budget,
+                overrides={**(overrides or {}), "train.seed": seed, "train.threads": 1},
+            ),
+            out / "runs" / f"{situation}-{method}-{budget}-s{seed}",
+        )
+        for seed in seeds
+        for situation in situations
+        for method in methods
+    ]
+
+
+def smoke_note(budget: str) -> str | None:
+    """What every output of a study says whose runs are too short to mean anything; none else."""
+    if budget != "quick":
+        return None
+    return "budget quick: a smoke run, no result; its runs are too short to compare methods"
