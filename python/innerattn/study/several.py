@@ -77,6 +77,7 @@ def train_side_by_side(
     changed: Callable[[Sequence[Run]], None],
     failed: Callable[[Run], None],
     debug: bool = False,
+    keep: object = None,
 ) -> None:
     """Train and evaluate every run in a process of its own; a failure leaves the others alone.
 
@@ -86,6 +87,7 @@ def train_side_by_side(
         changed: called with all runs when one of them is further.
         failed: called with each run that failed.
         debug: let a process that fails show where.
+        keep: handed to every process, which keeps it until its end.
 
     Raises:
         KeyboardInterrupt: after every process has saved what it learnt and is gone; a second one
@@ -97,7 +99,7 @@ def train_side_by_side(
     try:
         while waiting or running:
             while waiting and len(running) < at_once:
-                _start(waiting.popleft(), running, debug)
+                _start(waiting.popleft(), running, debug, keep)
             for pipe in connection.wait(list(running)):
                 assert isinstance(pipe, Connection)
                 run, process = running[pipe]
@@ -113,12 +115,14 @@ def train_side_by_side(
         _stop(running)
 
 
-def _start(run: Run, running: dict[Connection, tuple[Run, BaseProcess]], debug: bool) -> None:
+def _start(
+    run: Run, running: dict[Connection, tuple[Run, BaseProcess]], debug: bool, keep: object
+) -> None:
     """Start a process that Ctrl-C does not reach: what a terminal sends, it sends to all."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # handed down to the process
     try:
         pipe, its_end = _SPAWN.Pipe()
-        arguments = (run.config, run.folder, its_end, debug)
+        arguments = (run.config, run.folder, its_end, debug, keep)
         process = _SPAWN.Process(target=work, args=arguments, daemon=True)
         process.start()
         its_end.close()
@@ -159,7 +163,9 @@ def _stop(running: dict[Connection, tuple[Run, BaseProcess]]) -> None:
         raise
 
 
-def work(config: RunConfig, folder: Path, pipe: Connection, debug: bool) -> None:
+def work(
+    config: RunConfig, folder: Path, pipe: Connection, debug: bool, keep: object = None
+) -> None:
     """What the process of a run does: the same as `innerattn train` for one seed.
 
     Args:
@@ -167,7 +173,9 @@ def work(config: RunConfig, folder: Path, pipe: Connection, debug: bool) -> None
         folder: where.
         pipe: takes shares, and at last a summary or the reason of a failure; its end ends the run.
         debug: let an error that is told through the pipe be seen too.
+        keep: what comes with the process and lasts as long by itself, such as a lock.
     """
+    del keep  # it lasts without this name
     report = _Report(pipe)
     try:
         from innerattn.evaluate import evaluate_run
