@@ -1,10 +1,15 @@
 """A finished run, trained once by the command itself, for tests of more than one room."""
 
+import shutil
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
 from innerattn.cli.main import main
+from innerattn.errors import InnerattnError
+from innerattn.study.plan import plan
+from innerattn.study.several import Run
 
 
 @pytest.fixture(scope="session")
@@ -33,3 +38,70 @@ def run_dir(tmp_path_factory: pytest.TempPathFactory, tiny: list[str]) -> Path:
     path = tmp_path_factory.mktemp("runs") / "tiny"
     assert main(["train", "--run-dir", str(path), "--seed", "3", *tiny]) == 0
     return path
+
+
+@pytest.fixture(scope="session")
+def small() -> dict[str, object]:
+    """Values by key for runs of a second."""
+    return {
+        "train.env_steps": 96,
+        "train.num_envs": 8,
+        "td.warmup_env_steps": 48,
+        "td.batch_size": 16,
+        "td.update_every_env_steps": 24,
+        "ppo.rollout_steps": 6,
+        "ppo.minibatch_size": 16,
+        "network.hidden_width": 8,
+        "network.attention_heads": 2,
+        "evaluate.episodes": 2,
+        "evaluate.score_episodes": 3,
+        "evaluate.long_episodes": 2,
+        "evaluate.long_episode_steps": 5,
+    }
+
+
+def train_in_turn(
+    runs: Sequence[Run],
+    at_once: int,
+    *,
+    changed: Callable[[Sequence[Run]], None],
+    failed: Callable[[Run], None],
+    **_: object,
+) -> None:
+    """What `train_side_by_side` does, without processes, which take long to start."""
+    from innerattn.evaluate import evaluate_run
+    from innerattn.train import train
+
+    assert at_once >= 1
+    for run in runs:
+        try:
+            train(run.config, run.folder)
+            evaluation = evaluate_run(run.folder)
+            evaluation.write(run.folder / "evaluation")
+            run.state, run.share, run.summary = "done", 1.0, evaluation.summary
+        except InnerattnError as error:
+            run.state, run.failure = "failed", str(error)
+            failed(run)
+        changed(runs)
+
+
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trains the runs of a study one after the other, in this process."""
+    monkeypatch.setattr("innerattn.study.train.train_side_by_side", train_in_turn)
+
+
+@pytest.fixture(scope="session")
+def finished_study(tmp_path_factory: pytest.TempPathFactory, small: dict[str, object]) -> Path:
+    """A study's folder with two finished runs, td-inner and td-uniform; not to be changed."""
+    out = tmp_path_factory.mktemp("studies") / "finished"
+    planned = plan(("td-inner", "td-uniform"), ("mixed",), (0,), "quick", out, small)
+    runs = [Run(one.config, one.folder) for one in planned]
+    train_in_turn(runs, 1, changed=lambda _: None, failed=lambda run: pytest.fail(str(run)))
+    return out
+
+
+@pytest.fixture
+def study(tmp_path: Path, finished_study: Path) -> Path:
+    """A copy of the finished study, to be changed at will."""
+    return Path(shutil.copytree(finished_study, tmp_path / "study"))

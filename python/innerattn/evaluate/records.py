@@ -23,7 +23,7 @@ from innerattn.evaluate.episodes import FIELDS, Record, rescue_dtype
 FORMAT = "innerattn.records"
 SCHEMA_VERSION = 1
 
-_EPISODES, _RESCUES = "episodes.parquet", "rescues.parquet"
+RECORD_FILES = _EPISODES, _RESCUES = "episodes.parquet", "rescues.parquet"
 
 
 def write_records(records: Sequence[Record], folder: Path) -> None:

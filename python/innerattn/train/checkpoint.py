@@ -157,7 +157,7 @@ def read_info(run: str | Path) -> RunInfo:
     if not path.is_dir():
         raise RunError(f"{path}: no such run folder")
     try:
-        info = RunInfo(**json.loads(_plain_file(path / "run.json").read_text("utf-8")))
+        info = RunInfo(**json.loads(plain_file(path / "run.json").read_text("utf-8")))
     except (OSError, ValueError, TypeError) as error:
         raise RunError(f"{path / 'run.json'}: not the record of a run") from error
     if info.schema_version != SCHEMA_VERSION:
@@ -184,11 +184,11 @@ def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learne
     """
     path = Path(run)
     read_info(path)
-    config = read_toml(_plain_file(path / "config.toml"))
+    config = read_toml(plain_file(path / "config.toml"))
     train = config.train.model_copy(update={"device": device})
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         learner = build_learner(config.model_copy(update={"train": train}), env)
-    weights = _newest_weights(path)
+    weights = newest_weights(path)
     try:
         learner.load(read_weights(weights))
     except ValueError as error:
@@ -196,14 +196,18 @@ def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learne
     return config, learner
 
 
-def _newest_weights(run: Path) -> Path:
-    """The weights file that ``checkpoints/latest`` names; a name is a plain number."""
+def newest_weights(run: Path) -> Path:
+    """The weights file that ``checkpoints/latest`` names; a name is a plain number.
+
+    Raises:
+        RunError: there is none yet, or what is there was not made by training.
+    """
     checkpoints = run / "checkpoints"
     latest = checkpoints / "latest"
     if checkpoints.is_symlink() or not checkpoints.is_dir() or not os.path.lexists(latest):
         raise RunError(f"{run}: holds no checkpoint yet")
     try:
-        name = _plain_file(latest).read_text("ascii").strip()
+        name = plain_file(latest).read_text("ascii").strip()
     except ValueError:
         name = ""
     folder = checkpoints / name
@@ -212,7 +216,12 @@ def _newest_weights(run: Path) -> Path:
     return folder / "weights.safetensors"
 
 
-def _plain_file(path: Path) -> Path:
+def plain_file(path: Path) -> Path:
+    """``path``, which is a file and no link.
+
+    Raises:
+        RunError: it is not.
+    """
     if path.is_symlink() or not path.is_file():
         raise RunError(f"{path}: missing, or not a plain file")
     return path

@@ -1,0 +1,137 @@
+"""What is there of the runs that a study needs, and what may be used of it; it changes nothing."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from innerattn.config import RunConfig, read_toml
+from innerattn.errors import InnerattnError
+from innerattn.study.failures import read_failures
+from innerattn.study.measured import NotMeasuredError, read_measured
+from innerattn.study.plan import Case, PlannedRun
+from innerattn.train import RunInfo, read_info
+from innerattn.train.checkpoint import newest_weights, plain_file
+
+State = Literal["missing", "unfinished", "failed", "finished", "other_configuration", "unreadable"]
+"""``failed``: an earlier try ended with an error. A folder of one of the last two states is neither
+used nor changed."""
+
+TO_TRAIN: frozenset[State] = frozenset({"missing", "unfinished", "failed"})
+_MOST_KEYS, _MOST_LETTERS = 3, 60
+
+
+@dataclass(frozen=True)
+class Found:
+    """What is at the place of a planned run, and why it is not a finished run, if it is not."""
+
+    planned: PlannedRun
+    state: State
+    why: str | None = None
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """A run of a study that tables and figures may use.
+
+    Attributes:
+        case: which one it is.
+        folder: the run folder; its ``evaluation`` is whole.
+        config: what it was trained with.
+        info: how it was made.
+    """
+
+    case: Case
+    folder: Path
+    config: RunConfig
+    info: RunInfo
+
+
+def take_inventory(planned: Iterable[PlannedRun], out: Path) -> list[Found]:
+    """What is there of each planned run of the study in ``out``.
+
+    Raises:
+        RunError: the study's list of failures is damaged.
+    """
+    failures = read_failures(out)
+    found = [_find(one) for one in planned]
+    return [
+        Found(one.planned, "failed", failures[name])
+        if one.state in TO_TRAIN and (name := one.planned.folder.name) in failures
+        else one
+        for one in found
+    ]
+
+
+def finished_runs(found: Iterable[Found]) -> list[FinishedRun]:
+    """The runs that can be used.
+
+    Raises:
+        RunError: a folder has changed since it was found.
+    """
+    return [
+        FinishedRun(
+            one.planned.case,
+            one.planned.folder,
+            one.planned.config,
+            read_info(one.planned.folder),
+        )
+        for one in found
+        if one.state == "finished"
+    ]
+
+
+def differences(config: RunConfig, planned: RunConfig) -> list[str]:
+    """Where ``config`` differs from what is planned: key, its value and the planned one.
+
+    What counts is the values, not what a file spells out: a key that came later has its default.
+    """
+    values, wanted = _flat(config.model_dump()), _flat(planned.model_dump())
+    return [
+        f"{key} = {_short(values[key])}, planned {_short(value)}"
+        for key, value in wanted.items()
+        if values[key] != value
+    ]
+
+
+def _find(planned: PlannedRun) -> Found:
+    folder = planned.folder
+    if not os.path.lexists(folder):
+        return Found(planned, "missing")
+    if folder.is_symlink():
+        return Found(planned, "unreadable", "a link: must be a run folder")
+    try:
+        info = read_info(folder)
+        config = read_toml(plain_file(folder / "config.toml"))
+        differing = differences(config, planned.config)
+        if differing:
+            return Found(planned, "other_configuration", _some(differing))
+        if info.state != "done":
+            return Found(planned, "unfinished", f"its state is {info.state!r}")
+        plain_file(newest_weights(folder))
+        read_measured(folder, config)
+    except NotMeasuredError:
+        return Found(planned, "unfinished", "trained, but not measured as a whole")
+    except (InnerattnError, OSError) as error:
+        return Found(planned, "unreadable", " ".join(str(error).split()))
+    return Found(planned, "finished")
+
+
+def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by dotted key."""
+    return {
+        f"{section}.{key}": value for section, part in table.items() for key, value in part.items()
+    }
+
+
+def _some(differing: Sequence[str]) -> str:
+    more = len(differing) - _MOST_KEYS
+    return "; ".join(differing[:_MOST_KEYS]) + (f"; and {more} more" if more > 0 else "")
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= _MOST_LETTERS else f"{text[:_MOST_LETTERS]}..."

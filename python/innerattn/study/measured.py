@@ -1,0 +1,87 @@
+"""What a finished run's own evaluation found, read back from its folder."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from innerattn.config import RunConfig
+from innerattn.errors import RunError
+from innerattn.evaluate.records import RECORD_FILES
+from innerattn.evaluate.summary import SCHEMA_VERSION
+from innerattn.train.checkpoint import plain_file
+
+
+class NotMeasuredError(RunError):
+    """The evaluation of a run is not there as a whole."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Means at one length of episodes; ``score`` is none where it means nothing."""
+
+    episode_steps: int
+    rescues_per_episode: float
+    score: float | None
+
+
+def read_measured(folder: Path, config: RunConfig) -> tuple[Measured, Measured]:
+    """What a run's evaluation found at the standard and at the second length of episodes.
+
+    Args:
+        folder: the run folder.
+        config: the run's configuration.
+
+    Raises:
+        NotMeasuredError: a file of the evaluation is missing or damaged.
+        RunError: a file is a link, or the run was measured otherwise than its configuration says.
+    """
+    path = folder / "evaluation" / "summary.json"
+    records = [path.with_name(name) for name in RECORD_FILES]
+    for file in (path, *records):
+        if not os.path.lexists(file):
+            raise NotMeasuredError(f"{file}: missing")
+    try:
+        for file in records:
+            pq.read_metadata(plain_file(file))
+        found = json.loads(plain_file(path).read_text("utf-8"))
+        parts = (found, found["long"])
+        measured = tuple(
+            Measured(
+                int(part["episode_steps"]),
+                float(part["rescues_per_episode"]["mean"]),
+                None if part["score"] is None else float(part["score"]["mean"]),
+            )
+            for part in parts
+        )
+        _refuse_other_measures(path, found, config)
+    except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
+        raise NotMeasuredError(f"{path}: not a whole evaluation") from error
+    return measured[0], measured[1]
+
+
+def _refuse_other_measures(path: Path, found: dict[str, Any], config: RunConfig) -> None:
+    settings, scenario = config.evaluate, config.scenario
+    expected = {
+        "schema_version": (found["schema_version"], SCHEMA_VERSION),
+        "method": (found["method"], config.train.method),
+        "situation": (found["situation"], scenario.situation),
+        "seed": (found["seed"], settings.seed),
+        "episodes": (found["episodes"], settings.episodes),
+        "episode_steps": (found["episode_steps"], scenario.episode_steps),
+        "score_episodes": (
+            found["score_episodes"],
+            max(settings.score_episodes, settings.episodes),
+        ),
+        "long.episodes": (found["long"]["episodes"], settings.long_episodes),
+        "long.episode_steps": (found["long"]["episode_steps"], settings.long_episode_steps),
+    }
+    for key, (value, wanted) in expected.items():
+        if value != wanted:
+            raise RunError(f"{path}: {key} = {value!r}, its configuration says {wanted!r}")
