@@ -15,6 +15,7 @@ import tyro
 from innerattn.cli.evaluate import Evaluate
 from innerattn.cli.info import Info
 from innerattn.cli.options import UsageError
+from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
 from innerattn.cli.train import command_type
 from innerattn.errors import InnerattnError
@@ -56,6 +57,7 @@ def _parse(argv: list[str]) -> Any:
         Annotated[train, tyro.conf.subcommand("train")]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
         | Annotated[Robustness, tyro.conf.subcommand("robustness")]
+        | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
         | Annotated[Info, tyro.conf.subcommand("info")]
     )
     return tyro.cli(commands, args=argv, prog="innerattn", description=_DESCRIPTION)

@@ -96,7 +96,7 @@ def _over_seeds(intervals: Sequence[Interval | None]) -> str:
     from innerattn.evaluate import student_interval
 
     means = [interval.mean for interval in intervals if interval is not None]
-    return _plus_minus(student_interval(means) if len(means) == len(intervals) else None)
+    return plus_minus(student_interval(means) if len(means) == len(intervals) else None)
 
 
 def _mean(interval: Interval | None) -> str:
@@ -117,7 +117,7 @@ def _rescues(summary: Summary) -> Table:
     own = [
         cell
         for figures in lengths
-        for cell in (_plus_minus(figures.rescues_per_episode), _plus_minus(figures.score))
+        for cell in (plus_minus(figures.rescues_per_episode), plus_minus(figures.score))
     ]
     scripted = summary.method in summary.standard.scripted
     table.add_row(summary.method if scripted else f"{summary.method} (trained)", *own, style="bold")
@@ -130,10 +130,11 @@ def _scripted_cells(figures: Figures, name: str) -> tuple[str, str]:
     means = {policy: interval.mean for policy, interval in figures.scripted.items()}
     span = means["hungarian"] - means["random"]
     score = f"{(means[name] - means['random']) / span:.2f}" if figures.score else "-"
-    return _plus_minus(figures.scripted[name]), score
+    return plus_minus(figures.scripted[name]), score
 
 
-def _plus_minus(interval: Interval | None) -> str:
+def plus_minus(interval: Interval | None) -> str:
+    """A mean and half its interval, as tables show them."""
     if interval is None:
         return "-"
     return f"{interval.mean:.2f} ± {(interval.high - interval.low) / 2:.2f}"

@@ -1,0 +1,156 @@
+"""`innerattn reproduce`: train the runs that a table or figure needs, and say what is there."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+import tyro
+from rich.console import Console
+
+from innerattn.cli.options import Command, UsageError
+from innerattn.cli.progress import SeveralRuns
+from innerattn.cli.reproduce_tables import print_scores
+from innerattn.config import BUDGETS
+from innerattn.study.plan import SITUATIONS, TARGETS, PlannedRun, plan, smoke_note
+
+if TYPE_CHECKING:
+    from innerattn.study.inventory import Found
+    from innerattn.study.lock import StudyLock
+
+    Target: TypeAlias = str
+    Budget: TypeAlias = str
+else:
+    Target, Budget = Literal[tuple(TARGETS)], Literal[BUDGETS]
+
+_MOST_SEEDS = 1_000
+
+
+@dataclass(kw_only=True)
+class Reproduce(Command):
+    """Train the runs that a table or figure of the paper needs, and show what they score.
+
+    Runs that are there already are kept; the same command goes on with what is missing.
+    """
+
+    target: tyro.conf.Positional[Target]
+    """What is to be reproduced."""
+    budget: Budget = "quick"
+    """Built-in budget: how long to train; quick is a smoke run and gives no result."""
+    seeds: int = 5
+    """How many seeds: 0, 1, ... up to one less."""
+    out: Path | None = None
+    """Folder of the study, with the runs in runs; None: studies/BUDGET."""
+    methods: str = "all"
+    """Methods, separated by commas; all: what the target needs."""
+    situations: str = "all"
+    """Situations, separated by commas."""
+
+    def run(self) -> int:
+        """Plan, train, print, write.
+
+        Returns:
+            The exit code: 0, or 1 where a run failed or is left out.
+
+        Raises:
+            InnerattnError: wrong options, or another study is at work in the same folder.
+            OSError: a file cannot be written.
+            KeyboardInterrupt: the user stopped it; finished runs are kept.
+        """
+        methods = _chosen("methods", self.methods, TARGETS[self.target])
+        situations = _chosen("situations", self.situations, SITUATIONS)
+        if not 1 <= self.seeds <= _MOST_SEEDS:
+            raise UsageError(f"--seeds = {self.seeds}: must be 1 to {_MOST_SEEDS:,}")
+        out = self.out or Path("studies") / self.budget
+        planned = plan(methods, situations, range(self.seeds), self.budget, out)
+
+        from innerattn.study.document import write_account
+        from innerattn.study.inventory import finished_runs, take_inventory
+        from innerattn.study.lock import StudyLock
+        from innerattn.study.outputs import make_outputs
+
+        console = Console(markup=False, highlight=False)
+        with StudyLock.take(out) as lock:
+            found = take_inventory(planned, out)
+            self._print_plan(console, found, out)
+            try:
+                self._train(found, out, lock)
+            except KeyboardInterrupt:
+                found = take_inventory(planned, out)
+                write_account(out, self.target, self.budget, found)
+                _say_what_is_kept(found)
+                raise
+            found = take_inventory(planned, out)
+            note = smoke_note(self.budget)
+            outputs = make_outputs(self.target, finished_runs(found), out, note=note)
+            account = write_account(out, self.target, self.budget, found, outputs)
+        print_scores(console, found)
+        unusable = [one for one in found if one.state != "finished"]
+        if unusable:
+            console.print("Runs that are not in it", style="bold")
+        for one in unusable:
+            console.print(f"  {one.planned.case}: {_reason(one)}", soft_wrap=True)
+        for path in (*outputs, account):
+            console.print(f"Written: {path}", soft_wrap=True)
+        if note:
+            console.print(note[:1].upper() + note[1:], style="bold")
+        return int(bool(unusable))
+
+    def _print_plan(self, console: Console, found: Sequence[Found], out: Path) -> None:
+        from innerattn.study.train import places, to_train
+
+        states = Counter(one.state for one in found)
+        count = len(to_train(found))
+        left_out = len(found) - count - states["finished"]
+        line = f"{self.target}, budget {self.budget}: {len(found)} runs of {_seeds(self.seeds)}; "
+        line += f"{states['finished']} finished, {count} to train"
+        line += f", {places(count)} at a time" if count else ""
+        line += f"; {left_out} left out" if left_out else ""
+        console.print(line, soft_wrap=True)
+        note = smoke_note(self.budget)
+        if note:
+            console.print(note[:1].upper() + note[1:], style="bold")
+        console.print(f"Study folder: {out}", soft_wrap=True)
+        for one in found:
+            if one.state in ("other_configuration", "unreadable"):
+                text = f"left out: {one.planned.folder}: {_reason(one)}"
+                print(f"innerattn: {text} (move it away to have it trained)", file=sys.stderr)
+
+    def _train(self, found: Sequence[Found], out: Path, lock: StudyLock) -> None:
+        from innerattn.study.train import train_missing
+
+        with SeveralRuns() as progress:
+            train_missing(found, out, lock, changed=progress, failed=_say_why, debug=self.debug)
+
+
+def _chosen(option: str, text: str, known: Sequence[str]) -> tuple[str, ...]:
+    """The names that ``text`` lists, in the order of ``known``."""
+    names = {name.strip() for name in text.split(",")}
+    if names == {"all"}:
+        return tuple(known)
+    unknown = sorted(names - set(known))
+    if unknown:
+        raise UsageError(f"--{option} = {unknown[0]!r}: must be all or of {', '.join(known)}")
+    return tuple(name for name in known if name in names)
+
+
+def _seeds(count: int) -> str:
+    return "1 seed" if count == 1 else f"{count} seeds"
+
+
+def _reason(found: Found) -> str:
+    return f"{found.state.replace('_', ' ')}: {found.why}" if found.why else found.state
+
+
+def _say_why(planned: PlannedRun, reason: str) -> None:
+    print(f"innerattn: error: {planned.case}: {reason}", file=sys.stderr)
+
+
+def _say_what_is_kept(found: Sequence[Found]) -> None:
+    done = sum(one.state == "finished" for one in found)
+    text = f"{done} of {len(found)} runs are finished and kept; the same command goes on with them"
+    print(f"innerattn: {text}", file=sys.stderr)

@@ -1,0 +1,274 @@
+"""`innerattn reproduce`: trains what is missing, uses what is as planned, and names the rest."""
+
+import json
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from innerattn.cli import reproduce
+from innerattn.cli.main import main
+from innerattn.errors import RunError
+from innerattn.study.lock import StudyLock
+from innerattn.study.plan import plan
+from innerattn.study.several import Run
+from innerattn.train.weights import read_weights
+
+Command = Callable[..., int]
+NAMES = ("mixed-td-inner-quick-s0", "mixed-td-uniform-quick-s0")
+
+
+@pytest.fixture
+def command(monkeypatch: pytest.MonkeyPatch, small: dict[str, object]) -> Command:
+    """The command with small runs: target, folder, methods, then more options, in `mixed`."""
+
+    def run(target: str, out: Path, methods: str, *options: str, **values: object) -> int:
+        monkeypatch.setattr(reproduce, "plan", partial(plan, overrides={**small, **values}))
+        given = ["--out", str(out), "--methods", methods, "--situations", "mixed"]
+        return main(["reproduce", target, *given, *options])
+
+    return run
+
+
+def account(out: Path) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads((out / "runs.json").read_text())
+    return document
+
+
+def states(out: Path) -> list[str]:
+    return [run["state"] for run in account(out)["runs"]]
+
+
+def weights(folder: Path) -> dict[str, bytes]:
+    tensors = read_weights(folder / "checkpoints" / "96" / "weights.safetensors")
+    return {name: tensor.numpy().tobytes() for name, tensor in tensors.items()}
+
+
+def times(folder: Path) -> dict[Path, int]:
+    return {path: path.stat().st_mtime_ns for path in (folder, *folder.rglob("*"))}
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_finished_runs_are_used_and_the_missing_ones_trained(
+    study: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = times(study / "runs" / NAMES[0]) | times(study / "runs" / NAMES[1])
+    assert command("table2", study, "td-inner,td-uniform", "--seeds", "2") == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("table2, budget quick: 4 runs of 2 seeds; 2 finished, 2 to train, ")
+    assert out.count("a smoke run, no result") == 2
+    assert err == ""
+    rows = [line.split() for line in out.splitlines()]
+    assert ["td-inner", "2", "of", "2"] in [row[:4] for row in rows]
+    assert f"Written: {study / 'runs.json'}\n" in out
+
+    document = account(study)
+    assert "no result" in document["note"]
+    assert (document["target"], document["budget"]) == ("table2", "quick")
+    assert (document["seeds"], document["situations"]) == ([0, 1], ["mixed"])
+    for run in document["runs"]:
+        summary = json.loads((study / run["folder"] / "evaluation" / "summary.json").read_text())
+        info = json.loads((study / run["folder"] / "run.json").read_text())
+        assert run["state"] == "finished"
+        assert run["rescues_per_episode"] == summary["rescues_per_episode"]["mean"]
+        assert len(run["config_sha256"]) == len(run["weights_sha256"]) == 64
+        assert (run["commit"], run["versions"]) == (info["commit"], info["versions"])
+
+    trained = times(study / "runs")
+    assert before.items() <= trained.items()
+    assert command("table2", study, "td-inner,td-uniform", "--seeds", "2") == 0
+    again = capsys.readouterr().out
+    assert again.startswith("table2, budget quick: 4 runs of 2 seeds; 4 finished, 0 to train\n")
+    assert again.splitlines()[3:] == out.splitlines()[3:]
+    assert times(study / "runs") == trained
+    assert account(study) == document
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_another_configuration_is_named_and_neither_used_nor_changed(
+    study: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    foreign = study / "runs" / NAMES[0]
+    config = foreign / "config.toml"
+    config.write_text(config.read_text().replace("polyak = 0.02\n", "polyak = 0.03\n"))
+    before = times(foreign)
+    assert command("fig4", study, "td-inner,td-uniform", "--seeds", "2") == 1
+    out, err = capsys.readouterr()
+    why = "other configuration: td.polyak = 0.03, planned 0.02"
+    assert err == f"innerattn: left out: {foreign}: {why} (move it away to have it trained)\n"
+    assert "4 runs of 2 seeds; 1 finished, 2 to train" in out
+    assert "; 1 left out\n" in out
+    assert f"  mixed td-inner seed 0: {why}\n" in out
+    (row,) = [line.split() for line in out.splitlines() if line.startswith("    td-inner")]
+    assert row[1:4] == ["1", "of", "2"]
+    assert "±" not in row
+    assert times(foreign) == before
+    assert states(study) == ["other_configuration", "finished", "finished", "finished"]
+    assert account(study)["runs"][0]["why"] == "td.polyak = 0.03, planned 0.02"
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_an_unfinished_run_is_trained_again(study: Path, command: Command) -> None:
+    left, kept = (study / "runs" / name for name in NAMES)
+    (left / "evaluation" / "summary.json").unlink()
+    (left / "of an earlier try").touch()
+    before_it = weights(left)
+    before = times(kept)
+    assert command("table2", study, "td-inner,td-uniform", "--seeds", "1") == 0
+    assert not (left / "of an earlier try").exists()
+    assert weights(left) == before_it
+    assert times(kept) == before
+    assert sorted(path.name for path in (study / "runs").iterdir()) == sorted(NAMES)
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_a_run_that_diverges_is_named_and_the_others_are_trained(
+    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = partial(command, "fig5", tmp_path, "all", "--seeds", "1")
+    for _ in range(2):  # the second try fails as well
+        assert study(**{"td.reward_scale": 1e-37}) == 1
+        out, err = capsys.readouterr()
+        assert err.startswith("innerattn: error: mixed td-inner seed 0: training diverged at ")
+        assert err.count("\n") == 1
+        assert "  mixed td-inner seed 0: failed: training diverged at " in out
+        assert states(tmp_path) == ["failed", "finished"]
+    assert "1 finished, 1 to train" in out
+    (failure,) = json.loads((tmp_path / "failures.json").read_text())["failures"]
+    assert failure["folder"] == NAMES[0]
+    assert failure["reason"] == account(tmp_path)["runs"][0]["why"]
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_a_failure_is_forgotten_once_the_run_succeeds(study: Path, command: Command) -> None:
+    (study / "runs" / NAMES[0] / "evaluation" / "summary.json").unlink()
+    failures = {"schema_version": 1, "failures": [{"folder": NAMES[0], "reason": "it fell"}]}
+    (study / "failures.json").write_text(json.dumps(failures))
+    assert command("table2", study, "td-inner", "--seeds", "1") == 0
+    assert json.loads((study / "failures.json").read_text())["failures"] == []
+
+
+def test_ctrl_c_keeps_what_is_finished(
+    study: Path,
+    command: Command,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def press_ctrl_c(runs: Sequence[Run], *_: object, **__: object) -> None:
+        assert [run.folder.name for run in runs] == ["mixed-td-inner-quick-s1"]
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("innerattn.study.train.train_side_by_side", press_ctrl_c)
+    assert command("fig5", study, "td-inner", "--seeds", "2") == 130
+    err = capsys.readouterr().err.splitlines()
+    assert err[0].startswith("innerattn: 1 of 2 runs are finished and kept")
+    assert err[1:] == ["innerattn: interrupted"]
+    assert states(study) == ["finished", "missing"]
+
+
+KILLED = """
+import sys
+from functools import partial
+from innerattn.cli import reproduce
+from innerattn.cli.main import main
+from innerattn.study.plan import plan
+if __name__ == "__main__":
+    reproduce.plan = partial(plan, overrides={overrides!r})
+    main(["reproduce", "fig4", "--seeds", "1", "--out", sys.argv[1], "--methods",
+          "td-inner,td-uniform", "--situations", "mixed"])
+"""
+
+
+def test_a_killed_study_goes_on(
+    study: Path, small: dict[str, object], command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its processes end by themselves, and only then can the next study begin."""
+    left, kept = (study / "runs" / name for name in NAMES)
+    shutil.rmtree(left)
+    config = kept / "config.toml"  # as if it had been trained for as long as the one that is killed
+    config.write_text(config.read_text().replace("env_steps = 96\n", "env_steps = 10000000\n"))
+    before = times(kept)
+    script = study.parent / "killed.py"
+    script.write_text(KILLED.format(overrides={**small, "train.env_steps": 10_000_000}))
+    process = subprocess.Popen([sys.executable, str(script), str(study)], stdout=subprocess.PIPE)
+    wait_for((left / "run.json").exists)
+    process.kill()
+    process.communicate()
+    wait_for(lambda: can_be_locked(study))
+    assert json.loads((left / "run.json").read_text())["state"] == "interrupted"
+
+    asked: list[Path] = []
+
+    def note(runs: Sequence[Run], *_: object, **__: object) -> None:
+        asked.extend(run.folder for run in runs)
+        assert not left.exists()
+
+    monkeypatch.setattr("innerattn.study.train.train_side_by_side", note)
+    values = {"train.env_steps": 10_000_000}
+    assert command("fig4", study, "td-inner,td-uniform", "--seeds", "1", **values) == 1
+    assert asked == [left]
+    assert states(study) == ["missing", "finished"]
+    assert times(kept) == before
+
+
+def can_be_locked(study: Path) -> bool:
+    try:
+        with StudyLock.take(study):
+            return True
+    except RunError:
+        return False
+
+
+def wait_for(done: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60.0
+    while not done():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def test_a_study_at_work_is_left_alone(
+    study: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = times(study)
+    with StudyLock.take(study):
+        assert command("table2", study, "td-inner", "--seeds", "2") == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"innerattn: error: {study}: another study is at work here")
+    assert err.count("\n") == 1
+    (study / ".lock").unlink()
+    assert times(study / "runs").items() <= before.items()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["fig5", "--methods", "td-uniform"], "--methods = 'td-uniform': must be all or of td-i"),
+        (["all", "--situations", "mixed,x"], "--situations = 'x': must be all or of single, "),
+        (["all", "--seeds", "0"], "--seeds = 0: must be 1 to 1,000"),
+    ],
+)
+def test_wrong_options_are_one_line(
+    options: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["reproduce", *options]) == 2
+    assert capsys.readouterr().err.startswith(f"innerattn: error: {message}")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_target_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["reproduce", "table3"])
+    assert ended.value.code == 2
+    assert "table3" in capsys.readouterr().err
