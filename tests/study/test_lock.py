@@ -32,3 +32,9 @@ def test_a_process_holds_it_to_its_end(tmp_path: Path) -> None:
     process.join()
     with StudyLock.take(tmp_path):
         pass
+
+
+def test_a_file_cannot_hold_a_study(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(RunError, match=r"file: cannot hold a study \(File exists\)$"):
+        StudyLock.take(tmp_path / "file")

@@ -43,7 +43,7 @@ def print_scores(console: Console, found: Sequence[Found]) -> None:
     if lengths is None:
         return
     table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("situation, method")
+    table.add_column("method")
     table.add_column("runs", justify="right")
     for measured_at in lengths:
         table.add_column(f"{measured_at.episode_steps} steps", justify="right")

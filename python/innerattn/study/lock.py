@@ -28,11 +28,13 @@ class StudyLock:
         """Lock the folder ``out``, which is made if needed.
 
         Raises:
-            RunError: another study is at work there.
-            OSError: the folder or the lock cannot be made.
+            RunError: another study is at work there, or the folder or its lock cannot be made.
         """
-        out.mkdir(parents=True, exist_ok=True)
-        file = os.open(out / ".lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            file = os.open(out / ".lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+        except OSError as error:
+            raise RunError(f"{out}: cannot hold a study ({error.strerror})") from error
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
