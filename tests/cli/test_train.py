@@ -134,7 +134,7 @@ def test_every_key_is_an_option(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["train", "--help"])
     text = capsys.readouterr().out.replace("_", "-")
-    in_a_file = {"scenario.robots", "scenario.tasks", "scenario.obstacles"}
+    in_a_file = {f"scenario.{name}" for name in ("robots", "tasks", "obstacles", "faults")}
     for section, table in load_run_config().model_dump().items():
         for key in table:
             offered = f"--{section}.{key.replace('_', '-')} " in text.replace(",", " ")
