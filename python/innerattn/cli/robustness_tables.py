@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -33,6 +33,7 @@ _ATTENTION_KEY = """\
   the same worlds without the fault; AUC: how often a faulty robot gets more
   weight than a healthy one; 0.5 tells nothing, below 0.5 faults turn it away
 """
+_MOST_WITH_INTERVALS = 4  # policies that 80 columns hold with their intervals
 
 
 def print_robustness(
@@ -57,7 +58,11 @@ def print_robustness(
         f"{scenario.episode_steps} steps",
         style="bold",
     )
-    console.print(_by_kind(grid, found))
+    # Names of runs are too long to stand over columns.
+    heads = [f"run {i + 1}" if name in bounds else name for i, name in enumerate(found)]
+    console.print(_by_kind(grid, found, heads))
+    for head, name in zip(heads, bounds, strict=False):
+        console.print(f"  {head}: {name}", soft_wrap=True)
     console.print(_KEY)
     first, kept = next(iter(found.items()))
     console.print(f"{first}: a fault from the start, by severity (mean over robots)", style="bold")
@@ -70,15 +75,16 @@ def print_robustness(
             _print_attention(console, name, attention[name])
 
 
-def _by_kind(grid: Grid, found: Mapping[str, Kept]) -> Table:
-    table = _table("kept", *found)
+def _by_kind(grid: Grid, found: Mapping[str, Kept], heads: Sequence[str]) -> Table:
+    show = _text if len(found) <= _MOST_WITH_INTERVALS else _mean
+    table = _table("kept", *heads)
     means = {name: kept.by_kind() for name, kept in found.items()}
     for k, kind in enumerate(grid.kinds):
-        table.add_row(_words(kind), *(_text(mean[k].interval()) for mean in means.values()))
+        table.add_row(_words(kind), *(show(mean[k].interval()) for mean in means.values()))
     table.add_section()
-    overall = [_text(mean.mean(0).interval()) for mean in means.values()]
+    overall = [show(mean.mean(0).interval()) for mean in means.values()]
     table.add_row("all kinds", *overall, style="bold")
-    clean = [_text(kept.clean.interval()) for kept in found.values()]
+    clean = [show(kept.clean.interval()) for kept in found.values()]
     table.add_row("rescues", *clean)
     return table
 
@@ -175,6 +181,10 @@ def _words(kind: str) -> str:
 
 def _share(value: float | None) -> str:
     return "-" if value is None else f"{value:.0%}"
+
+
+def _mean(interval: Interval) -> str:
+    return "-" if math.isnan(interval.mean) else f"{interval.mean:.2f}"
 
 
 def _text(interval: Interval) -> str:
