@@ -9,7 +9,8 @@ from innerattn.config import Scenario
 from innerattn.errors import RunError
 from innerattn.evaluate.faults.grid import Grid, Kept
 from innerattn.evaluate.faults.retention import Estimate
-from innerattn.report.heatmap import check_format, draw_heatmap, write_heatmap
+from innerattn.report.drawing import check_format
+from innerattn.report.heatmap import draw_heatmap, write_heatmap
 
 GRID = Grid(Scenario(), kinds=("motor_gain", "blackout"), severities=(0.5, 1.0))
 

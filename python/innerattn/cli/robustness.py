@@ -58,7 +58,7 @@ class Robustness(Command):
         """
         kinds = self._check()
         if self.plot is not None:
-            from innerattn.report.heatmap import check_format
+            from innerattn.report.drawing import check_format
 
             check_format(self.plot)
         grid, found, methods = self._retention(kinds)

@@ -2,38 +2,18 @@
 
 from __future__ import annotations
 
-import io
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from innerattn.config.files import write_whole
-from innerattn.errors import RunError
 from innerattn.evaluate.faults.grid import ONSETS, Grid, Kept
+from innerattn.report.drawing import check_format, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FORMATS = ("pdf", "png", "svg")
-"""Kinds of files that can be drawn, by their suffix."""
-
 _INK_CHANGES_AT = 0.45  # dark ink on light cells and light ink on dark ones
-
-
-def check_format(path: Path) -> str:
-    """The format that a file's suffix names.
-
-    Raises:
-        RunError: it names none of `FORMATS`, or matplotlib is not installed.
-    """
-    kind = path.suffix.removeprefix(".").lower()
-    if kind not in FORMATS:
-        raise RunError(f"{path}: the file must end in {', '.join('.' + x for x in FORMATS)}")
-    if find_spec("matplotlib") is None:
-        raise RunError("drawing needs matplotlib: install innerattn[figures]")
-    return kind
 
 
 def draw_heatmap(name: str, kept: Kept, grid: Grid) -> Figure:
@@ -78,15 +58,8 @@ def write_heatmap(path: Path, name: str, kept: Kept, grid: Grid) -> None:
     """Draw a heat map into a file, whole or not at all.
 
     Raises:
-        RunError: see `check_format`.
+        RunError: see `drawing.check_format`.
         OSError: the file cannot be written.
     """
-    kind = check_format(path)
-    from matplotlib import rc_context
-
-    buffer = io.BytesIO()
-    # Without dates and random names in it the same figures give the same bytes.
-    metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
-    with rc_context({"svg.hashsalt": "innerattn"}):
-        draw_heatmap(name, kept, grid).savefig(buffer, format=kind, dpi=200, metadata=metadata)
-    write_whole(path, buffer.getvalue())
+    check_format(path)
+    write_figure(path, draw_heatmap(name, kept, grid))
