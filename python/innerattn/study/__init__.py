@@ -1,1 +1,4 @@
-"""Studies: many runs that belong together, trained side by side; it prints nothing."""
+"""Studies: many runs trained side by side, then seen together as the paper's tables and figures.
+
+It prints nothing.
+"""

@@ -1,0 +1,181 @@
+"""Table II as text: Markdown tables to read and one CSV to compute with."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+
+from innerattn.evaluate.sharing.evenness import MARGIN, ChiSquared, Evenness, EvennessOfRuns
+from innerattn.evaluate.statistics import Interval
+from innerattn.study.competence import COMPETENCE, Competence
+from innerattn.study.over_runs import OverRuns
+from innerattn.study.table2 import Row, Sharing, Table2
+
+NONE = "–"
+"""What stands where there is no figure."""
+
+_CSV_COLUMNS = """
+situation method task seed episodes robot_0 robot_1 rescues_0 rescues_1 share_0 share_low share_high
+chi_squared p equivalence_p verdict printed_share_0 printed_chi_squared rescues_per_episode score
+"""
+
+
+def table2_markdown(table: Table2) -> str:
+    """Tables by situation: sharing over all episodes, then as in the paper, runs, competence."""
+    low, high = MARGIN
+    parts = [
+        "Shares are of rescues in which the first food robot helped. Over several runs the "
+        "interval is Student's 95 % with the run as the unit, of a single run it is over its "
+        f"episodes. Verdict: even where the 90 % interval lies within {low} to {high} (two "
+        "one-sided tests at 5 %), uneven where the 95 % interval lies outside, else undecided. "
+        "χ² is that of the rescues of all runs added up, as if they were independent; it and a "
+        "mean near 0.5 can hide runs that are uneven in opposite ways, so runs are counted by "
+        "their own verdict, too.\n"
+    ]
+    for situation in dict.fromkeys(row.situation for row in table.rows):
+        rows = [row for row in table.rows if row.situation == situation]
+        scores = {c.method: c.mean["score"] for c in table.competence if c.situation == situation}
+        parts.append(f"### Sharing, {situation}\n")
+        for name in ("scored", "recorded"):
+            episodes = sorted({getattr(row, name).episodes for row in rows})
+            like = ", as in the paper" if name == "recorded" and episodes == [80] else ""
+            parts.append(f"Over {_listed(episodes)} episodes of each run{like}:\n")
+            parts.append(_sharing_table(rows, name, scores))
+        parts.append("Every run:\n")
+        parts.append(_runs_table(rows))
+        parts.append(f"### Competence, {situation}\n")
+        parts.append(_competence_table([c for c in table.competence if c.situation == situation]))
+    return "\n".join(parts)
+
+
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table that ends with a line break."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+
+
+def table2_csv(table: Table2) -> str:
+    """One line per situation, method, task, set of episodes and run, and one for all runs."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_CSV_COLUMNS.split())
+    competence = {(part.situation, part.method): part for part in table.competence}
+    for row in table.rows:
+        beside = competence[row.situation, row.method]
+        for sharing in (row.recorded, row.scored):
+            for seed, run, figures in zip(row.seeds, sharing.each, beside.each, strict=True):
+                writer.writerow(_csv_line(row, str(seed), sharing, run, figures))
+            means = {name: mean.mean if mean else None for name, mean in beside.mean.items()}
+            writer.writerow(_csv_line(row, "all", sharing, sharing.all, means))
+    return text.getvalue()
+
+
+def _csv_line(
+    row: Row,
+    seed: str,
+    sharing: Sharing,
+    run: Evenness | EvennessOfRuns,
+    figures: Mapping[str, float | None],
+) -> list[str | int | float | None]:
+    share, chi, printed = run.share, run.chi_squared, row.printed
+    return [
+        *(row.situation, row.method, row.task, seed, sharing.episodes),
+        *(*row.robots, *run.rescues),
+        *((share.mean, share.low, share.high) if share else (None, None, None)),
+        *((chi.statistic, chi.p) if chi else (None, None)),
+        *(run.equivalence_p, run.verdict),
+        *((printed.row.shares[0], printed.row.chi_squared) if printed else (None, None)),
+        *(figures["rescues_per_episode"], figures["score"]),
+    ]
+
+
+def shown(value: OverRuns | Interval | None, decimals: int = 2) -> str:
+    """A mean with its interval, where it has one."""
+    if value is None:
+        return NONE
+    text = f"{value.mean:.{decimals}f}"
+    if value.low is None or value.high is None:
+        return text
+    return f"{text} [{value.low:.{decimals}f}, {value.high:.{decimals}f}]"
+
+
+def share_shown(sharing: Sharing) -> str:
+    """The share of the first robot in all runs; without an interval where it has none."""
+    whole = sharing.all
+    if whole.share is not None or not sum(whole.rescues):
+        return shown(whole.share)
+    return f"{whole.rescues[0] / sum(whole.rescues):.2f}"
+
+
+def verdicts_shown(sharing: Sharing) -> str:
+    """Numbers of runs that are even, uneven and undecided by themselves."""
+    return " / ".join(str(count) for count in sharing.verdicts().values())
+
+
+def _sharing_table(rows: Sequence[Row], name: str, scores: dict[str, OverRuns | None]) -> str:
+    head = ["method", "task", "seeds", "rescues (first + second)", "share of the first [95 %]"]
+    head += ["χ² (p)", "verdict", "runs even / uneven / undecided", "score [95 %]"]
+    printed = any(row.printed for row in rows) and name == "recorded"
+    head += ["printed shares, χ²", "printed χ² at n = 100"] if printed else []
+    lines = []
+    for row in rows:
+        sharing: Sharing = getattr(row, name)
+        first, second = sharing.all.rescues
+        cells = [row.method, row.task, str(len(row.seeds))]
+        cells += [f"{first + second} ({first} + {second})", share_shown(sharing)]
+        cells += [_chi_squared(sharing.all.chi_squared), sharing.all.verdict]
+        cells += [verdicts_shown(sharing), shown(scores[row.method])]
+        if printed and row.printed:
+            shares, was = row.printed.row.shares, row.printed.row
+            cells += [f"{shares[0]:.2f} / {shares[1]:.2f}, {was.chi_squared:.{was.decimals}f}"]
+            cells += [f"{row.printed.chi_squared:.2f}"]
+        elif printed:
+            cells += [NONE, NONE]
+        lines.append(cells)
+    return markdown_table(head, lines)
+
+
+def _runs_table(rows: Sequence[Row]) -> str:
+    head = ["method", "task", "seed"]
+    for name in ("scored", "recorded"):
+        episodes = _listed(sorted({getattr(row, name).episodes for row in rows}))
+        head += [f"{episodes} episodes: rescues", "share [95 %]", "χ² (p)", "verdict"]
+    lines = []
+    for row in rows:
+        for index, seed in enumerate(row.seeds):
+            cells = [row.method, row.task, str(seed)]
+            for sharing in (row.scored, row.recorded):
+                run = sharing.each[index]
+                cells += [f"{run.rescues[0]} + {run.rescues[1]}", shown(run.share)]
+                cells += [_chi_squared(run.chi_squared), run.verdict]
+            lines.append(cells)
+    return markdown_table(head, lines)
+
+
+def _competence_table(parts: Sequence[Competence]) -> str:
+    head = ["method", "seed"]
+    for name, unit in COMPETENCE.items():
+        words = name.removesuffix("_s").replace("_", " ")
+        head.append(f"{words} ({unit})" if unit else words)
+    lines = []
+    for part in parts:
+        for seed, figures in zip(part.seeds, part.each, strict=True):
+            values = [figures[name] for name in COMPETENCE]
+            shown_ = [NONE if value is None else f"{value:.2f}" for value in values]
+            lines.append([part.method, str(seed), *shown_])
+        if len(part.seeds) > 1:
+            means = [shown(part.mean[name]) for name in COMPETENCE]
+            lines.append([part.method, "mean [95 %]", *means])
+    return markdown_table(head, lines)
+
+
+def _chi_squared(found: ChiSquared | None) -> str:
+    if found is None:
+        return NONE
+    p = "p < 0.001" if found.p < 0.001 else f"p = {found.p:.3f}"
+    return f"{found.statistic:.2f} ({p})"
+
+
+def _listed(values: Sequence[int]) -> str:
+    return " or ".join(f"{value:,}" for value in values)
