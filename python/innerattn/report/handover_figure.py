@@ -1,0 +1,186 @@
+"""Fig. 5: one hand-over as it went; it chooses and measures nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.config import Scenario
+from innerattn.report.drawing import BLACK, PAGE_WIDTH_IN, ROBOT_COLOURS, VERMILION
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MARKERS = "oo^s"  # of robots by index; further ones are diamonds
+_VICTIM_MARKERS = "*XP"
+_NAME_HEIGHT = 0.14  # distance of names, as a share of half the arena
+_STAGES = ("(i) before", "(ii) between", "(iii) after")
+
+
+@dataclass(frozen=True)
+class HandoverScene:
+    """One hand-over; T steps of its episode, R robots, V victim slots, H heads.
+
+    Attributes:
+        scenario: the worlds.
+        title: where it is from.
+        robot: index of the robot that hands over.
+        before: index of its partner in the first rescue.
+        after: index of its partner in the second.
+        tasks: names of the tasks of the two rescues.
+        start: step at which the first stage begins.
+        first: step whose action completes the first rescue.
+        second: step whose action completes the second.
+        positions: (T, R, 2) before each step's action [m].
+        velocities: (T, R, 2) [m/s].
+        victims: (T, V) structured; present, task, x, y [m].
+        weights: (T, H, R) of the robot on each robot.
+    """
+
+    scenario: Scenario
+    title: str
+    robot: int
+    before: int
+    after: int
+    tasks: tuple[str, str]
+    start: int
+    first: int
+    second: int
+    positions: NDArray[np.float32]
+    velocities: NDArray[np.float32]
+    victims: NDArray[np.void]
+    weights: NDArray[np.float32]
+
+    @property
+    def stages(self) -> tuple[tuple[int, int], ...]:
+        """First and last step of the trails of each stage; the last is where robots are drawn."""
+        middle = (self.first + 1 + self.second) // 2
+        return (self.start, self.first), (self.first, middle), (middle, self.second)
+
+
+def draw_handover(scene: HandoverScene) -> Figure:
+    """Panels A (positions in three stages), B (weights, mean over heads) and C (each head)."""
+    from matplotlib.figure import Figure
+
+    heads = scene.weights.shape[1]
+    figure = Figure(figsize=(PAGE_WIDTH_IN, 6.6), layout="constrained")
+    parts: Any = figure.subfigures(3, 1, height_ratios=(2.55, 1.75, 1.6))
+    upper, middle, lower = parts
+    arenas = upper.subplots(1, len(_STAGES), squeeze=False)[0]
+    for panel, name, (since, now) in zip(arenas, _STAGES, scene.stages, strict=True):
+        _arena(panel, scene, since, now)
+        panel.set_title(f"{name}: step {now}", fontsize=8)
+    panel_b = middle.subplots(1, 1)
+    _weights(panel_b, scene, scene.weights.mean(1))
+    panel_b.set_ylabel("weight, mean over heads", fontsize=8)
+    panel_b.set_xlabel(f"step of the episode [{scene.scenario.dt_s:g} s each]", fontsize=8)
+    top = panel_b.get_ylim()[1]
+    for step, task, partner in zip(
+        (scene.first, scene.second), scene.tasks, (scene.before, scene.after), strict=True
+    ):
+        panel_b.annotate(
+            f"{task} done with\n{scene.scenario.robots[partner].name} ",
+            (step + 0.5, top),
+            xytext=(-2, -3),
+            textcoords="offset points",
+            fontsize=6.5,
+            ha="right",
+            va="top",
+        )
+    for name, (_, now) in zip(_STAGES, scene.stages, strict=True):
+        panel_b.annotate(name.split()[0], (now, 0.02), fontsize=6.5, ha="center")
+    panels = lower.subplots(1, heads, sharey=True, squeeze=False)[0]
+    for head, panel in enumerate(panels):
+        _weights(panel, scene, scene.weights[:, head])
+        panel.set_title(f"head {head + 1}", fontsize=8)
+        panel.set_xlabel(f"step [{scene.scenario.dt_s:g} s]", fontsize=8)
+    panels[0].set_ylabel("weight", fontsize=8)
+    for first, letter in ((arenas[0], "A"), (panel_b, "B"), (panels[0], "C")):
+        first.set_title(letter, loc="left", fontsize=11, fontweight="bold")
+    handles, names = panels[0].get_legend_handles_labels()
+    lower.legend(
+        handles, names, fontsize=7, ncols=len(names), loc="outside lower center", frameon=False
+    )
+    robot = scene.scenario.robots[scene.robot].name
+    figure.suptitle(f"{robot} hands over: {scene.title}", fontsize=9)
+    return figure
+
+
+def _arena(panel: Axes, scene: HandoverScene, since: int, now: int) -> None:
+    from matplotlib.patches import Circle, Rectangle
+    from matplotlib.patheffects import withStroke
+
+    half = scene.scenario.arena_half_width_m
+    panel.set(xlim=(-1.08 * half, 1.08 * half), ylim=(-1.08 * half, 1.08 * half), aspect="equal")
+    panel.add_patch(Rectangle((-half, -half), 2 * half, 2 * half, fill=False, linewidth=1.2))
+    panel.set_xlabel("x [m]", fontsize=8)
+    panel.set_ylabel("y [m]", fontsize=8)
+    panel.set_xticks([-half, 0, half])
+    panel.set_yticks([-half, 0, half])
+    panel.tick_params(labelsize=7, length=2)
+    halo = [withStroke(linewidth=1.8, foreground="white")]
+    text: dict[str, Any] = {"fontsize": 6, "textcoords": "offset points", "path_effects": halo}
+    tasks = scene.scenario.tasks
+    for victim in scene.victims[now][scene.victims[now]["present"].astype(bool)]:
+        x, y, task = float(victim["x"]), float(victim["y"]), int(victim["task"])
+        marker = _VICTIM_MARKERS[task % len(_VICTIM_MARKERS)]
+        panel.plot([x], [y], marker, color=VERMILION, markersize=8, markeredgewidth=0.0, zorder=2)
+        ring = Circle((x, y), scene.scenario.rescue_radius_m, fill=False, linestyle="--")
+        ring.set(edgecolor=VERMILION, linewidth=0.7)
+        panel.add_patch(ring)
+        style: dict[str, Any] = {"ha": "center", "color": VERMILION, "zorder": 6}
+        panel.annotate(tasks[task].name, (x, y), (0, -15), **style, **text)
+    heights = _apart(scene.positions[now, :, 1], _NAME_HEIGHT * half)
+    for r, robot in enumerate(scene.scenario.robots):
+        colour, own = ROBOT_COLOURS[r % len(ROBOT_COLOURS)], r == scene.robot
+        trail = scene.positions[since : now + 1, r]
+        panel.plot(*trail.T, color=colour, linewidth=1.6 if own else 0.9, zorder=3)
+        edge: dict[str, Any] = {"markeredgecolor": BLACK, "markeredgewidth": 1.2 if own else 0.4}
+        panel.plot(*trail[-1:].T, _marker(r), color=colour, markersize=6, zorder=4, **edge)
+        x = float(trail[-1, 0])
+        style = {"ha": "left" if x < 0 else "right", "va": "center", "zorder": 5}
+        weight = "bold" if own else "normal"
+        beside = (6 if x < 0 else -6, 0)
+        panel.annotate(robot.name, (x, heights[r]), beside, fontweight=weight, **style, **text)
+
+
+def _apart(values: NDArray[np.float32], least: float) -> list[float]:
+    """Values pushed apart until neighbours differ by ``least``, about the place where they were."""
+    order = np.argsort(values)
+    placed = values[order].astype(np.float64)
+    for _ in range(len(placed) ** 2):
+        for low in range(len(placed) - 1):
+            overlap = least - (placed[low + 1] - placed[low])
+            if overlap > 0.0:
+                placed[low] -= overlap / 2.0
+                placed[low + 1] += overlap / 2.0
+    found = np.empty(len(placed))
+    found[order] = placed
+    return [float(value) for value in found]
+
+
+def _weights(panel: Axes, scene: HandoverScene, weights: NDArray[np.float32]) -> None:
+    """Weights (T, R) on the teammates over the steps of the hand-over."""
+    from matplotlib.ticker import MaxNLocator
+
+    steps = np.arange(scene.start, scene.second + 1)
+    for r, robot in enumerate(scene.scenario.robots):
+        if r != scene.robot:
+            colour = ROBOT_COLOURS[r % len(ROBOT_COLOURS)]
+            panel.plot(steps, weights[steps, r], f"{_marker(r)}-", color=colour, linewidth=1.3,
+                       markersize=2.5, label=f"on {robot.name}")  # fmt: skip
+    even = 1.0 / (len(scene.scenario.robots) - 1)
+    panel.axhline(even, color=BLACK, linewidth=0.7, linestyle=":", label="even attention")
+    for step in (scene.first, scene.second):
+        panel.axvline(step + 0.5, color=BLACK, linewidth=0.9, linestyle="--")
+    panel.set(xlim=(scene.start - 0.3, scene.second + 0.8), ylim=(0.0, 1.0))
+    panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+    panel.tick_params(labelsize=7, length=2)
+
+
+def _marker(robot: int) -> str:
+    return _MARKERS[robot] if robot < len(_MARKERS) else "D"

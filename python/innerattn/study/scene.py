@@ -1,0 +1,60 @@
+"""Which hand-over is shown as Fig. 5, by a fixed rule, so that nobody picks the prettiest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from innerattn.evaluate.sharing.handover import handovers
+from innerattn.report.handover_figure import HandoverScene
+from innerattn.study.fig5 import alike_robots
+from innerattn.study.run import Measured
+
+SCENE_RULE = (
+    "the run of lowest seed; of the first food robot's hand-overs from the first task to the "
+    "second with another partner, in the episodes recorded step by step, the one whose shorter "
+    "stage (before and after the first rescue) is longest, then the one that is longest in all, "
+    "then the first"
+)
+"""How the hand-over that is shown is chosen; it looks at no attention weight."""
+
+
+def choose_scene(group: Sequence[Measured]) -> HandoverScene | None:
+    """The hand-over that is shown, by `SCENE_RULE`.
+
+    Args:
+        group: runs of one situation and method, in order of seeds.
+
+    Returns:
+        None where the first run has no attention, not two tasks of two needs, or no such hand-over.
+    """
+    run, record = group[0].run, group[0].recorded
+    tasks = [task.name for task in record.scenario.tasks if len(task.needs) == 2]
+    alike = alike_robots(record)
+    if "attention" not in record.steps or len(tasks) < 2 or not alike:
+        return None
+    found = handovers(record, alike[0], tasks[0], tasks[1])
+    if not len(found):
+        return None
+    before = found["first"] - found["start"] + 1
+    after = found["second"] - found["first"]
+    shorter, whole = np.minimum(before, after), before + after
+    chosen = found[np.lexsort((np.arange(len(found)), -whole, -shorter))[0]]
+    episode = int(chosen["episode"]) - record.first_episode
+    robot, steps = int(chosen["robot"]), record.steps
+    return HandoverScene(
+        scenario=record.scenario,
+        title=f"{run.situation}, {run.method}, seed {run.seed}, episode {int(chosen['episode'])}",
+        robot=robot,
+        before=int(chosen["before"]),
+        after=int(chosen["after"]),
+        tasks=(tasks[0], tasks[1]),
+        start=int(chosen["start"]),
+        first=int(chosen["first"]),
+        second=int(chosen["second"]),
+        positions=steps["positions"][episode],
+        velocities=steps["velocities"][episode],
+        victims=steps["victims"][episode],
+        weights=steps["attention"][episode, :, :, robot],
+    )
