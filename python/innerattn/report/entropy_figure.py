@@ -61,7 +61,7 @@ def draw_entropy(lines: Sequence[EntropyLines], printed_nats: float) -> Figure:
 
     situations = list(dict.fromkeys(line.situation for line in lines))
     methods = list(dict.fromkeys(line.method for line in lines))
-    figure = Figure(figsize=(PAGE_WIDTH_IN, 4.9), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH_IN, 5.1), layout="constrained")
     panels = figure.subplots(2, len(situations), sharey=True, squeeze=False)
     for column, situation in enumerate(situations):
         own = [line for line in lines if line.situation == situation]
@@ -71,8 +71,8 @@ def draw_entropy(lines: Sequence[EntropyLines], printed_nats: float) -> Figure:
         _robots(lower, own[0])
         upper.set_title(situation, fontsize=9)
         lower.set_title(f"{own[0].method} by robot; thin: its heads", fontsize=7)
-        lower.set_xlabel("training [1,000 env-steps]", fontsize=8)
         for panel in (upper, lower):
+            panel.set_xlabel("training [1,000 env-steps]", fontsize=8)
             _marks(panel, own[0].even_nats, printed_nats)
             last = column == len(situations) - 1
             _teammates(panel, labelled=last)

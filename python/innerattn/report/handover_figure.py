@@ -36,7 +36,6 @@ class HandoverScene:
         first: step whose action completes the first rescue.
         second: step whose action completes the second.
         positions: (T, R, 2) before each step's action [m].
-        velocities: (T, R, 2) [m/s].
         victims: (T, V) structured; present, task, x, y [m].
         weights: (T, H, R) of the robot on each robot.
     """
@@ -51,7 +50,6 @@ class HandoverScene:
     first: int
     second: int
     positions: NDArray[np.float32]
-    velocities: NDArray[np.float32]
     victims: NDArray[np.void]
     weights: NDArray[np.float32]
 

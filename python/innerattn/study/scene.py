@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from innerattn.evaluate.sharing.handover import handovers
 from innerattn.report.handover_figure import HandoverScene
 from innerattn.study.fig5 import alike_robots
 from innerattn.study.run import Measured
+
+SCHEMA_VERSION = 1
 
 SCENE_RULE = (
     "the run of lowest seed; of the first food robot's hand-overs from the first task to the "
@@ -54,7 +57,37 @@ def choose_scene(group: Sequence[Measured]) -> HandoverScene | None:
         first=int(chosen["first"]),
         second=int(chosen["second"]),
         positions=steps["positions"][episode],
-        velocities=steps["velocities"][episode],
         victims=steps["victims"][episode],
         weights=steps["attention"][episode, :, :, robot],
     )
+
+
+def scene_json(scene: HandoverScene) -> dict[str, Any]:
+    """The document of ``fig5.json``: the steps of the hand-over, start to second."""
+    shown = slice(scene.start, scene.second + 1)
+    names = [robot.name for robot in scene.scenario.robots]
+    tasks = [task.name for task in scene.scenario.tasks]
+    victims = [
+        [
+            {"task": tasks[int(v["task"])], "x": float(v["x"]), "y": float(v["y"])}
+            for v in step[step["present"].astype(bool)]
+        ]
+        for step in scene.victims[shown]
+    ]
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "title": scene.title,
+        "rule": SCENE_RULE,
+        "robots": names,
+        "robot": names[scene.robot],
+        "before": names[scene.before],
+        "after": names[scene.after],
+        "tasks": list(scene.tasks),
+        "steps": list(range(scene.start, scene.second + 1)),
+        "first": scene.first,
+        "second": scene.second,
+        "stages": [list(stage) for stage in scene.stages],
+        "positions_by_step_robot": scene.positions[shown].tolist(),
+        "victims_by_step": victims,
+        "weights_by_step_head_robot": scene.weights[shown].tolist(),
+    }

@@ -50,9 +50,10 @@ def table2_markdown(table: Table2) -> str:
 
 
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table that ends with a line break."""
+    """A Markdown table that ends with a line break; bars in cells are escaped."""
     lines = [head, ["---"] * len(head), *rows]
-    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+    escaped = ([cell.replace("|", "\\|") for cell in cells] for cells in lines)
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in escaped)
 
 
 def table2_csv(table: Table2) -> str:
@@ -94,10 +95,15 @@ def shown(value: OverRuns | Interval | None, decimals: int = 2) -> str:
     """A mean with its interval, where it has one."""
     if value is None:
         return NONE
-    text = f"{value.mean:.{decimals}f}"
+    mean = fixed(value.mean, decimals)
     if value.low is None or value.high is None:
-        return text
-    return f"{text} [{value.low:.{decimals}f}, {value.high:.{decimals}f}]"
+        return mean
+    return f"{mean} [{fixed(value.low, decimals)}, {fixed(value.high, decimals)}]"
+
+
+def fixed(value: float, decimals: int = 2) -> str:
+    """A number with so many decimals; none is minus zero."""
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
 def share_shown(sharing: Sharing) -> str:
@@ -162,7 +168,7 @@ def _competence_table(parts: Sequence[Competence]) -> str:
     for part in parts:
         for seed, figures in zip(part.seeds, part.each, strict=True):
             values = [figures[name] for name in COMPETENCE]
-            shown_ = [NONE if value is None else f"{value:.2f}" for value in values]
+            shown_ = [NONE if value is None else fixed(value) for value in values]
             lines.append([part.method, str(seed), *shown_])
         if len(part.seeds) > 1:
             means = [shown(part.mean[name]) for name in COMPETENCE]

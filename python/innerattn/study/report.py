@@ -1,0 +1,124 @@
+"""The paper's Table II, Fig. 4 and Fig. 5 from finished runs, as files in a folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from innerattn.config.files import write_whole
+from innerattn.report.aligned_figure import draw_aligned
+from innerattn.report.drawing import check_format, write_figure
+from innerattn.report.entropy_figure import draw_entropy
+from innerattn.report.handover_figure import HandoverScene, draw_handover
+from innerattn.study.fig4 import PRINTED_NATS, fig4, fig4_csv, fig4_json, fig4_lines
+from innerattn.study.fig5 import evidence, evidence_json, evidence_lines
+from innerattn.study.report_text import Findings, report_markdown
+from innerattn.study.run import (
+    Measured,
+    StudyRun,
+    by_method,
+    digests,
+    read_configs,
+    read_measured,
+)
+from innerattn.study.scene import choose_scene, scene_json
+from innerattn.study.table2 import PRINTED_SITUATION, table2
+from innerattn.study.table2_text import table2_csv, table2_markdown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PARTS = ("table2", "fig4", "fig5")
+"""What can be asked for."""
+
+
+def write_report(
+    runs: Sequence[StudyRun], folder: Path, budget: str, parts: Collection[str] = PARTS
+) -> Findings:
+    """Write ``report.md`` and the files of the parts into ``folder``, which is made if needed.
+
+    The same runs give the same bytes. The files are table2.json, .md and .csv; fig4.json, .csv,
+    .pdf and .png; fig5.json, .pdf and .png, which show one hand-over; and fig5_evidence.json, .pdf
+    and .png. A figure that has nothing to show is not drawn.
+
+    Args:
+        runs: finished runs with evaluations; they are read only.
+        folder: where to write.
+        budget: name of the budget they were trained with; with "quick" the report says that it is a
+            smoke run.
+        parts: which of `PARTS`.
+
+    Returns:
+        What the report says.
+
+    Raises:
+        RunError: runs are missing, unfinished, not what they are listed as, or cannot be compared;
+            or matplotlib is not installed.
+        ValueError: a part is unknown.
+        OSError: the files cannot be written; each is written whole or not at all.
+    """
+    if unknown := sorted(set(parts) - set(PARTS)):
+        raise ValueError(f"parts = {unknown}: known are {', '.join(PARTS)}")
+    check_format(folder / "fig4.png")
+    groups = by_method(runs)
+    ordered = [run for group in groups.values() for run in group]
+    configs = read_configs(ordered)
+    named = [digests(run) for run in ordered]
+    measured: list[list[Measured]] = []
+    if {"table2", "fig5"} & set(parts):
+        measured = [[read_measured(run) for run in group] for group in groups.values()]
+    findings = Findings(
+        budget=budget,
+        runs=tuple(ordered),
+        digests=tuple(named),
+        env_steps=tuple(config.train.env_steps for config in configs),
+        table=table2(measured) if "table2" in parts else None,
+        courses=tuple(fig4(ordered)) if "fig4" in parts else None,
+        scene=_scene(measured) if "fig5" in parts else None,
+        evidence=tuple(filter(None, map(evidence, measured))) if "fig5" in parts else None,
+    )
+    folder.mkdir(parents=True, exist_ok=True)
+    _write_parts(findings, folder)
+    write_whole(folder / "report.md", report_markdown(findings).encode())
+    return findings
+
+
+def _scene(groups: Sequence[Sequence[Measured]]) -> HandoverScene | None:
+    """A hand-over of TD with inner attention in the mixed situation, or of what comes nearest."""
+
+    def distance(group: Sequence[Measured]) -> tuple[bool, bool]:
+        run = group[0].run
+        return run.situation != PRINTED_SITUATION, run.method != "td-inner"
+
+    scenes = (choose_scene(group) for group in sorted(groups, key=distance))
+    return next((scene for scene in scenes if scene is not None), None)
+
+
+def _write_parts(findings: Findings, folder: Path) -> None:
+    if findings.table is not None:
+        _write_json(folder / "table2.json", findings.table.to_json())
+        write_whole(folder / "table2.md", table2_markdown(findings.table).encode())
+        write_whole(folder / "table2.csv", table2_csv(findings.table).encode())
+    if findings.courses is not None:
+        _write_json(folder / "fig4.json", fig4_json(findings.courses))
+        write_whole(folder / "fig4.csv", fig4_csv(findings.courses).encode())
+        if lines := fig4_lines(findings.courses):
+            _draw(folder, "fig4", draw_entropy(lines, PRINTED_NATS))
+    if findings.scene is not None:
+        _write_json(folder / "fig5.json", scene_json(findings.scene))
+        _draw(folder, "fig5", draw_handover(findings.scene))
+    if findings.evidence is not None:
+        _write_json(folder / "fig5_evidence.json", evidence_json(findings.evidence))
+        if findings.evidence:
+            _draw(folder, "fig5_evidence", draw_aligned(evidence_lines(findings.evidence)))
+
+
+def _write_json(path: Path, document: dict[str, Any]) -> None:
+    write_whole(path, f"{json.dumps(document, allow_nan=False)}\n".encode())
+
+
+def _draw(folder: Path, name: str, figure: Figure) -> None:
+    for suffix in (".pdf", ".png"):
+        write_figure(folder / f"{name}{suffix}", figure)

@@ -1,0 +1,202 @@
+"""The report as Markdown: claims first, then the tables and figures, then the runs they are of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from innerattn.report.handover_figure import HandoverScene
+from innerattn.study.claims import RULES, Claim, entropy_claims, handover_claims, sharing_claims
+from innerattn.study.fig4 import EntropyCourse
+from innerattn.study.fig5 import Evidence
+from innerattn.study.run import Digests, StudyRun
+from innerattn.study.scene import SCENE_RULE
+from innerattn.study.table2 import PRINTED_SITUATION, Table2
+from innerattn.study.table2_text import NONE, markdown_table, shown, table2_markdown
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What runs show; a part that was not asked for is None.
+
+    Attributes:
+        budget: name of the budget of training.
+        runs: all runs, by situation and method, then seed.
+        digests: of each run.
+        env_steps: how long each run was trained.
+        table: Table II.
+        courses: Fig. 4.
+        scene: the hand-over that is shown as Fig. 5; None, too, where there is none to show.
+        evidence: Fig. 5 over all hand-overs.
+    """
+
+    budget: str
+    runs: tuple[StudyRun, ...]
+    digests: tuple[Digests, ...]
+    env_steps: tuple[int, ...]
+    table: Table2 | None
+    courses: tuple[EntropyCourse, ...] | None
+    scene: HandoverScene | None
+    evidence: tuple[Evidence, ...] | None
+
+    def claims(self) -> list[Claim]:
+        """All claims that can be asked of the parts there are."""
+        return [
+            *(sharing_claims(self.table) if self.table else []),
+            *entropy_claims(self.courses or ()),
+            *handover_claims(self.evidence or ()),
+        ]
+
+
+def report_markdown(findings: Findings) -> str:
+    """The whole report."""
+    parts = ["# The paper's claims, measured here\n", _opening(findings), _claims(findings)]
+    if findings.table is not None:
+        parts += ["## Table II\n", table2_markdown(findings.table)]
+    if findings.courses is not None:
+        parts += ["## Fig. 4: entropy of attention during training\n", _fig4(findings.courses)]
+    if findings.evidence is not None:
+        parts += ["## Fig. 5: attention when work is handed over\n", _fig5(findings)]
+    return "\n".join([*parts, "## Runs\n", _runs(findings)])
+
+
+def _opening(findings: Findings) -> str:
+    text = ""
+    if findings.budget == "quick":
+        text = (
+            "> **This is a smoke run.** The budget `quick` shows that everything works; robots "
+            "have learnt far too little for any of these figures to mean something.\n\n"
+        )
+    seeds = sorted({run.seed for run in findings.runs})
+    return text + (
+        f"{len(findings.runs)} runs, budget `{findings.budget}`, training seeds "
+        f"{', '.join(map(str, seeds))}. A situation, method and seed name one run; all are listed "
+        "at the end with their folders and digests. The paper does not say which situation its "
+        f"Table II, Fig. 4 and Fig. 5 are about; {PRINTED_SITUATION} is assumed, since its text "
+        "speaks of a variety of tasks.\n"
+    )
+
+
+def _claims(findings: Findings) -> str:
+    claims = findings.claims()
+    assumed = [claim for claim in claims if claim.situation == PRINTED_SITUATION]
+    others = [claim for claim in claims if claim.situation != PRINTED_SITUATION]
+    parts = [_claim_table(assumed) if assumed else f"There is no {PRINTED_SITUATION} run.\n"]
+    parts += ["Runs of a task are counted as even / uneven / undecided by themselves.\n"]
+    parts += ["### How it is decided\n", RULES]
+    if others:
+        parts += ["### The same in the other situations\n", _claim_table(others)]
+    return "\n".join(parts)
+
+
+def _claim_table(claims: Sequence[Claim]) -> str:
+    order = list(dict.fromkeys(claim.claim for claim in claims))
+    head = ["claim", "situation", "method", "printed", "measured here", "runs", "holds?"]
+    rows = [
+        [c.claim, c.situation, c.method, c.printed, c.measured, str(c.runs), f"**{c.holds}**"]
+        for c in sorted(claims, key=lambda claim: order.index(claim.claim))
+    ]
+    return markdown_table(head, rows)
+
+
+def _fig4(courses: Sequence[EntropyCourse]) -> str:
+    head = ["situation", "method", "seeds", "logged [env-steps]", "first tenth [nats]"]
+    head += ["last tenth [nats]", "change [nats]", "share of ln(N − 1)", "teammates in effect"]
+    rows = []
+    for course in courses:
+        end, even = course.end.mean, course.even_nats
+        steps = course.env_steps
+        rows.append(
+            [
+                *(course.situation, course.method, _seeds(course.seeds)),
+                f"{steps[0]:,} to {steps[-1]:,}",
+                *(shown(course.begin), shown(course.end), shown(course.change)),
+                *(f"{end / even:.2f}" if even else NONE, f"{np.exp(end):.2f}"),
+            ]
+        )
+    drawn = any(course.chooses for course in courses)
+    picture = "![Entropy of attention during training](fig4.png)\n\n" if drawn else ""
+    return picture + (
+        "Means over robots and heads; teammates in effect are exp(entropy). Bands are Student's "
+        "95 % from three runs on, least to largest of two runs, none of one run. Uniform attention "
+        "stays at ln(N − 1). The paper gives 1.02 nats.\n\n" + markdown_table(head, rows)
+    )
+
+
+def _fig5(findings: Findings) -> str:
+    if findings.scene is None:
+        text = "There is no hand-over to show.\n"
+    else:
+        text = (
+            f"![One hand-over](fig5.png)\n\nOne hand-over ({findings.scene.title}) as an "
+            f"illustration. It was chosen by rule: {SCENE_RULE}.\n"
+        )
+    if not findings.evidence:
+        return text + "\nNo run has hand-overs and attention that chooses.\n"
+    head = ["situation", "method", "seed", "hand-overs (episodes)", "change on the partner to be"]
+    head += ["p", "of the robot that takes no part", "p", "difference"]
+    head += ["change on the partner before", "of the robot that takes no part"]
+    rows = [row for part in findings.evidence for row in _evidence_rows(part)]
+    return text + (
+        "\n![All hand-overs](fig5_evidence.png)\n\nAll hand-overs of both food robots in both "
+        "orders of the tasks. Weights are means over heads; a change is the mean after the first "
+        "rescue minus that up to it; p is of a permutation test that deals teammates' names "
+        "anew within each episode. The control is the other food robot at the same moments: what "
+        "it shows too follows from which victims are there, not from who hands over.\n\n"
+        + markdown_table(head, rows)
+    )
+
+
+def _evidence_rows(part: Evidence) -> list[list[str]]:
+    to_be, control = part.robot["to_be"], part.control["to_be"]
+    before, before_control = part.robot["before"], part.control["before"]
+    rows = []
+    for n, seed in enumerate(part.seeds):
+        p, control_p = (_p(role.p_by_run[n]) for role in (to_be, control))
+        rows.append(
+            [
+                *(part.situation, part.method, str(seed)),
+                f"{part.handovers[n]} ({part.episodes[n]})",
+                *(_signed(to_be.change_by_run[n]), p, _signed(control.change_by_run[n]), control_p),
+                _signed(part.own_part_by_run[n]),
+                *(_signed(role.change_by_run[n]) for role in (before, before_control)),
+            ]
+        )
+    if len(part.seeds) > 1:
+        rows.append(
+            [
+                *(part.situation, part.method, "mean [95 %]", f"{sum(part.handovers):,}"),
+                *(shown(to_be.change), NONE, shown(control.change), NONE, shown(part.own_part)),
+                *(shown(before.change), shown(before_control.change)),
+            ]
+        )
+    return rows
+
+
+def _runs(findings: Findings) -> str:
+    head = ["situation", "method", "seed", "folder", "trained [env-steps]"]
+    head += ["SHA-256 of config.toml", "SHA-256 of the weights"]
+    rows = [
+        [
+            *(run.situation, run.method, str(run.seed), f"`{run.folder}`", f"{steps:,}"),
+            *(f"`{digest.config}`", f"`{digest.weights}`"),
+        ]
+        for run, digest, steps in zip(
+            findings.runs, findings.digests, findings.env_steps, strict=True
+        )
+    ]
+    return markdown_table(head, rows)
+
+
+def _seeds(seeds: Sequence[int]) -> str:
+    return ", ".join(map(str, seeds))
+
+
+def _signed(value: float | None) -> str:
+    return NONE if value is None else f"{round(value, 2) + 0.0:+.2f}"
+
+
+def _p(value: float | None) -> str:
+    return NONE if value is None else f"{value:.4f}"
