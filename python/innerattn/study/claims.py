@@ -11,16 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from innerattn.evaluate.comparison import compare
-from innerattn.evaluate.sharing.evenness import MARGIN, Verdict
-from innerattn.evaluate.sharing.printed import TEXT
+from innerattn.evaluate.sharing.evenness import MARGIN
 from innerattn.study.fig4 import PRINTED_NATS, EntropyCourse
 from innerattn.study.fig5 import Evidence
 from innerattn.study.over_runs import OverRuns
-from innerattn.study.table2 import PRINTED_SITUATION, Row, Table2
-from innerattn.study.table2_text import NONE, share_shown, shown, verdicts_shown
+from innerattn.study.table2 import PRINTED_SITUATION
+from innerattn.study.table2_text import NONE, shown
 
 Holds = Literal["yes", "no", "undecided"]
 
@@ -78,46 +74,6 @@ class Claim:
     holds: Holds
 
 
-def sharing_claims(table: Table2) -> list[Claim]:
-    """Whether work is shared evenly with inner attention, and unevenly without."""
-    rows: dict[tuple[str, str], list[Row]] = {}
-    for row in table.rows:
-        rows.setdefault((row.situation, row.method), []).append(row)
-    claims = []
-    for (situation, method), own in rows.items():
-        if not method.endswith(("-inner", "-uniform")):
-            continue
-        verdicts = [judged(row) for row in own]
-        inner = method.endswith("-inner")
-        wanted, other = ("even", "uneven") if inner else ("uneven", "even")
-        claims.append(
-            Claim(
-                claim="even sharing with inner attention" if inner else "uneven sharing without",
-                situation=situation,
-                method=method,
-                printed="; ".join(_printed_share(row) for row in own),
-                measured="; ".join(_measured_share(row) for row in own),
-                runs=len(own[0].seeds),
-                holds=_all_or_one(verdicts, wanted, other),
-            )
-        )
-        without = rows.get((situation, method.replace("-inner", "-uniform")))
-        if inner and without:
-            claims.append(_contrast(own, without))
-    return claims
-
-
-def judged(row: Row) -> Verdict:
-    """How a task is shared, over all episodes of all runs, by `RULES`."""
-    verdicts, together = row.scored.verdicts(), row.scored.together
-    if together is None:
-        return "undecided"
-    if together.verdict == "even" and not verdicts["uneven"]:
-        return "even"
-    many = 2 * verdicts["uneven"] > len(row.seeds)
-    return "uneven" if many or together.verdict == "uneven" else "undecided"
-
-
 def entropy_claims(courses: Sequence[EntropyCourse]) -> list[Claim]:
     """Whether attention becomes and stays selective in training."""
     claims = []
@@ -161,10 +117,8 @@ def handover_claims(found: Sequence[Evidence]) -> list[Claim]:
         claims += [
             Claim(
                 claim="attention moves to the next partner",
-                printed=_printed(
-                    part.situation, "rises on the next, falls on the last (one episode)"
-                ),
-                measured=f"on the next {shown(change)}, on the last "
+                printed=_printed(part.situation, "rises on the next, falls on the one before"),
+                measured=f"on the next {shown(change)}, on the one before "
                 f"{shown(part.robot['before'].change)} ({sum(part.handovers):,} hand-overs)",
                 holds=moves,
                 **about,  # type: ignore[arg-type]
@@ -202,71 +156,9 @@ def _printed(situation: str, text: str) -> str:
     return text if situation == PRINTED_SITUATION else NONE
 
 
-def _all_or_one(verdicts: Sequence[Verdict], wanted: str, other: str) -> Holds:
-    if all(verdict == wanted for verdict in verdicts):
-        return "yes"
-    return "no" if other in verdicts else "undecided"
-
-
 def _decided(value: OverRuns, yes_below: float, no_above: float | None = None) -> Holds:
     if value.low is None or value.high is None:
         return "undecided"
     if value.high < yes_below:
         return "yes"
     return "no" if no_above is not None and value.low > no_above else "undecided"
-
-
-def _printed_share(row: Row) -> str:
-    if row.printed is None:
-        return f"{row.task}: {NONE}"
-    first, second = row.printed.row.shares
-    stated = TEXT.get((row.method, row.task))
-    text = f" (text: {stated[0]:.2f} / {stated[1]:.2f})" if stated else ""
-    return f"{row.task}: {first:.2f} / {second:.2f}{text}"
-
-
-def _measured_share(row: Row) -> str:
-    return f"{row.task}: {share_shown(row.scored)}, runs {verdicts_shown(row.scored)}"
-
-
-def _unevenness(rows: Sequence[Row]) -> list[float]:
-    """|share - 0.5| averaged over tasks, one value per run that has rescues of every task."""
-    by_run = zip(*(row.scored.each for row in rows), strict=True)
-    shares = [[task.share.mean for task in run if task.share] for run in by_run]
-    full = [run for run in shares if len(run) == len(rows)]
-    return [float(np.mean(np.abs(np.array(run) - 0.5))) for run in full]
-
-
-def _contrast(inner: Sequence[Row], uniform: Sequence[Row]) -> Claim:
-    with_, without = _unevenness(inner), _unevenness(uniform)
-    enough = len(with_) > 1 and len(without) > 1
-    found = compare(without, with_, 0.5 - MARGIN[0], 0) if enough else None
-    holds: Holds = "undecided"
-    measured = f"distance from 0.5: {_mean(with_)} with, {_mean(without)} without"
-    if found is not None:
-        measured += f"; difference {shown(found.difference)}"
-        if found.difference.low > 0.0:
-            holds = "yes"
-        elif found.difference.high < 0.0 or found.equivalent:
-            holds = "no"
-    printed = "; ".join(
-        f"{row.task}: {_distance(row)} with, {_distance(other)} without"
-        for row, other in zip(inner, uniform, strict=True)
-    )
-    return Claim(
-        claim="more even with inner attention than without",
-        situation=inner[0].situation,
-        method=f"{inner[0].method}, {uniform[0].method}",
-        printed=printed,
-        measured=measured,
-        runs=min(len(with_), len(without)),
-        holds=holds,
-    )
-
-
-def _distance(row: Row) -> str:
-    return f"{abs(row.printed.row.shares[0] - 0.5):.2f}" if row.printed else NONE
-
-
-def _mean(values: Sequence[float]) -> str:
-    return f"{np.mean(values):.2f}" if values else NONE

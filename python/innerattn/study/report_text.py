@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from innerattn.report.handover_figure import HandoverScene
-from innerattn.study.claims import RULES, Claim, entropy_claims, handover_claims, sharing_claims
+from innerattn.study.claims import RULES, Claim, entropy_claims, handover_claims
 from innerattn.study.fig4 import EntropyCourse
 from innerattn.study.fig5 import Evidence
 from innerattn.study.run import Digests, StudyRun
 from innerattn.study.scene import SCENE_RULE
+from innerattn.study.sharing_claims import sharing_claims
 from innerattn.study.table2 import PRINTED_SITUATION, Table2
 from innerattn.study.table2_text import NONE, markdown_table, shown, table2_markdown
 

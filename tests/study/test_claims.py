@@ -1,0 +1,121 @@
+"""The rules that decide claims, on figures made for them."""
+
+import numpy as np
+import pytest
+
+from innerattn.evaluate.sharing.evenness import evenness, evenness_of_runs
+from innerattn.study.claims import Holds, entropy_claims, handover_is_own, handover_moves
+from innerattn.study.competence import COMPETENCE, Competence
+from innerattn.study.fig4 import EntropyCourse
+from innerattn.study.over_runs import OverRuns, over_runs
+from innerattn.study.sharing_claims import judged, sharing_claims
+from innerattn.study.table2 import Row, Sharing, Table2
+
+EVEN, UNEVEN = (0.5, 0.51, 0.49), (0.8, 0.82, 0.79)
+
+
+def made_row(method: str, task: str, shares: tuple[float, ...]) -> Row:
+    rng = np.random.default_rng(0)
+    runs = []
+    for share in shares:
+        first = rng.permutation(np.arange(1000) < round(1000 * share))
+        runs.append(np.stack([first, ~first], 1).astype(np.int64))
+    together = evenness_of_runs(runs, 0) if len(runs) > 1 else None
+    sharing = Sharing(1000, tuple(evenness(run) for run in runs), together)
+    seeds = tuple(range(len(shares)))
+    return Row("mixed", method, task, ("food_0", "food_1"), seeds, sharing, sharing, None)
+
+
+def claims_of(**shares: list[tuple[float, ...]]) -> dict[tuple[str, str], Holds]:
+    rows = [
+        made_row(method.replace("_", "-"), f"task_{index + 1}", of_task)
+        for method, tasks in shares.items()
+        for index, of_task in enumerate(tasks)
+    ]
+    nothing: dict[str, OverRuns | None] = dict.fromkeys(COMPETENCE)
+    beside = Competence("mixed", "td-inner", (), (), (), nothing)
+    found = sharing_claims(Table2(tuple(rows), (beside,)))
+    return {(claim.claim.split()[0], claim.method): claim.holds for claim in found}
+
+
+def test_a_task_is_judged_by_its_runs_and_not_by_their_mean_alone() -> None:
+    assert judged(made_row("td-inner", "task_1", EVEN)) == "even"
+    assert judged(made_row("td-inner", "task_1", UNEVEN)) == "uneven"
+    assert judged(made_row("td-inner", "task_1", (0.9, 0.1, 0.88, 0.12))) == "uneven"
+    assert judged(made_row("td-inner", "task_1", (0.5, 0.51, 0.7, 0.5))) == "undecided"
+    assert judged(made_row("td-inner", "task_1", (0.5,))) == "undecided"
+
+
+def test_claims_about_sharing() -> None:
+    found = claims_of(
+        td_inner=[EVEN, EVEN], td_uniform=[UNEVEN, UNEVEN], ppo_inner=[EVEN, UNEVEN], mappo=[EVEN]
+    )
+    assert found == {
+        ("even", "td-inner"): "yes",
+        ("more", "td-inner, td-uniform"): "yes",
+        ("uneven", "td-uniform"): "yes",
+        ("even", "ppo-inner"): "no",
+    }
+    found = claims_of(td_inner=[EVEN, EVEN], td_uniform=[EVEN, UNEVEN])
+    assert found["uneven", "td-uniform"] == "no"
+    found = claims_of(td_inner=[EVEN, EVEN], td_uniform=[(0.52, 0.5, 0.48), (0.5, 0.49, 0.51)])
+    assert found["more", "td-inner, td-uniform"] == "no"
+    found = claims_of(td_inner=[(0.5,), (0.5,)], td_uniform=[(0.8,), (0.8,)])
+    assert set(found.values()) == {"undecided"}
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "below", "falls"),
+    [
+        ((1.0, 1.01, 0.99), (0.5, 0.51, 0.49), "yes", "yes"),
+        ((0.5, 0.51, 0.49), (0.8, 0.81, 0.79), "yes", "no"),
+        ((0.8, 1.0, 0.9), (0.7, 1.05, 0.95), "undecided", "undecided"),
+        ((1.0,), (0.5,), "undecided", "undecided"),
+    ],
+)
+def test_claims_about_entropy(
+    begin: tuple[float, ...], end: tuple[float, ...], below: Holds, falls: Holds
+) -> None:
+    means = [over_runs(values) for values in (begin, end, np.subtract(end, begin).tolist())]
+    first, last, change = (mean for mean in means if mean is not None)
+    course = EntropyCourse(
+        situation="mixed",
+        method="td-inner",
+        seeds=tuple(range(len(end))),
+        robots=("a", "b", "c", "d"),
+        env_steps=np.array([1]),
+        nats=np.reshape(end, (-1, 1, 1, 1)),
+        begin=first,
+        end=last,
+        change=change,
+    )
+    assert [claim.holds for claim in entropy_claims([course])] == [below, falls]
+
+
+@pytest.mark.parametrize(
+    ("change", "moves"),
+    [
+        (OverRuns(0.2, 0.1, 0.3, 3), "yes"),
+        (OverRuns(0.03, 0.01, 0.045, 3), "no"),
+        (OverRuns(-0.03, -0.1, 0.04, 3), "no"),
+        (OverRuns(0.1, -0.1, 0.3, 3), "undecided"),
+        (OverRuns(0.2, None, None, 1), "undecided"),
+        (None, "undecided"),
+    ],
+)
+def test_whether_attention_moves(change: OverRuns | None, moves: Holds) -> None:
+    assert handover_moves(change) == moves
+
+
+@pytest.mark.parametrize(
+    ("own", "holds"),
+    [
+        (OverRuns(0.15, 0.1, 0.2, 3), "yes"),
+        (OverRuns(0.0, -0.05, 0.05, 3), "no"),
+        (OverRuns(0.05, 0.02, 0.08, 3), "no"),
+        (OverRuns(0.09, 0.01, 0.17, 3), "undecided"),
+        (OverRuns(0.15, None, None, 1), "undecided"),
+    ],
+)
+def test_whether_the_move_is_that_of_who_hands_over(own: OverRuns, holds: Holds) -> None:
+    assert handover_is_own(OverRuns(0.2, 0.1, 0.3, 3), own) == holds

@@ -1,0 +1,77 @@
+"""The whole report on made runs: its files, the same bytes twice, and what it says."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+
+from innerattn.errors import RunError
+from innerattn.study.report import write_report
+from innerattn.study.run import StudyRun
+
+FIGURES = ("fig4", "fig5", "fig5_evidence")
+FILES = {
+    *(f"{name}.{kind}" for name in FIGURES for kind in ("json", "pdf", "png")),
+    *("table2.json", "table2.md", "table2.csv", "fig4.csv", "report.md"),
+}
+
+
+@pytest.fixture(scope="module")
+def folder(runs: list[StudyRun], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("study") / "report"
+    write_report(runs, path, "quick")
+    return path
+
+
+def test_all_files_are_written_and_the_same_twice(
+    runs: list[StudyRun], folder: Path, tmp_path: Path
+) -> None:
+    assert {path.name for path in folder.iterdir()} == FILES
+    write_report(runs, tmp_path, "quick")
+    for name in FILES:
+        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes(), name
+    for path in folder.glob("*.json"):
+        assert json.loads(path.read_text())["schema_version"] == 1
+
+
+def test_the_report_opens_with_claims_and_ends_with_the_runs(
+    runs: list[StudyRun], folder: Path
+) -> None:
+    text = (folder / "report.md").read_text()
+    assert "**This is a smoke run.**" in text
+    assert text.index("| claim |") < text.index("## Table II") < text.index("## Fig. 4")
+    mixed, others = text.split("### The same in the other situations")
+    assert "| even sharing with inner attention | mixed | td-inner |" in mixed
+    assert "| even sharing with inner attention | single | ppo-inner |" in others
+    for run in runs:
+        assert f"`{run.folder}`" in text
+        for name in ("config.toml", "checkpoints/0/weights.safetensors"):
+            digest = hashlib.sha256((run.folder / name).read_bytes()).hexdigest()
+            assert f"`{digest}`" in text
+    for name in FIGURES:
+        assert f"({name}.png)" in text
+    assert (folder / "table2.md").read_text() in text
+
+
+def test_parts_can_be_asked_for_alone(runs: list[StudyRun], tmp_path: Path) -> None:
+    findings = write_report(runs[3:5], tmp_path, "short", ("table2", "fig4"))
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {
+        "report.md",
+        "fig4.json",
+        "fig4.csv",
+        *(f"table2.{x}" for x in ("json", "md", "csv")),
+    }
+    text = (tmp_path / "report.md").read_text()
+    assert "smoke run" not in text
+    assert "Fig. 5:" not in text
+    assert findings.evidence is None
+    with pytest.raises(ValueError, match=r"parts = \['fig6'\]: known are table2, fig4, fig5"):
+        write_report(runs, tmp_path, "short", ("fig6",))
+
+
+def test_nothing_is_written_where_a_run_is_missing(runs: list[StudyRun], tmp_path: Path) -> None:
+    with pytest.raises(RunError, match="seed 0; must be one run of each seed"):
+        write_report([runs[1], runs[1]], tmp_path / "none", "short")
+    assert not (tmp_path / "none").exists()
