@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.report.drawing import BLACK, BLUE, PAGE_WIDTH_IN, VERMILION
+from innerattn.report.drawing import BLACK, BLUE, COLUMN_WIDTH_IN, PAGE_WIDTH_IN, VERMILION
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +47,8 @@ def draw_aligned(lines: Sequence[AlignedLines]) -> Figure:
 
     methods = list(dict.fromkeys(line.method for line in lines))
     situations = list(dict.fromkeys(line.situation for line in lines))
-    size = (PAGE_WIDTH_IN, 0.7 + 2.3 * len(methods))
+    wide = len(situations) > 1
+    size = (PAGE_WIDTH_IN if wide else COLUMN_WIDTH_IN, 0.9 + 2.3 * len(methods))
     figure = Figure(figsize=size, layout="constrained")
     panels = figure.subplots(len(methods), len(situations), sharey=True, squeeze=False)
     handles: dict[str, Any] = {}
@@ -62,10 +63,8 @@ def draw_aligned(lines: Sequence[AlignedLines]) -> Figure:
             panel.set_title(f"{situation}, {method}\n{own[0].runs}", fontsize=7)
             panel.set_xlabel(f"steps since the first rescue [{own[0].step_s:g} s]", fontsize=7)
         panels[row, 0].set_ylabel("weight, mean over heads", fontsize=8)
-    figure.legend(
-        handles.values(), handles.keys(), fontsize=7, ncols=2, loc="outside lower center",
-        frameon=False,
-    )  # fmt: skip
+    where: dict[str, Any] = {"loc": "outside lower center", "ncols": 2 if wide else 1}
+    figure.legend(handles.values(), handles.keys(), fontsize=7, frameon=False, **where)
     return figure
 
 

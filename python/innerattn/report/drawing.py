@@ -25,8 +25,8 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
 ROBOT_COLOURS = (BLUE, SKY, ORANGE, GREEN, PURPLE, VERMILION, BLACK, YELLOW)
 """By index in the team, round again beyond the last."""
 
-PAGE_WIDTH_IN = 7.0
-"""Width of a figure over both columns of a page [in]."""
+COLUMN_WIDTH_IN, PAGE_WIDTH_IN = 3.4, 7.0
+"""Widths of figures over one column of a page and over both [in]."""
 
 
 def check_format(path: Path) -> str:

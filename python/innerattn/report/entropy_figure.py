@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from innerattn.report.drawing import BLUE, GREEN, PAGE_WIDTH_IN, PURPLE, ROBOT_COLOURS, VERMILION
+from innerattn.report.drawing import (
+    BLUE,
+    COLUMN_WIDTH_IN,
+    GREEN,
+    PAGE_WIDTH_IN,
+    PURPLE,
+    ROBOT_COLOURS,
+    VERMILION,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,7 +69,8 @@ def draw_entropy(lines: Sequence[EntropyLines], printed_nats: float) -> Figure:
 
     situations = list(dict.fromkeys(line.situation for line in lines))
     methods = list(dict.fromkeys(line.method for line in lines))
-    figure = Figure(figsize=(PAGE_WIDTH_IN, 5.1), layout="constrained")
+    width = PAGE_WIDTH_IN if len(situations) > 1 else COLUMN_WIDTH_IN
+    figure = Figure(figsize=(width, 5.1), layout="constrained")
     panels = figure.subplots(2, len(situations), sharey=True, squeeze=False)
     for column, situation in enumerate(situations):
         own = [line for line in lines if line.situation == situation]
@@ -82,7 +91,12 @@ def draw_entropy(lines: Sequence[EntropyLines], printed_nats: float) -> Figure:
         upper.legend(fontsize=6, loc="lower right", frameon=False)
     handles, names = panels[1, 0].get_legend_handles_labels()
     figure.legend(
-        handles, names, fontsize=7, ncols=len(names), loc="outside lower center", frameon=False
+        handles,
+        names,
+        fontsize=7,
+        ncols=round(width / 1.7),
+        loc="outside lower center",
+        frameon=False,
     )
     least = min(float(np.nanmin([line.mean.min(), line.by_head.min()])) for line in lines)
     panels[0, 0].set_ylim(max(0.0, least - 0.1), 1.06 * max(line.even_nats for line in lines))

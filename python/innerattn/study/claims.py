@@ -80,27 +80,21 @@ def entropy_claims(courses: Sequence[EntropyCourse]) -> list[Claim]:
     for course in courses:
         if not course.chooses:
             continue
-        end, change = course.end, course.change
-        own = {"situation": course.situation, "method": course.method, "runs": len(course.seeds)}
-        below = _decided(end, yes_below=course.even_nats)
+        begin, end, change, even = course.begin, course.end, course.change, course.even_nats
         claims += [
-            Claim(
-                claim="entropy ends below that of even attention",
-                printed=_printed(
-                    course.situation, f"about {PRINTED_NATS} of {math.log(3):.2f} nats"
-                ),
-                measured=f"{shown(end)} of {course.even_nats:.2f} nats",
-                holds=below,
-                **own,  # type: ignore[arg-type]
+            _claim(
+                course,
+                "entropy ends below that of even attention",
+                f"about {PRINTED_NATS} of {math.log(3):.2f} nats",
+                f"{shown(end)} of {even:.2f} nats",
+                _decided(end, yes_below=even),
             ),
-            Claim(
-                claim="entropy falls throughout training",
-                printed=_printed(
-                    course.situation, f"falls continually to about {PRINTED_NATS} nats"
-                ),
-                measured=f"from {course.begin.mean:.2f} to {end.mean:.2f} nats: {shown(change)}",
-                holds=_decided(change, yes_below=0.0, no_above=0.0),
-                **own,  # type: ignore[arg-type]
+            _claim(
+                course,
+                "entropy falls throughout training",
+                f"falls continually to about {PRINTED_NATS} nats",
+                f"from {begin.mean:.2f} to {end.mean:.2f} nats: {shown(change)}",
+                _decided(change, yes_below=0.0, no_above=0.0),
             ),
         ]
     return claims
@@ -111,24 +105,23 @@ def handover_claims(found: Sequence[Evidence]) -> list[Claim]:
     claims = []
     for part in found:
         change, own = part.robot["to_be"].change, part.own_part
-        control = part.control["to_be"].change
+        before, control = part.robot["before"].change, part.control["to_be"].change
         moves = handover_moves(change)
-        about = {"situation": part.situation, "method": part.method, "runs": len(part.seeds)}
         claims += [
-            Claim(
-                claim="attention moves to the next partner",
-                printed=_printed(part.situation, "rises on the next, falls on the one before"),
-                measured=f"on the next {shown(change)}, on the one before "
-                f"{shown(part.robot['before'].change)} ({sum(part.handovers):,} hand-overs)",
-                holds=moves,
-                **about,  # type: ignore[arg-type]
+            _claim(
+                part,
+                "attention moves to the next partner",
+                "rises on the next, falls on the one before",
+                f"on the next {shown(change)}, on the one before {shown(before)} "
+                f"({sum(part.handovers):,} hand-overs)",
+                moves,
             ),
-            Claim(
-                claim="…and does so for the robot that hands over",
-                printed=_printed(part.situation, "taken for granted"),
-                measured=f"{shown(own)} more than the robot that takes no part ({shown(control)})",
-                holds=handover_is_own(change, own) if moves == "yes" else "undecided",
-                **about,  # type: ignore[arg-type]
+            _claim(
+                part,
+                "…and does so for the robot that hands over",
+                "taken for granted",
+                f"{shown(own)} more than the robot that takes no part ({shown(control)})",
+                handover_is_own(change, own) if moves == "yes" else "undecided",
             ),
         ]
     return claims
@@ -152,8 +145,19 @@ def handover_is_own(change: OverRuns | None, own: OverRuns | None) -> Holds:
     return "no" if own.high < change.mean / 2.0 else "undecided"
 
 
-def _printed(situation: str, text: str) -> str:
-    return text if situation == PRINTED_SITUATION else NONE
+def _claim(
+    found: EntropyCourse | Evidence, claim: str, printed: str, measured: str, holds: Holds
+) -> Claim:
+    """A claim about a situation and method; the paper's words stand beside one situation only."""
+    return Claim(
+        claim=claim,
+        situation=found.situation,
+        method=found.method,
+        printed=printed if found.situation == PRINTED_SITUATION else NONE,
+        measured=measured,
+        runs=len(found.seeds),
+        holds=holds,
+    )
 
 
 def _decided(value: OverRuns, yes_below: float, no_above: float | None = None) -> Holds:
