@@ -80,6 +80,13 @@ def test_finished_runs_are_used_and_the_missing_ones_trained(
         assert len(run["config_sha256"]) == len(run["weights_sha256"]) == 64
         assert (run["commit"], run["versions"]) == (info["commit"], info["versions"])
 
+    made = ["report.md", "table2.csv", "table2.json", "table2.md"]
+    assert document["outputs"] == made
+    texts = {name: (study / name).read_text() for name in made}
+    assert "This is a smoke run" in texts["report.md"]
+    assert "Not in any figure" not in texts["report.md"]
+    assert not list(study.glob("fig*"))
+
     trained = times(study / "runs")
     assert before.items() <= trained.items()
     assert command("table2", study, "td-inner,td-uniform", "--seeds", "2") == 0
@@ -88,6 +95,7 @@ def test_finished_runs_are_used_and_the_missing_ones_trained(
     assert again.splitlines()[3:] == out.splitlines()[3:]
     assert times(study / "runs") == trained
     assert account(study) == document
+    assert {name: (study / name).read_text() for name in made} == texts
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -111,6 +119,10 @@ def test_another_configuration_is_named_and_neither_used_nor_changed(
     assert times(foreign) == before
     assert states(study) == ["other_configuration", "finished", "finished", "finished"]
     assert account(study)["runs"][0]["why"] == "td.polyak = 0.03, planned 0.02"
+    assert (
+        f"**Not in any figure below:**\n\n- mixed td-inner seed 0: {why}"
+        in (study / "report.md").read_text()
+    )
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -1,4 +1,4 @@
-"""`innerattn reproduce`: train the runs that a table or figure needs, and say what is there."""
+"""`innerattn reproduce`: train the runs that a table or figure needs, and make it of them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MOST_SEEDS = 1_000
 
 @dataclass(kw_only=True)
 class Reproduce(Command):
-    """Train the runs that a table or figure of the paper needs, and show what they score.
+    """Train the runs that a table or figure of the paper needs, and make it of them.
 
     Runs that are there already are kept; the same command goes on with what is missing.
     """
@@ -86,14 +86,16 @@ class Reproduce(Command):
                 raise
             found = take_inventory(planned, out)
             note = smoke_note(self.budget)
-            outputs = make_outputs(self.target, finished_runs(found), out, note=note)
+            unusable = [one for one in found if one.state != "finished"]
+            reasons = [f"{one.planned.case}: {_reason(one)}" for one in unusable]
+            runs = finished_runs(found)
+            outputs = make_outputs(self.target, runs, out, self.budget, reasons)
             account = write_account(out, self.target, self.budget, found, outputs)
         print_scores(console, found)
-        unusable = [one for one in found if one.state != "finished"]
-        if unusable:
+        if reasons:
             console.print("Runs that are not in it", style="bold")
-        for one in unusable:
-            console.print(f"  {one.planned.case}: {_reason(one)}", soft_wrap=True)
+        for reason in reasons:
+            console.print(f"  {reason}", soft_wrap=True)
         for path in (*outputs, account):
             console.print(f"Written: {path}", soft_wrap=True)
         if note:

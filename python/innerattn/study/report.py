@@ -35,7 +35,11 @@ PARTS = ("table2", "fig4", "fig5")
 
 
 def write_report(
-    runs: Sequence[StudyRun], folder: Path, budget: str, parts: Collection[str] = PARTS
+    runs: Sequence[StudyRun],
+    folder: Path,
+    budget: str,
+    parts: Collection[str] = PARTS,
+    left_out: Sequence[str] = (),
 ) -> Findings:
     """Write ``report.md`` and the files of the parts into ``folder``, which is made if needed.
 
@@ -49,6 +53,7 @@ def write_report(
         budget: name of the budget they were trained with; with "quick" the report says that it is a
             smoke run.
         parts: which of `PARTS`.
+        left_out: what is said of runs that were planned and are not among ``runs``.
 
     Returns:
         What the report says.
@@ -78,6 +83,7 @@ def write_report(
         courses=tuple(fig4(ordered)) if "fig4" in parts else None,
         scene=_scene(measured) if "fig5" in parts else None,
         evidence=tuple(filter(None, map(evidence, measured))) if "fig5" in parts else None,
+        left_out=tuple(left_out),
     )
     folder.mkdir(parents=True, exist_ok=True)
     _write_parts(findings, folder)

@@ -31,6 +31,7 @@ class Findings:
         courses: Fig. 4.
         scene: the hand-over that is shown as Fig. 5; None, too, where there is none to show.
         evidence: Fig. 5 over all hand-overs.
+        left_out: runs that were planned and are in none of the figures, each with the reason.
     """
 
     budget: str
@@ -41,6 +42,7 @@ class Findings:
     courses: tuple[EntropyCourse, ...] | None
     scene: HandoverScene | None
     evidence: tuple[Evidence, ...] | None
+    left_out: tuple[str, ...] = ()
 
     def claims(self) -> list[Claim]:
         """All claims that can be asked of the parts there are."""
@@ -53,7 +55,10 @@ class Findings:
 
 def report_markdown(findings: Findings) -> str:
     """The whole report."""
-    parts = ["# The paper's claims, measured here\n", _opening(findings), _claims(findings)]
+    parts = ["# The paper's claims, measured here\n", _opening(findings)]
+    if findings.left_out:
+        parts += ["**Not in any figure below:**\n", *(f"- {one}" for one in findings.left_out), ""]
+    parts.append(_claims(findings))
     if findings.table is not None:
         parts += ["## Table II\n", table2_markdown(findings.table)]
     if findings.courses is not None:
