@@ -15,10 +15,11 @@ train: setup ## train TD-innerATT on mixed rescue worlds, then evaluate it
 
 test: setup lint ## every check but the long one
 	cargo test --quiet
-	pytest -n auto
+	pytest -n auto --dist worksteal
 
-test-slow: setup ## the long check: ten million env-steps of contacts
+test-slow: setup ## the long checks: ten million env-steps of contacts, compilers at their slowest
 	INNERATTN_SLOW=1 cargo test --quiet --test containment
+	pytest -m slow
 
 lint: setup ## formatting, lints, types, stub, import floors
 	cargo fmt --check

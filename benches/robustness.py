@@ -44,9 +44,15 @@ def measured(folders: Sequence[Path], name: str, *options: str) -> Document:
     return found
 
 
-def by_kind(document: Document, index: int, kind: str) -> float:
-    """Mean retention of the policy at this index under a kind of fault."""
-    return float(document["policies"][index]["by_kind"][kind]["mean"])
+def by_kind(document: Document, index: int, kind: str) -> Document:
+    """Retention of the policy at this index under a kind of fault: mean, low and high."""
+    found: Document = document["policies"][index]["by_kind"][kind]
+    return found
+
+
+def within_run(found: Document) -> str:
+    """Mean, with half the 95 % interval over the worlds of one run."""
+    return f"{found['mean']:.2f} ± {(found['high'] - found['low']) / 2:.2f}"
 
 
 def over_seeds(values: Sequence[float]) -> str:
@@ -55,6 +61,11 @@ def over_seeds(values: Sequence[float]) -> str:
         return f"{values[0]:.2f}"
     interval = student_interval(values)
     return f"{interval.mean:.2f} ± {interval.high - interval.mean:.2f}"
+
+
+def of_runs(found: Sequence[Document]) -> str:
+    """Over seeds; of a single run, over its worlds."""
+    return within_run(found[0]) if len(found) < 2 else over_seeds([x["mean"] for x in found])
 
 
 def kinds_table(head: Sequence[str], kinds: Sequence[str], cell: Callable[[str, int], str]) -> str:
@@ -72,21 +83,24 @@ def deployment(documents: Sequence[Document]) -> str:
 
     def cell(kind: str, column: int) -> str:
         if column < len(METHODS):
-            return over_seeds([by_kind(one, column, kind) for one in documents])
-        found = documents[0]["policies"][column]["by_kind"][kind]
-        return f"{found['mean']:.2f} ± {(found['high'] - found['low']) / 2:.2f}"
+            return of_runs([by_kind(one, column, kind) for one in documents])
+        return within_run(by_kind(documents[0], column, kind))
 
     def difference(kind: str, column: int) -> str:
         inner, uniform = 2 * column, 2 * column + 1
         return over_seeds(
-            [by_kind(one, inner, kind) - by_kind(one, uniform, kind) for one in documents]
+            [
+                by_kind(one, inner, kind)["mean"] - by_kind(one, uniform, kind)["mean"]
+                for one in documents
+            ]
         )
 
     rescues = [
-        [one["policies"][c]["rescues_per_episode"]["mean"] for one in documents]
-        for c in range(len(names))
+        [one["policies"][c]["rescues_per_episode"] for one in documents] for c in range(len(names))
     ]
-    clean = table(["", *names], [["rescues", *(over_seeds(x) for x in rescues)]])
+    scripts = [within_run(one[0]) for one in rescues[len(METHODS) :]]
+    trained = [of_runs(one) for one in rescues[: len(METHODS)]]
+    clean = table(["", *names], [["rescues", *trained, *scripts]])
     heads = ["inner - uniform", "td", "ppo"]
     return "\n\n".join(
         [kinds_table(["kept", *names], kinds, cell), clean, kinds_table(heads, kinds, difference)]
@@ -101,8 +115,7 @@ def recovery(documents: Sequence[Document]) -> str:
 
     def cell(kind: str, column: int) -> str:
         method, part = cases[column]
-        found = [one["policies"][method]["after_onset"][kind][part]["mean"] for one in documents]
-        return over_seeds(found)
+        return of_runs([one["policies"][method]["after_onset"][kind][part] for one in documents])
 
     words = {"early": "soon", "late": "later", "late_minus_early": "difference"}
     head = ["kept", *(f"{METHODS[method]}, {words[part]}" for method, part in cases)]
@@ -177,7 +190,7 @@ def attention(documents: Sequence[Document]) -> str:
         parts = [one["kinds"][kinds.index(kind)] for one in of_method]
         if column % 3 < 2:
             key = ("effect", "auc")[column % 3]
-            return over_seeds([part[key]["mean"]["mean"] for part in parts])
+            return of_runs([part[key]["mean"] for part in parts])
         each = [robot["effect"]["mean"]["mean"] for part in parts for robot in part["robots"]]
         return f"{min(each):+.2f} to {max(each):+.2f}"
 
@@ -194,9 +207,9 @@ def training(documents: Sequence[Document]) -> str:
     def cell(kind: str, column: int) -> str:
         each = [[by_kind(one, index, kind) for index in range(3)] for one in documents]
         if column < 3:
-            return over_seeds([row[column] for row in each])
-        pair = (0, 2) if column == 3 else (1, 0)
-        return over_seeds([row[pair[0]] - row[pair[1]] for row in each])
+            return of_runs([row[column] for row in each])
+        one, other = (0, 2) if column == 3 else (1, 0)
+        return over_seeds([row[one]["mean"] - row[other]["mean"] for row in each])
 
     def named(kind: str) -> str:
         return kind if kind == "all" else f"{kind} ({'seen' if kind in SEEN else 'unseen'})"
@@ -206,10 +219,9 @@ def training(documents: Sequence[Document]) -> str:
         for kind in ordered
     ]
     rescues = [
-        [one["policies"][index]["rescues_per_episode"]["mean"] for one in documents]
-        for index in range(3)
+        [one["policies"][index]["rescues_per_episode"] for one in documents] for index in range(3)
     ]
-    rows.append(["rescues without a fault", *(over_seeds(x) for x in rescues), "", ""])
+    rows.append(["rescues without a fault", *(of_runs(x) for x in rescues), "", ""])
     return table(head, rows)
 
 

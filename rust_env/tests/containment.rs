@@ -1,6 +1,6 @@
 //! Robots stay where they can be: no play drives one out of the arena, through an obstacle or through
-//! another robot, and overlaps stay small beside a radius. A million env-steps; ten times as many
-//! with `INNERATTN_SLOW=1`.
+//! another robot, and overlaps stay small beside a radius. Half a million env-steps for each engine;
+//! twenty times as many with `INNERATTN_SLOW=1`.
 
 mod common;
 
@@ -105,7 +105,7 @@ fn nearest_to_origin(from: Vec2, to: Vec2) -> f32 {
 
 fn play(name: &str, engines: &[Engine], scenario: &Scenario, steps: usize) {
     let slow = std::env::var("INNERATTN_SLOW").is_ok_and(|value| value == "1");
-    let steps = if slow { 10 * steps } else { steps };
+    let steps = if slow { 20 * steps } else { steps };
     for (engine, play) in engines.iter().flat_map(|engine| PLAYS.map(|play| (*engine, play))) {
         let scenario = Scenario { engine, ..scenario.clone() };
         let mut table = Table::new(scenario, Options { num_threads: Some(2), ..options(ENVS, 1) });
@@ -142,18 +142,18 @@ fn long_episodes() -> Scenario {
 
 #[test]
 fn the_default_team_stays_apart() {
-    play("default team", &ENGINES, &long_episodes(), 150_000);
+    play("default team", &ENGINES, &long_episodes(), 75_000);
 }
 
 #[test]
 fn obstacles_hold() {
-    play("obstacles", &ENGINES, &Scenario { obstacles: some_obstacles(), ..long_episodes() }, 75_000);
+    play("obstacles", &ENGINES, &Scenario { obstacles: some_obstacles(), ..long_episodes() }, 40_000);
 }
 
 #[test]
 fn a_crowd_of_unlike_robots_stays_apart() {
     let scenario = Scenario { robots: mixed_team(16), spawn_clearance_m: 0.1, ..long_episodes() };
-    play("sixteen", &ENGINES, &scenario, 25_000);
+    play("sixteen", &ENGINES, &scenario, 12_500);
 }
 
 #[test]
@@ -167,5 +167,5 @@ fn discs_hold_however_unlike_small_and_fast_the_robots() {
     // Short periods: in a long one so fast a robot may be turned about by contact after contact, and
     // the straight line from its start to its end says nothing.
     let scenario = Scenario { dt_s: 0.005, damping: 0.1, ..scenario };
-    play("extreme", &[Engine::Discs], &scenario, 25_000);
+    play("extreme", &[Engine::Discs], &scenario, 12_500);
 }

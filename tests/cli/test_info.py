@@ -95,7 +95,7 @@ def test_wrong_usage_is_two(arguments: list[str], capsys: pytest.CaptureFixture[
     assert capsys.readouterr().out == ""
 
 
-@pytest.mark.parametrize("command", ["train", "evaluate", "info"])
+@pytest.mark.parametrize("command", ["train", "evaluate", "robustness", "reproduce", "info"])
 def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     for arguments in (["--help"], [command, "--help"]):
         with pytest.raises(SystemExit) as caught:
@@ -107,7 +107,7 @@ def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
 def test_only_what_exists_is_offered(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["--help"])
-    assert "{train,evaluate,info}" in capsys.readouterr().out
+    assert "{train,evaluate,robustness,reproduce,info}" in capsys.readouterr().out
 
 
 def test_light_imports() -> None:

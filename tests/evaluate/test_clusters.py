@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.stats import norm
 from scipy.stats import t as student
@@ -59,6 +59,8 @@ def test_variance_and_interval_against_statsmodels(share: float) -> None:
     )
 
 
+@example([(0, 1)] * 3, 0.9)
+@example([(1, 0)] * 3, 0.9)
 @given(
     st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=2, max_size=12),
     st.sampled_from([0.8, 0.9, 0.95]),

@@ -112,5 +112,6 @@ def test_the_compiled_update_agrees(algorithm: str) -> None:
     agree(algorithm, 4, "inductor", {"attention": "inner"}, {})
 
 
+@pytest.mark.slow
 def test_the_compiled_update_agrees_by_entities() -> None:
     agree("td", 4, "inductor", ENTITIES, {})

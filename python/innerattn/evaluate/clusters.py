@@ -44,7 +44,8 @@ class Share:
         t = float(stdtrit(self.episodes - 1, 0.5 + level / 2.0))
         centre = (p + t * t / (2.0 * n)) / (1.0 + t * t / n)
         half = t / (1.0 + t * t / n) * math.sqrt(p * (1.0 - p) / n + t * t / (4.0 * n * n))
-        return max(centre - half, 0.0), min(centre + half, 1.0)
+        # It holds p and lies in [0, 1]; rounding alone could say otherwise.
+        return min(max(centre - half, 0.0), p), max(min(centre + half, 1.0), p)
 
     def p_above(self, bound: float) -> float:
         """The p-value against "the share is at most ``bound``", which is in (0, 1).
