@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -13,8 +12,8 @@ from innerattn.config.files import write_whole
 from innerattn.study.inventory import Found
 from innerattn.study.measured import read_measured
 from innerattn.study.plan import smoke_note
+from innerattn.study.run import digests
 from innerattn.train import read_info
-from innerattn.train.checkpoint import newest_weights, plain_file
 
 SCHEMA_VERSION = 1
 
@@ -67,16 +66,12 @@ def _row(out: Path, found: Found) -> dict[str, Any]:
         return row
     info = read_info(planned.folder)
     standard, long = read_measured(planned.folder, planned.config)
+    named = digests(planned.folder)
     return row | {
         **asdict(standard),
         "long": asdict(long),
-        "config_sha256": _sha256(planned.folder / "config.toml"),
-        "weights_sha256": _sha256(newest_weights(planned.folder)),
+        "config_sha256": named.config,
+        "weights_sha256": named.weights,
         "commit": info.commit,
         "versions": info.versions,
     }
-
-
-def _sha256(path: Path) -> str:
-    with plain_file(path).open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -70,7 +70,7 @@ def write_report(
     groups = by_method(runs)
     ordered = [run for group in groups.values() for run in group]
     configs = read_configs(ordered)
-    named = [digests(run) for run in ordered]
+    named = [digests(run.folder) for run in ordered]
     measured: list[list[Measured]] = []
     if {"table2", "fig5"} & set(parts):
         measured = [[read_measured(run) for run in group] for group in groups.values()]

@@ -14,7 +14,7 @@ from innerattn.config import RunConfig, read_toml
 from innerattn.errors import RunError
 from innerattn.evaluate.episodes import Record
 from innerattn.evaluate.records import read_records
-from innerattn.train.checkpoint import newest_weights
+from innerattn.train.checkpoint import newest_weights, plain_file
 
 
 @dataclass(frozen=True)
@@ -132,17 +132,17 @@ def read_measured(run: StudyRun) -> Measured:
     return Measured(run, scored[0], tuple(scored), summary)
 
 
-def digests(run: StudyRun) -> Digests:
-    """What tells a run from any other.
+def digests(folder: Path) -> Digests:
+    """What tells the run in ``folder`` from any other.
 
     Raises:
-        RunError: a file is missing.
+        RunError: a file is missing, or is no plain file.
     """
-    return Digests(_sha256(run.folder / "config.toml"), _sha256(newest_weights(run.folder)))
+    return Digests(_sha256(folder / "config.toml"), _sha256(newest_weights(folder)))
 
 
 def _sha256(path: Path) -> str:
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        return hashlib.sha256(plain_file(path).read_bytes()).hexdigest()
     except OSError as error:
         raise RunError(f"{path}: cannot be read ({error.strerror})") from error
