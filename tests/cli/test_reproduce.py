@@ -15,6 +15,7 @@ import pytest
 from innerattn.cli import reproduce
 from innerattn.cli.main import main
 from innerattn.errors import RunError
+from innerattn.study.crossed.arms import plan_crossed
 from innerattn.study.lock import StudyLock
 from innerattn.study.plan import plan
 from innerattn.study.several import Run
@@ -29,7 +30,9 @@ def command(monkeypatch: pytest.MonkeyPatch, small: dict[str, object]) -> Comman
     """The command with small runs: target, folder, methods, then more options, in `mixed`."""
 
     def run(target: str, out: Path, methods: str, *options: str, **values: object) -> int:
-        monkeypatch.setattr(reproduce, "plan", partial(plan, overrides={**small, **values}))
+        for make in (plan, plan_crossed):
+            overridden = partial(make, overrides={**small, **values})
+            monkeypatch.setattr(reproduce, make.__name__, overridden)
         given = ["--out", str(out), "--methods", methods, "--situations", "mixed"]
         return main(["reproduce", target, *given, *options])
 
@@ -123,6 +126,26 @@ def test_another_configuration_is_named_and_neither_used_nor_changed(
         f"**Not in any figure below:**\n\n- mixed td-inner seed 0: {why}"
         in (study / "report.md").read_text()
     )
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_the_crossed_design_has_runs_and_files_of_its_own(
+    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command("crossed", tmp_path, "td-uniform", "--seeds", "1") == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("crossed, budget quick: 2 runs of 1 seed; 0 finished, 2 to train, ")
+    assert err == ""
+    rows = [" ".join(line.split()[:5]) for line in out.splitlines()]
+    assert "td-uniform helpers 1 of 1" in rows
+    assert "td-uniform team 1 of 1" in rows
+    document = account(tmp_path)
+    files = [f"crossed.{kind}" for kind in ("csv", "json", "md", "pdf", "png")]
+    assert (document["target"], document["outputs"]) == ("crossed", files)
+    assert [run["variant"] for run in document["runs"]] == ["helpers", "team"]
+    assert {path.name for path in (tmp_path / "runs").iterdir()} == {
+        f"mixed-td-uniform-{credit}-quick-s0" for credit in ("helpers", "team")
+    }
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -34,9 +34,10 @@ def test_a_run_is_what_its_name_says() -> None:
 
 
 def test_targets() -> None:
-    assert set(TARGETS) == {"table2", "fig4", "fig5", "all"}
+    assert set(TARGETS) == {"table2", "fig4", "fig5", "all", "crossed"}
     assert TARGETS["fig5"] == ("td-inner", "ppo-inner")
     assert TARGETS["table2"] == TARGETS["fig4"] == TARGETS["all"] == METHODS
+    assert TARGETS["crossed"] == ("td-inner", "td-uniform")
 
 
 @pytest.mark.parametrize(

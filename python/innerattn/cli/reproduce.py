@@ -16,6 +16,8 @@ from innerattn.cli.options import Command, UsageError
 from innerattn.cli.progress import SeveralRuns
 from innerattn.cli.reproduce_tables import print_scores
 from innerattn.config import BUDGETS
+from innerattn.study.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
+from innerattn.study.crossed.arms import plan_crossed
 from innerattn.study.plan import SITUATIONS, TARGETS, PlannedRun, plan, smoke_note
 
 if TYPE_CHECKING:
@@ -38,17 +40,18 @@ class Reproduce(Command):
     """
 
     target: tyro.conf.Positional[Target]
-    """What is to be reproduced."""
+    """What is to be reproduced; all: table2, fig4 and fig5; crossed: attention, rescue credit and
+    logit penalty crossed, to find what makes sharing even."""
     budget: Budget = "quick"
     """Built-in budget: how long to train; quick is a smoke run and gives no result."""
     seeds: int = 5
     """How many seeds: 0, 1, ... up to one less."""
     out: Path | None = None
-    """Folder of the study, with the runs in runs; None: studies/BUDGET."""
+    """Folder of the study, its runs in runs; None: studies/BUDGET or studies/crossed-BUDGET."""
     methods: str = "all"
     """Methods, separated by commas; all: what the target needs."""
     situations: str = "all"
-    """Situations, separated by commas."""
+    """Situations, separated by commas; all: what the target needs."""
 
     def run(self) -> int:
         """Plan, train, print, write.
@@ -61,12 +64,9 @@ class Reproduce(Command):
             OSError: a file cannot be written.
             KeyboardInterrupt: the user stopped it; finished runs are kept.
         """
-        methods = _chosen("methods", self.methods, TARGETS[self.target])
-        situations = _chosen("situations", self.situations, SITUATIONS)
-        if not 1 <= self.seeds <= _MOST_SEEDS:
-            raise UsageError(f"--seeds = {self.seeds}: must be 1 to {_MOST_SEEDS:,}")
-        out = self.out or Path("studies") / self.budget
-        planned = plan(methods, situations, range(self.seeds), self.budget, out)
+        name = f"crossed-{self.budget}" if self.target == "crossed" else self.budget
+        out = self.out or Path("studies") / name
+        planned = self._planned(out)
 
         from innerattn.study.document import write_account
         from innerattn.study.inventory import finished_runs, take_inventory
@@ -101,6 +101,16 @@ class Reproduce(Command):
         if note:
             console.print(note[:1].upper() + note[1:], style="bold")
         return int(bool(unusable))
+
+    def _planned(self, out: Path) -> list[PlannedRun]:
+        methods = _chosen("methods", self.methods, TARGETS[self.target])
+        crossed = self.target == "crossed"
+        named = ",".join(CROSSED_SITUATIONS) if crossed and self.situations == "all" else None
+        situations = _chosen("situations", named or self.situations, SITUATIONS)
+        if not 1 <= self.seeds <= _MOST_SEEDS:
+            raise UsageError(f"--seeds = {self.seeds}: must be 1 to {_MOST_SEEDS:,}")
+        make = plan_crossed if crossed else plan
+        return make(methods, situations, range(self.seeds), self.budget, out)
 
     def _print_plan(self, console: Console, found: Sequence[Found], out: Path) -> None:
         from innerattn.study.train import places, to_train

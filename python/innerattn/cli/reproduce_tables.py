@@ -38,7 +38,7 @@ def print_scores(console: Console, found: Sequence[Found]) -> None:
         planned = one.planned
         usable = one.state == "finished"
         measured = read_measured(planned.folder, planned.config) if usable else None
-        cells.setdefault((planned.case.situation, planned.case.method), []).append(measured)
+        cells.setdefault((planned.case.situation, planned.case.trained), []).append(measured)
     lengths = next((two for runs in cells.values() for two in runs if two is not None), None)
     if lengths is None:
         return

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from innerattn.study.crossed.report import write_crossed
 from innerattn.study.inventory import FinishedRun
 from innerattn.study.report import PARTS, write_report
 from innerattn.study.run import StudyRun
@@ -31,6 +32,9 @@ def make_outputs(
     """
     if not runs:
         return []
+    if target == "crossed":
+        write_crossed(runs, out, budget, left_out)
+        return sorted(out.glob("crossed.*"))
     parts = PARTS if target == "all" else (target,)
     listed = [StudyRun(*_label(run), run.folder) for run in runs]
     write_report(listed, out, budget, parts, left_out)

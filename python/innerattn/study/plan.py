@@ -17,20 +17,35 @@ TARGETS: Mapping[str, tuple[str, ...]] = {
     "fig4": METHODS,
     "fig5": tuple(method for method in METHODS if method.endswith("-inner")),
     "all": METHODS,
+    "crossed": tuple(method for method in METHODS if method.startswith("td-")),
 }
-"""What can be reproduced, with the methods that it needs, in every situation."""
+"""What can be reproduced, with the methods that it needs. All is what the paper shows, in every
+situation; the crossed design is apart, see `innerattn.study.crossed`."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What tells the runs of one study apart."""
+    """What tells the runs of one study apart.
+
+    Attributes:
+        situation: name of the built-in scenario.
+        method: value of `train.method`.
+        seed: of training.
+        variant: what else was changed, as a word; nothing in the paper's own comparison.
+    """
 
     situation: str
     method: str
     seed: int
+    variant: str = ""
+
+    @property
+    def trained(self) -> str:
+        """How it was trained, apart from the situation and the seed."""
+        return f"{self.method} {self.variant}".rstrip()
 
     def __str__(self) -> str:
-        return f"{self.situation} {self.method} seed {self.seed}"
+        return f"{self.situation} {self.trained} seed {self.seed}"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Does attention cause even sharing? Attention, rescue credit and logit penalty, crossed."""

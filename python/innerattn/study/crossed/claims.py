@@ -1,0 +1,166 @@
+"""What was expected of the crossed design beside what its runs show, decided by fixed rules."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from scipy.stats import binomtest
+
+from innerattn.study.claims import Holds
+from innerattn.study.crossed.arms import CREDITS, PENALTIES, Arm, Credit
+from innerattn.study.crossed.effects import MARGINS, Effect
+from innerattn.study.crossed.outcome import IDLE, Outcome
+from innerattn.study.over_runs import over_runs
+from innerattn.study.table2_text import NONE, shown
+
+LEAST_RUNS = 10
+"""So many runs without an idle robot say that there is none; fewer say nothing."""
+
+EVEN_ENTROPY = 1.0 - MARGINS["entropy_share"]
+"""Attention whose entropy is a larger share of ln(N - 1) than this counts as even."""
+
+RULES = f"""\
+Intervals are 95 %, the run is the unit: Student's of one mean, Welch's and Satterthwaite's of
+differences, Wilson's of numbers of runs. Two means count as alike where two one-sided tests show
+them to be within the margin ({MARGINS["unevenness"]:g} of unevenness, {MARGINS["score"]:g} of the
+score, {MARGINS["entropy_share"]:g} of the entropy's share).
+
+- **Attention makes sharing even; attention rescues more**: yes where the interval of inner minus
+  uniform, over credits and penalties, lies on that side of 0; no where it lies on the other, or
+  where the two are alike.
+- **The team's credit makes sharing uneven**: yes where the interval of team minus helpers, over
+  attentions and penalties, lies above 0; no where it lies below, or where they are alike.
+- **The team's credit leaves a food robot idle with either attention**: yes where both attentions
+  have such runs (a share of the rescues below {IDLE:g}); no where one of them has none in at least
+  {LEAST_RUNS} runs.
+- **With the helpers' credit sharing is even with either attention**: yes where no robot is idle and
+  both intervals of the unevenness lie below {MARGINS["unevenness"]:g}; no where a robot is idle or
+  one interval lies above.
+- **The largest penalty holds attention even**: yes where the interval of the entropy's share lies
+  above {EVEN_ENTROPY:g}; no where it lies below.
+"""
+"""How `Answer.holds` is found, in Markdown."""
+
+Outcomes = Mapping[Arm, Sequence[Outcome]]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One expectation for one situation.
+
+    Attributes:
+        claim: in a few words.
+        situation: of the worlds.
+        measured: what the runs show.
+        holds: by `RULES`.
+    """
+
+    claim: str
+    situation: str
+    measured: str
+    holds: Holds
+
+
+def answers(situation: str, outcomes: Outcomes, effects: Sequence[Effect]) -> list[Answer]:
+    """All expectations in one situation, from its runs and their `effects`."""
+    main = {(one.figure, one.name.split(",")[0]): one for one in effects if one.main}
+    asked = [
+        ("attention makes sharing even", "unevenness", "inner - uniform", -1.0),
+        ("attention rescues more", "score", "inner - uniform", 1.0),
+        ("the team's credit makes sharing uneven", "unevenness", "team - helpers", 1.0),
+    ]
+    found = [
+        Answer(claim, situation, *_of_effect(main[figure, name], sign))
+        for claim, figure, name, sign in asked
+    ]
+    return [
+        *found,
+        _idle_with_team(situation, outcomes),
+        _even_with_helpers(situation, outcomes),
+        _held_even(situation, outcomes),
+    ]
+
+
+def idle_shown(outcomes: Sequence[Outcome]) -> str:
+    """How many runs have an idle robot, with Wilson's interval of their share."""
+    idle, known = idle_runs(outcomes)
+    if not known:
+        return NONE
+    ends = binomtest(idle, known).proportion_ci(method="wilson")
+    return f"{idle} of {known} [{ends.low:.2f}, {ends.high:.2f}]"
+
+
+def idle_runs(outcomes: Sequence[Outcome]) -> tuple[int, int]:
+    """How many runs have an idle robot, and how many have rescues at all."""
+    shares = [run.least_share for run in outcomes if run.least_share is not None]
+    return sum(share < IDLE for share in shares), len(shares)
+
+
+def _of_effect(effect: Effect, sign: float) -> tuple[str, Holds]:
+    """Whether an effect is on the expected side of 0."""
+    found = effect.found
+    if found is None:
+        return NONE, "undecided"
+    measured = f"{effect.name}: {shown(found.difference)}, g {shown(found.hedges_g, 1)}"
+    low, high = sorted((sign * found.difference.low, sign * found.difference.high))
+    if low > 0.0:
+        return measured, "yes"
+    return measured, "no" if high < 0.0 or found.equivalent else "undecided"
+
+
+def _of(outcomes: Outcomes, credit: Credit) -> dict[str, list[Outcome]]:
+    """The runs of one credit by attention, at all penalties."""
+    found: dict[str, list[Outcome]] = {"inner": [], "uniform": []}
+    for arm, runs in outcomes.items():
+        if arm.credit == credit:
+            found[arm.method.removeprefix("td-")] += runs
+    return found
+
+
+def _idle_with_team(situation: str, outcomes: Outcomes) -> Answer:
+    by_attention = _of(outcomes, "team")
+    measured = "; ".join(f"{name}: {idle_shown(runs)}" for name, runs in by_attention.items())
+    counts = [idle_runs(runs) for runs in by_attention.values()]
+    holds: Holds = "undecided"
+    if all(idle for idle, _ in counts):
+        holds = "yes"
+    elif any(not idle and known >= LEAST_RUNS for idle, known in counts):
+        holds = "no"
+    claim = "the team's credit leaves a food robot idle with either attention"
+    return Answer(claim, situation, measured, holds)
+
+
+def _even_with_helpers(situation: str, outcomes: Outcomes) -> Answer:
+    by_attention = _of(outcomes, "helpers")
+    means = {
+        name: over_runs([run.unevenness for run in runs]) for name, runs in by_attention.items()
+    }
+    measured = "; ".join(
+        f"{name}: {shown(means[name])}, idle {idle_shown(runs)}"
+        for name, runs in by_attention.items()
+    )
+    idle = any(idle_runs(runs)[0] for runs in by_attention.values())
+    margin = MARGINS["unevenness"]
+    found = [mean for mean in means.values() if mean is not None]
+    holds: Holds = "undecided"
+    if idle or any(mean.low is not None and mean.low > margin for mean in found):
+        holds = "no"
+    elif len(found) == len(means) and all(
+        mean.high is not None and mean.high < margin for mean in found
+    ):
+        holds = "yes"
+    claim = "with the helpers' credit sharing is even with either attention"
+    return Answer(claim, situation, measured, holds)
+
+
+def _held_even(situation: str, outcomes: Outcomes) -> Answer:
+    runs = [run for credit in CREDITS for run in outcomes.get(Arm(credit, PENALTIES[-1]), ())]
+    mean = over_runs([run.entropy_share for run in runs])
+    holds: Holds = "undecided"
+    if mean is not None and mean.low is not None and mean.low > EVEN_ENTROPY:
+        holds = "yes"
+    elif mean is not None and mean.high is not None and mean.high < EVEN_ENTROPY:
+        holds = "no"
+    claim = f"a penalty of {PENALTIES[-1]:g} holds attention even"
+    return Answer(claim, situation, f"share of ln(N - 1): {shown(mean, 3)}", holds)

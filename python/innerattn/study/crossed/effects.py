@@ -1,0 +1,129 @@
+"""Effects of attention, credit and penalty on the runs' figures; the run is the unit.
+
+An effect is a contrast of arms: a weighted sum of their means. With uniform weights there is no
+penalty, so that one arm stands against those with learnt attention at every penalty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from innerattn.evaluate.comparison import Contrast, contrast
+from innerattn.study.crossed.arms import ARMS, CREDITS, PENALTIES, Arm, Credit
+from innerattn.study.crossed.outcome import Outcome
+
+MARGINS = {"unevenness": 0.1, "score": 0.05, "entropy_share": 0.02}
+"""The figures that effects are asked of, and the largest difference that counts as none."""
+
+Weights = Mapping[Arm, float]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect in one situation.
+
+    Attributes:
+        situation: of the worlds.
+        figure: one of `MARGINS`.
+        name: what is compared with what.
+        main: it is an average over the other factors, or an interaction; else within one level.
+        runs: how many the compared arms have.
+        found: None where an arm has less than two runs with the figure, or none has any scatter.
+    """
+
+    situation: str
+    figure: str
+    name: str
+    main: bool
+    runs: int
+    found: Contrast | None
+
+
+def contrasts() -> list[tuple[str, bool, Weights]]:
+    """All effects that are asked for: name, whether it is a main effect, weights of arms."""
+    least, most = PENALTIES[0], PENALTIES[-1]
+    attention = {credit: _attention(credit) for credit in CREDITS}
+    helpers, team = (attention[credit] for credit in ("helpers", "team"))
+    asked: list[tuple[str, bool, Weights]] = [
+        ("inner - uniform, over credits and penalties", True, _mean([helpers, team])),
+        ("team - helpers, over attentions and penalties", True, _credit(ARMS)),
+        (
+            f"penalty {most:g} - {least:g}, over credits",
+            True,
+            _mean([_penalty(credit, most) for credit in CREDITS]),
+        ),
+        ("(inner - uniform) with team - with helpers", True, _minus(team, helpers)),
+    ]
+    for credit in CREDITS:
+        asked += [
+            (
+                f"inner at penalty {penalty:g} - uniform, {credit}",
+                False,
+                {Arm(credit, penalty): 1.0, Arm(credit, None): -1.0},
+            )
+            for penalty in PENALTIES
+        ]
+        asked += [
+            (f"penalty {penalty:g} - {least:g}, {credit}", False, _penalty(credit, penalty))
+            for penalty in PENALTIES[1:]
+        ]
+    for penalty in (None, *PENALTIES):
+        arms = [Arm(credit, penalty) for credit in CREDITS]
+        words = "uniform" if penalty is None else f"inner at penalty {penalty:g}"
+        asked.append((f"team - helpers, {words}", False, _credit(arms)))
+    return asked
+
+
+def effects(situation: str, outcomes: Mapping[Arm, Sequence[Outcome]]) -> list[Effect]:
+    """All effects on all figures in one situation.
+
+    Args:
+        situation: of the worlds.
+        outcomes: figures of the runs of each arm; arms without runs may be missing.
+    """
+    found = []
+    for figure, margin in MARGINS.items():
+        values = {
+            arm: [value for run in runs if (value := getattr(run, figure)) is not None]
+            for arm, runs in outcomes.items()
+        }
+        for name, main, weights in contrasts():
+            groups = [values.get(arm, []) for arm in weights]
+            enough = all(len(group) > 1 for group in groups)
+            compared = contrast(groups, list(weights.values()), margin) if enough else None
+            runs = sum(len(group) for group in groups)
+            found.append(Effect(situation, figure, name, main, runs, compared))
+    return found
+
+
+def _attention(credit: Credit) -> Weights:
+    """Learnt attention, averaged over penalties, minus uniform weights."""
+    inner = {Arm(credit, penalty): 1.0 / len(PENALTIES) for penalty in PENALTIES}
+    return {**inner, Arm(credit, None): -1.0}
+
+
+def _penalty(credit: Credit, penalty: float) -> Weights:
+    """A penalty minus the least one."""
+    return {Arm(credit, penalty): 1.0, Arm(credit, PENALTIES[0]): -1.0}
+
+
+def _credit(arms: Sequence[Arm]) -> Weights:
+    """Team's credit minus helpers', averaged over attentions, then over penalties."""
+    weights = {}
+    attentions = {arm.method for arm in arms}
+    for arm in arms:
+        alike = sum(a.method == arm.method and a.credit == arm.credit for a in arms)
+        sign = 1.0 if arm.credit == "team" else -1.0
+        weights[arm] = sign / (alike * len(attentions))
+    return weights
+
+
+def _mean(parts: Sequence[Weights]) -> Weights:
+    """The average of contrasts of different arms."""
+    return {arm: weight / len(parts) for part in parts for arm, weight in part.items()}
+
+
+def _minus(one: Weights, other: Weights) -> Weights:
+    """The difference of contrasts of different arms."""
+    return {**one, **{arm: -weight for arm, weight in other.items()}}

@@ -1,0 +1,71 @@
+"""What one run shows of even sharing, of competence and of attention."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from innerattn.errors import RunError
+from innerattn.evaluate.sharing.evenness import counts_by_episode
+from innerattn.study.run import Measured
+
+IDLE = 0.2
+"""A food robot with a smaller share of the rescues than this counts as idle."""
+
+OUTCOMES = {
+    "unevenness": "distance of the first food robot's share from 0.5, a mean over tasks",
+    "least_share": "share of all rescues by the food robot that has fewer",
+    "rescues_per_episode": "rescues in an episode of the standard length",
+    "score": "0 random play, 1 scripted dispatch",
+    "entropy_share": "entropy of attention as a share of ln(N - 1), over robots and heads",
+}
+"""The figures of a run and what they are."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Figures of one run by the names of `OUTCOMES`; None where it has none."""
+
+    unevenness: float | None
+    least_share: float | None
+    rescues_per_episode: float
+    score: float | None
+    entropy_share: float | None
+
+
+def outcome_of(measured: Measured) -> Outcome:
+    """The figures of a run, sharing over all its episodes of the standard length.
+
+    Raises:
+        RunError: a task is not one that two robots share.
+    """
+    counts = _counts(measured)
+    for task, by_robot in counts.items():
+        if len(by_robot) != 2:
+            raise RunError(
+                f"{measured.run.folder}: {task} is shared by {len(by_robot)} robots; must be two"
+            )
+    total = np.sum(list(counts.values()), axis=0)
+    shares = [by_robot[0] / by_robot.sum() for by_robot in counts.values() if by_robot.sum()]
+    every = len(shares) == len(counts)
+    summary = measured.summary
+    return Outcome(
+        unevenness=float(np.mean(np.abs(np.array(shares) - 0.5))) if every else None,
+        least_share=float(total.min() / total.sum()) if total.sum() else None,
+        rescues_per_episode=float(summary["rescues_per_episode"]["mean"]),
+        score=None if summary["score"] is None else float(summary["score"]["mean"]),
+        entropy_share=_mean(summary["attention_entropy_share"]),
+    )
+
+
+def _counts(measured: Measured) -> dict[str, np.ndarray[tuple[int], np.dtype[np.int64]]]:
+    """Rescues of each task by food robot, of all episodes."""
+    parts = [counts_by_episode(record) for record in measured.scored]
+    return {task: sum(part[task].sum(0) for part in parts) for task in parts[0]}
+
+
+def _mean(rows: dict[str, Sequence[float | None]]) -> float | None:
+    values = [value for row in rows.values() for value in row if value is not None]
+    return float(np.mean(values)) if values else None

@@ -1,0 +1,283 @@
+"""The crossed design from finished runs, as files in a folder: report, table and figure."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from innerattn.config.files import write_whole
+from innerattn.report.arms_figure import ArmDots, ArmPanel, draw_arms
+from innerattn.report.drawing import check_format, write_figure
+from innerattn.study.crossed.arms import ARMS, Arm, arm_of
+from innerattn.study.crossed.claims import RULES, Answer, answers, idle_runs, idle_shown
+from innerattn.study.crossed.effects import MARGINS, Effect, effects
+from innerattn.study.crossed.outcome import IDLE, OUTCOMES, Outcome, outcome_of
+from innerattn.study.inventory import FinishedRun
+from innerattn.study.over_runs import OverRuns, over_runs
+from innerattn.study.plan import smoke_note
+from innerattn.study.run import Digests, StudyRun, digests, read_measured
+from innerattn.study.table2_text import NONE, fixed, markdown_table, shown
+
+SCHEMA_VERSION = 1
+
+_DRAWN = {
+    "unevenness": ("unevenness of shares", (MARGINS["unevenness"],)),
+    "least_share": ("share of the idler robot", (IDLE,)),
+    "score": ("score", ()),
+    "entropy_share": ("entropy / ln(N - 1)", (1.0,)),
+}
+
+
+@dataclass(frozen=True)
+class CrossedRun:
+    """A run of the design.
+
+    Attributes:
+        arm: how it was trained.
+        seed: of its training.
+        folder: the run folder.
+        digests: what tells it from any other.
+        outcome: its figures.
+    """
+
+    arm: Arm
+    seed: int
+    folder: Path
+    digests: Digests
+    outcome: Outcome
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What the runs of one situation show."""
+
+    name: str
+    runs: tuple[CrossedRun, ...]
+    effects: tuple[Effect, ...]
+    answers: tuple[Answer, ...]
+
+    def outcomes(self) -> dict[Arm, list[Outcome]]:
+        """Figures of the runs by arm; arms without runs are there, empty."""
+        return {arm: [run.outcome for run in self.runs if run.arm == arm] for arm in ARMS}
+
+
+def write_crossed(
+    runs: Sequence[FinishedRun], out: Path, budget: str, left_out: Sequence[str] = ()
+) -> list[Situation]:
+    """Write ``crossed.md``, ``.json``, ``.csv``, ``.pdf`` and ``.png`` into ``out``.
+
+    The same runs give the same bytes.
+
+    Args:
+        runs: finished runs of the design, at least one; they are read only.
+        out: folder of the study; the runs' folders are named from there.
+        budget: name of the budget they were trained with.
+        left_out: what is said of runs that were planned and are not among ``runs``.
+
+    Returns:
+        What the report says, by situation.
+
+    Raises:
+        RunError: a run's evaluation is missing or is not one of two food robots; or matplotlib is
+            not installed.
+        OSError: a file cannot be written; each is written whole or not at all.
+    """
+    check_format(out / "crossed.png")
+    situations = [_situation(name, runs) for name in _names(runs)]
+    document = {
+        "schema_version": SCHEMA_VERSION,
+        "note": smoke_note(budget),
+        "budget": budget,
+        "figures": OUTCOMES,
+        "situations": [_json(situation, out) for situation in situations],
+    }
+    text = json.dumps(document, indent=1, allow_nan=False)
+    write_whole(out / "crossed.json", f"{text}\n".encode())
+    write_whole(out / "crossed.csv", _csv(situations).encode())
+    write_whole(out / "crossed.md", _markdown(situations, out, budget, left_out).encode())
+    figure = draw_arms([_panels(situation) for situation in situations])
+    for suffix in (".pdf", ".png"):
+        write_figure(out / f"crossed{suffix}", figure)
+    return situations
+
+
+def _names(runs: Sequence[FinishedRun]) -> list[str]:
+    return list(dict.fromkeys(run.case.situation for run in runs))
+
+
+def _situation(name: str, runs: Sequence[FinishedRun]) -> Situation:
+    own = [run for run in runs if run.case.situation == name]
+    order = {arm: index for index, arm in enumerate(ARMS)}
+    own.sort(key=lambda run: (order[arm_of(run.case)], run.case.seed))
+    found = tuple(_run(run) for run in own)
+    situation = Situation(name, found, (), ())
+    compared = tuple(effects(name, situation.outcomes()))
+    said = tuple(answers(name, situation.outcomes(), compared))
+    return Situation(name, found, compared, said)
+
+
+def _run(run: FinishedRun) -> CrossedRun:
+    case = run.case
+    measured = read_measured(StudyRun(case.situation, case.method, case.seed, run.folder))
+    return CrossedRun(
+        arm_of(case), case.seed, run.folder, digests(run.folder), outcome_of(measured)
+    )
+
+
+def _markdown(
+    situations: Sequence[Situation], out: Path, budget: str, left_out: Sequence[str]
+) -> str:
+    note = smoke_note(budget)
+    seeds = sorted({run.seed for situation in situations for run in situation.runs})
+    count = sum(len(situation.runs) for situation in situations)
+    missing = ["**Not in any figure below:**\n", *(f"- {one}" for one in left_out), ""]
+    said = [answer for situation in situations for answer in situation.answers]
+    parts = [
+        "# Does attention cause even sharing?\n",
+        *([f"> **{note[:1].upper()}{note[1:]}.**\n"] if note else []),
+        f"{count} runs, budget `{budget}`, training seeds {', '.join(map(str, seeds))}: attention "
+        "(inner, uniform), rescue credit (helpers, team) and the penalty of attention logits are "
+        "crossed, in worlds of their own credit. With uniform weights there are no logits, so one "
+        "arm stands for all penalties.\n",
+        *(missing if left_out else []),
+        markdown_table(
+            ["claim", "situation", "measured here", "holds?"],
+            [[a.claim, a.situation, a.measured, f"**{a.holds}**"] for a in said],
+        ),
+        "## How it is decided\n",
+        RULES,
+        "![All runs](crossed.png)\n",
+        "A dot is a run; bars are means and 95 % intervals over runs.\n",
+    ]
+    for situation in situations:
+        parts += [f"## {situation.name}\n", _arms_table(situation), _effects_table(situation)]
+    return "\n".join([*parts, "## Runs\n", _runs_table(situations, out)])
+
+
+def _arms_table(situation: Situation) -> str:
+    head = ["arm", "runs", "unevenness", "least share", "runs with an idle robot"]
+    head += ["rescues per episode", "score", "entropy / ln(N − 1)"]
+    rows = []
+    for arm, runs in situation.outcomes().items():
+        rows.append(
+            [
+                *(str(arm), str(len(runs))),
+                *(shown(_mean(runs, name)) for name in ("unevenness", "least_share")),
+                idle_shown(runs),
+                *(shown(_mean(runs, name)) for name in ("rescues_per_episode", "score")),
+                shown(_mean(runs, "entropy_share"), 3),
+            ]
+        )
+    return markdown_table(head, rows)
+
+
+def _effects_table(situation: Situation) -> str:
+    head = ["effect", "on", "runs", "difference [95 %]", "Hedges g [95 %]", "p", "alike within"]
+    rows = []
+    for effect in sorted(situation.effects, key=lambda effect: not effect.main):
+        found = effect.found
+        name = f"**{effect.name}**" if effect.main else effect.name
+        cells = [name, effect.figure.replace("_", " "), str(effect.runs)]
+        if found is None:
+            rows.append([*cells, NONE, NONE, NONE, NONE])
+            continue
+        alike = f"{found.margin:g}: {'yes' if found.equivalent else 'not shown'}"
+        p = "< 0.001" if found.p < 0.001 else f"{found.p:.3f}"
+        cells += [shown(found.difference, 3), shown(found.hedges_g, 1), p, alike]
+        rows.append(cells)
+    return markdown_table(head, rows)
+
+
+def _runs_table(situations: Sequence[Situation], out: Path) -> str:
+    head = ["situation", "arm", "seed", "unevenness", "least share", "score", "folder"]
+    head += ["SHA-256 of config.toml", "SHA-256 of the weights"]
+    rows = []
+    for situation in situations:
+        for run in situation.runs:
+            outcome = run.outcome
+            figures = (outcome.unevenness, outcome.least_share, outcome.score)
+            rows.append(
+                [
+                    *(situation.name, str(run.arm), str(run.seed)),
+                    *(NONE if value is None else fixed(value) for value in figures),
+                    f"`{_named(run, out)}`",
+                    *(f"`{digest}`" for digest in (run.digests.config, run.digests.weights)),
+                ]
+            )
+    return markdown_table(head, rows)
+
+
+def _csv(situations: Sequence[Situation]) -> str:
+    """One line per run."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = [field.name for field in fields(Outcome)]
+    writer.writerow(["situation", "method", "credit", "penalty", "seed", *names])
+    for situation in situations:
+        for run in situation.runs:
+            arm = run.arm
+            values = [getattr(run.outcome, name) for name in names]
+            writer.writerow(
+                [situation.name, arm.method, arm.credit, arm.penalty, run.seed, *values]
+            )
+    return text.getvalue()
+
+
+def _json(situation: Situation, out: Path) -> dict[str, Any]:
+    return {
+        "situation": situation.name,
+        "answers": [asdict(answer) for answer in situation.answers],
+        "arms": [
+            {
+                **asdict(arm),
+                "method": arm.method,
+                "runs": len(runs),
+                "idle": idle_runs(runs)[0],
+                "mean": {
+                    name: asdict(mean) if (mean := _mean(runs, name)) else None for name in OUTCOMES
+                },
+            }
+            for arm, runs in situation.outcomes().items()
+        ],
+        "effects": [asdict(effect) for effect in situation.effects],
+        "runs": [
+            {
+                **asdict(run.arm),
+                "method": run.arm.method,
+                "seed": run.seed,
+                "folder": _named(run, out),
+                **asdict(run.outcome),
+                "config_sha256": run.digests.config,
+                "weights_sha256": run.digests.weights,
+            }
+            for run in situation.runs
+        ],
+    }
+
+
+def _panels(situation: Situation) -> list[ArmPanel]:
+    panels = []
+    for name, (label, marks) in _DRAWN.items():
+        dots = []
+        for arm, runs in situation.outcomes().items():
+            mean = _mean(runs, name)
+            values = tuple(value for run in runs if (value := getattr(run, name)) is not None)
+            bar = None
+            if mean is not None and mean.low is not None and mean.high is not None:
+                bar = (mean.mean, mean.low, mean.high)
+            dots.append(ArmDots(str(arm), arm.penalty is not None, values, bar))
+        panels.append(ArmPanel(situation.name, label, tuple(dots), marks))
+    return panels
+
+
+def _mean(runs: Sequence[Outcome], name: str) -> OverRuns | None:
+    return over_runs([getattr(run, name) for run in runs])
+
+
+def _named(run: CrossedRun, out: Path) -> str:
+    return run.folder.relative_to(out).as_posix()

@@ -1,0 +1,245 @@
+"""The crossed design: its arms, what a run shows, effects against plain sums, rules, files."""
+
+import csv
+import hashlib
+import json
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_run import made_run
+from scipy.stats import ttest_ind
+
+from innerattn.errors import RunError
+from innerattn.study.crossed.arms import ARMS, Arm, arm_of, plan_crossed
+from innerattn.study.crossed.claims import Answer, answers
+from innerattn.study.crossed.effects import contrasts, effects
+from innerattn.study.crossed.outcome import Outcome, outcome_of
+from innerattn.study.crossed.report import write_crossed
+from innerattn.study.inventory import FinishedRun
+from innerattn.study.plan import PlannedRun
+from innerattn.study.run import StudyRun, read_measured
+from innerattn.train import read_info
+
+OUT = Path("study")
+METHODS = ("td-inner", "td-uniform")
+EVEN = Outcome(0.02, 0.48, 2.0, 0.7, 0.9)
+IDLE = replace(EVEN, unevenness=0.4, least_share=0.1)
+
+Outcomes = dict[Arm, list[Outcome]]
+
+
+def planned(out: Path = OUT, seeds: range = range(2)) -> list[PlannedRun]:
+    return plan_crossed(METHODS, ("single", "mixed"), seeds, "quick", out)
+
+
+def test_all_combinations_are_planned_and_are_what_they_say() -> None:
+    runs = planned()
+    assert len({one.folder for one in runs}) == len(runs) == 2 * 2 * 8
+    found = set()
+    for one in runs:
+        config, arm = one.config, arm_of(one.case)
+        assert config.scenario.situation == one.case.situation
+        assert (config.train.method, config.train.seed) == (one.case.method, one.case.seed)
+        assert config.network.attention == one.case.method.removeprefix("td-")
+        assert config.scenario.rescue_credit == arm.credit
+        if arm.penalty is not None:
+            assert config.td.attention_logit_penalty == arm.penalty
+        found.add((one.case.situation, one.case.seed, arm))
+    assert found == set(product(("single", "mixed"), range(2), ARMS))
+    inner = {(arm.credit, arm.penalty) for arm in ARMS if arm.method == "td-inner"}
+    assert inner == set(product(("helpers", "team"), (0.0, 1e-4, 1e-3)))
+    alone = plan_crossed(("td-uniform",), ("single",), (0,), "quick", OUT)
+    assert [one.case.variant for one in alone] == ["helpers", "team"]
+
+
+def random_outcomes(seed: int, runs: int = 4) -> Outcomes:
+    rng = np.random.default_rng(seed)
+    return {arm: [Outcome(*rng.uniform(size=5)) for _ in range(runs)] for arm in ARMS}
+
+
+def test_contrasts_compare_whole_means() -> None:
+    names = [name for name, _, _ in contrasts()]
+    assert len(set(names)) == len(names)
+    for name, _, weights in contrasts():
+        plus = sum(weight for weight in weights.values() if weight > 0)
+        minus = sum(weight for weight in weights.values() if weight < 0)
+        whole = 2.0 if " with " in name else 1.0
+        assert (plus, minus) == pytest.approx((whole, -whole)), name
+
+
+@pytest.mark.parametrize("figure", ["unevenness", "score", "entropy_share"])
+def test_effects_against_plain_means(figure: str) -> None:
+    outcomes = random_outcomes(3)
+    mean = {
+        (arm.credit, arm.penalty): np.mean([getattr(run, figure) for run in runs])
+        for arm, runs in outcomes.items()
+    }
+    found = {e.name: e.found for e in effects("mixed", outcomes) if e.figure == figure}
+    inner = {c: np.mean([mean[c, p] for p in (0.0, 1e-4, 1e-3)]) for c in ("helpers", "team")}
+    uniform = {c: mean[c, None] for c in inner}
+    expected = {
+        "inner - uniform, over credits and penalties": np.mean(
+            [inner["helpers"] - uniform["helpers"], inner["team"] - uniform["team"]]
+        ),
+        "team - helpers, over attentions and penalties": np.mean(
+            [inner["team"] - inner["helpers"], uniform["team"] - uniform["helpers"]]
+        ),
+        "penalty 0.001 - 0, over credits": np.mean(
+            [mean[c, 1e-3] - mean[c, 0.0] for c in ("helpers", "team")]
+        ),
+        "(inner - uniform) with team - with helpers": (inner["team"] - uniform["team"])
+        - (inner["helpers"] - uniform["helpers"]),
+        "inner at penalty 0.0001 - uniform, team": mean["team", 1e-4] - uniform["team"],
+        "team - helpers, uniform": uniform["team"] - uniform["helpers"],
+        "team - helpers, inner at penalty 0": mean["team", 0.0] - mean["helpers", 0.0],
+        "penalty 0.0001 - 0, helpers": mean["helpers", 1e-4] - mean["helpers", 0.0],
+    }
+    for name, difference in expected.items():
+        one = found[name]
+        assert one is not None
+        assert one.difference.mean == pytest.approx(difference), name
+    pair = [
+        [getattr(run, figure) for run in outcomes[Arm("team", penalty)]] for penalty in (1e-4, None)
+    ]
+    one = found["inner at penalty 0.0001 - uniform, team"]
+    assert one is not None
+    assert one.p == pytest.approx(ttest_ind(*pair, equal_var=False).pvalue)
+
+
+def test_effects_need_two_runs_of_each_arm() -> None:
+    outcomes = random_outcomes(1)
+    outcomes[Arm("team", None)] = outcomes[Arm("team", None)][:1]
+    found = {e.name: e for e in effects("mixed", outcomes) if e.figure == "score"}
+    assert found["team - helpers, uniform"].found is None
+    assert found["team - helpers, uniform"].runs == 5
+    assert found["team - helpers, inner at penalty 0"].found is not None
+    assert all(one.found is None for one in effects("mixed", {}))
+
+
+def said(outcomes: Outcomes) -> dict[str, Answer]:
+    return {one.claim: one for one in answers("mixed", outcomes, effects("mixed", outcomes))}
+
+
+def scattered(like: Outcome, seed: int, runs: int = 10) -> list[Outcome]:
+    rng = np.random.default_rng(seed)
+    return [
+        Outcome(*(np.array(list(vars(like).values())) + rng.normal(0.0, 0.005, 5)).tolist())
+        for _ in range(runs)
+    ]
+
+
+TEAM_IDLE = "the team's credit leaves a food robot idle with either attention"
+HELPERS_EVEN = "with the helpers' credit sharing is even with either attention"
+HELD = "a penalty of 0.001 holds attention even"
+
+
+def test_what_was_expected_can_be_confirmed() -> None:
+    flat = replace(EVEN, entropy_share=0.999)
+    outcomes = {
+        arm: scattered(flat if arm.penalty == 1e-3 else EVEN, i)
+        if arm.credit == "helpers"
+        else scattered(replace(IDLE, entropy_share=0.999 if arm.penalty == 1e-3 else 0.9), i)
+        for i, arm in enumerate(ARMS)
+    }
+    found = said(outcomes)
+    assert found[TEAM_IDLE].holds == found[HELPERS_EVEN].holds == found[HELD].holds == "yes"
+    assert found[TEAM_IDLE].measured.startswith("inner: 30 of 30 [0.89, 1.00]; uniform: 10 of 10 [")
+    assert found["the team's credit makes sharing uneven"].holds == "yes"
+    # Both attentions do the same, so neither is to be credited with it.
+    assert found["attention makes sharing even"].holds == "no"
+    assert found["attention rescues more"].holds == "no"
+
+
+def test_what_was_expected_can_be_refuted() -> None:
+    worse = replace(IDLE, score=0.4)
+    outcomes = {
+        arm: scattered(worse if arm.penalty is None else EVEN, i) for i, arm in enumerate(ARMS)
+    }
+    found = said(outcomes)
+    assert found["attention makes sharing even"].holds == "yes"
+    assert found["attention rescues more"].holds == "yes"
+    assert found[TEAM_IDLE].holds == "no"  # with learnt attention none is idle
+    assert found[HELPERS_EVEN].holds == "no"  # with uniform weights one is
+    assert found[HELD].holds == "no"
+    assert found["the team's credit makes sharing uneven"].holds == "no"
+
+
+def test_few_runs_decide_nothing() -> None:
+    few = {arm: [EVEN] for arm in ARMS if arm.credit == "team"}
+    assert {one.holds for one in said(few).values()} == {"undecided"}
+    assert {one.holds for one in said({}).values()} == {"undecided"}
+
+
+def test_outcome_against_a_plain_loop(runs: list[StudyRun]) -> None:
+    measured = read_measured(runs[0])
+    found = outcome_of(measured)
+    scenario = measured.recorded.scenario
+    by_index = dict(enumerate(task.name for task in scenario.tasks))
+    helped = {name: [0, 0] for name in by_index.values()}
+    for record in measured.scored:
+        for event in record.rescues:
+            for need, ability in enumerate(scenario.tasks[event["task"]].needs):
+                if ability == "food":
+                    robot = int(event[f"helper_{need}"])
+                    helped[by_index[int(event["task"])]][robot] += 1
+    distances = [abs(first / (first + second) - 0.5) for first, second in helped.values()]
+    total = np.sum(list(helped.values()), axis=0)
+    assert found.unevenness == pytest.approx(np.mean(distances))
+    assert found.least_share == pytest.approx(min(total) / sum(total))
+    assert found.rescues_per_episode == measured.summary["rescues_per_episode"]["mean"]
+    shares = np.concatenate(list(measured.summary["attention_entropy_share"].values()))
+    assert found.entropy_share == pytest.approx(shares.mean())
+
+
+def test_a_task_that_two_robots_do_not_share_is_refused(runs: list[StudyRun]) -> None:
+    measured = read_measured(runs[0])
+    robots = measured.recorded.scenario.robots
+    third = robots[0].model_copy(update={"name": "food_2"})
+    changed = measured.recorded.scenario.replace(robots=[*robots, third])
+    scored = tuple(replace(record, scenario=changed) for record in measured.scored)
+    with pytest.raises(RunError, match="is shared by 3 robots; must be two"):
+        outcome_of(replace(measured, scored=scored))
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[FinishedRun]]:
+    """Runs of all arms in mixed, two of each, in a study's folder."""
+    out = tmp_path_factory.mktemp("crossed")
+    found = []
+    for one in plan_crossed(METHODS, ("mixed",), range(2), "quick", out):
+        made = made_run(out / "made", "mixed", one.case.method, one.case.seed)
+        one.folder.parent.mkdir(exist_ok=True)
+        made.folder.rename(one.folder)
+        found.append(FinishedRun(one.case, one.folder, one.config, read_info(one.folder)))
+    return out, found
+
+
+def test_files_are_the_same_twice_and_name_every_run(
+    finished: tuple[Path, list[FinishedRun]],
+) -> None:
+    out, runs = finished
+    names = [f"crossed.{kind}" for kind in ("md", "json", "csv", "pdf", "png")]
+    write_crossed(runs, out, "quick", ["mixed td-inner seed 9: failed"])
+    before = {name: (out / name).read_bytes() for name in names}
+    write_crossed(runs[::-1], out, "quick", ["mixed td-inner seed 9: failed"])
+    assert {name: (out / name).read_bytes() for name in names} == before
+
+    text = before["crossed.md"].decode()
+    assert text.index("smoke run") < text.index("mixed td-inner seed 9: failed")
+    assert text.index("| claim |") < text.index("## mixed") < text.index("## Runs")
+    for run in runs:
+        weights = run.folder / "checkpoints" / "0" / "weights.safetensors"
+        assert f"`runs/{run.folder.name}`" in text
+        assert hashlib.sha256(weights.read_bytes()).hexdigest() in text
+    document = json.loads(before["crossed.json"])
+    (situation,) = document["situations"]
+    assert len(situation["runs"]) == len(runs) == 16
+    rows = list(csv.DictReader(before["crossed.csv"].decode().splitlines()))
+    assert [float(row["score"]) for row in rows] == [run["score"] for run in situation["runs"]]
+    write_crossed(runs, out, "short")
+    text = (out / "crossed.md").read_text()
+    assert "smoke" not in text
+    assert "Not in any" not in text
