@@ -13,6 +13,7 @@ from pathlib import Path
 PERFORMANCE = Path(__file__).parents[1] / "docs" / "performance.md"
 LEARNING = PERFORMANCE.with_name("learning.md")
 ROBUSTNESS = PERFORMANCE.with_name("robustness.md")
+REPRODUCTION = PERFORMANCE.with_name("reproduction.md")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

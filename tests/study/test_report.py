@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -52,6 +54,17 @@ def test_the_report_opens_with_claims_and_ends_with_the_runs(
     for name in FIGURES:
         assert f"({name}.png)" in text
     assert (folder / "table2.md").read_text() in text
+
+
+def test_runs_within_the_study_are_named_from_there(runs: list[StudyRun], tmp_path: Path) -> None:
+    run = runs[0]
+    inside = tmp_path / "runs" / "one"
+    shutil.copytree(run.folder, inside)
+    findings = write_report([replace(run, folder=inside)], tmp_path, "short", ("table2",))
+    assert findings.folder == tmp_path
+    text = (tmp_path / "report.md").read_text()
+    assert "| `runs/one` |" in text
+    assert str(tmp_path) not in text
 
 
 def test_parts_can_be_asked_for_alone(runs: list[StudyRun], tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from innerattn.cli.tables import plus_minus
 
 if TYPE_CHECKING:
     from innerattn.study.inventory import Found
-    from innerattn.study.measured import Measured
+    from innerattn.study.scores import Scores
 
 _KEY = """\
   score: 0 plays like random, 1 like hungarian
@@ -31,13 +31,13 @@ def print_scores(console: Console, found: Sequence[Found]) -> None:
     Raises:
         RunError: a finished run has changed since it was found.
     """
-    from innerattn.study.measured import read_measured
+    from innerattn.study.scores import read_scores
 
-    cells: dict[tuple[str, str], list[tuple[Measured, Measured] | None]] = {}
+    cells: dict[tuple[str, str], list[tuple[Scores, Scores] | None]] = {}
     for one in found:
         planned = one.planned
         usable = one.state == "finished"
-        measured = read_measured(planned.folder, planned.config) if usable else None
+        measured = read_scores(planned.folder, planned.config) if usable else None
         cells.setdefault((planned.case.situation, planned.case.trained), []).append(measured)
     lengths = next((two for runs in cells.values() for two in runs if two is not None), None)
     if lengths is None:
@@ -61,7 +61,7 @@ def print_scores(console: Console, found: Sequence[Found]) -> None:
     console.print(_KEY)
 
 
-def _figures(runs: Sequence[tuple[Measured, Measured]]) -> list[str]:
+def _figures(runs: Sequence[tuple[Scores, Scores]]) -> list[str]:
     return [
         text
         for length in (0, 1)

@@ -10,9 +10,9 @@ from typing import Any
 
 from innerattn.config.files import write_whole
 from innerattn.study.inventory import Found
-from innerattn.study.measured import read_measured
 from innerattn.study.plan import smoke_note
 from innerattn.study.run import digests
+from innerattn.study.scores import read_scores
 from innerattn.train import read_info
 
 SCHEMA_VERSION = 1
@@ -65,7 +65,7 @@ def _row(out: Path, found: Found) -> dict[str, Any]:
     if found.state != "finished":
         return row
     info = read_info(planned.folder)
-    standard, long = read_measured(planned.folder, planned.config)
+    standard, long = read_scores(planned.folder, planned.config)
     named = digests(planned.folder)
     return row | {
         **asdict(standard),

@@ -11,8 +11,8 @@ from typing import Any, Literal
 from innerattn.config import RunConfig, read_toml
 from innerattn.errors import InnerattnError
 from innerattn.study.failures import read_failures
-from innerattn.study.measured import NotMeasuredError, read_measured
 from innerattn.study.plan import Case, PlannedRun
+from innerattn.study.scores import NotMeasuredError, read_scores
 from innerattn.train import RunInfo, read_info
 from innerattn.train.checkpoint import newest_weights, plain_file
 
@@ -112,7 +112,7 @@ def _find(planned: PlannedRun) -> Found:
         if info.state != "done":
             return Found(planned, "unfinished", f"its state is {info.state!r}")
         plain_file(newest_weights(folder))
-        read_measured(folder, config)
+        read_scores(folder, config)
     except NotMeasuredError:
         return Found(planned, "unfinished", "trained, but not measured as a whole")
     except (InnerattnError, OSError) as error:

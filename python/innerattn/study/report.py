@@ -76,6 +76,7 @@ def write_report(
         measured = [[read_measured(run) for run in group] for group in groups.values()]
     findings = Findings(
         budget=budget,
+        folder=folder,
         runs=tuple(ordered),
         digests=tuple(named),
         env_steps=tuple(config.train.env_steps for config in configs),

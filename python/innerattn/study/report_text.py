@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from innerattn.report.handover_figure import HandoverScene
 from innerattn.study.claims import RULES, Claim, entropy_claims, handover_claims
 from innerattn.study.fig4 import EntropyCourse
 from innerattn.study.fig5 import Evidence
-from innerattn.study.run import Digests, StudyRun
+from innerattn.study.run import Digests, StudyRun, named_from
 from innerattn.study.scene import SCENE_RULE
 from innerattn.study.sharing_claims import sharing_claims
 from innerattn.study.table2 import PRINTED_SITUATION, Table2
@@ -24,6 +25,7 @@ class Findings:
 
     Attributes:
         budget: name of the budget of training.
+        folder: where the report lies.
         runs: all runs, by situation and method, then seed.
         digests: of each run.
         env_steps: how long each run was trained.
@@ -35,6 +37,7 @@ class Findings:
     """
 
     budget: str
+    folder: Path
     runs: tuple[StudyRun, ...]
     digests: tuple[Digests, ...]
     env_steps: tuple[int, ...]
@@ -186,7 +189,8 @@ def _runs(findings: Findings) -> str:
     head += ["SHA-256 of config.toml", "SHA-256 of the weights"]
     rows = [
         [
-            *(run.situation, run.method, str(run.seed), f"`{run.folder}`", f"{steps:,}"),
+            *(run.situation, run.method, str(run.seed)),
+            *(f"`{named_from(run.folder, findings.folder)}`", f"{steps:,}"),
             *(f"`{digest.config}`", f"`{digest.weights}`"),
         ]
         for run, digest, steps in zip(

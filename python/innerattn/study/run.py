@@ -132,6 +132,12 @@ def read_measured(run: StudyRun) -> Measured:
     return Measured(run, scored[0], tuple(scored), summary)
 
 
+def named_from(folder: Path, base: Path) -> str:
+    """How a report in ``base`` names a run folder: from there, where it lies within."""
+    within = folder.is_relative_to(base)
+    return (folder.relative_to(base) if within else folder).as_posix()
+
+
 def digests(folder: Path) -> Digests:
     """What tells the run in ``folder`` from any other.
 

@@ -20,7 +20,7 @@ from innerattn.study.crossed.outcome import IDLE, OUTCOMES, Outcome, outcome_of
 from innerattn.study.inventory import FinishedRun
 from innerattn.study.over_runs import OverRuns, over_runs
 from innerattn.study.plan import smoke_note
-from innerattn.study.run import Digests, StudyRun, digests, read_measured
+from innerattn.study.run import Digests, StudyRun, digests, named_from, read_measured
 from innerattn.study.table2_text import NONE, fixed, markdown_table, shown
 
 SCHEMA_VERSION = 1
@@ -205,7 +205,7 @@ def _runs_table(situations: Sequence[Situation], out: Path) -> str:
                 [
                     *(situation.name, str(run.arm), str(run.seed)),
                     *(NONE if value is None else fixed(value) for value in figures),
-                    f"`{_named(run, out)}`",
+                    f"`{named_from(run.folder, out)}`",
                     *(f"`{digest}`" for digest in (run.digests.config, run.digests.weights)),
                 ]
             )
@@ -250,7 +250,7 @@ def _json(situation: Situation, out: Path) -> dict[str, Any]:
                 **asdict(run.arm),
                 "method": run.arm.method,
                 "seed": run.seed,
-                "folder": _named(run, out),
+                "folder": named_from(run.folder, out),
                 **asdict(run.outcome),
                 "config_sha256": run.digests.config,
                 "weights_sha256": run.digests.weights,
@@ -277,7 +277,3 @@ def _panels(situation: Situation) -> list[ArmPanel]:
 
 def _mean(runs: Sequence[Outcome], name: str) -> OverRuns | None:
     return over_runs([getattr(run, name) for run in runs])
-
-
-def _named(run: CrossedRun, out: Path) -> str:
-    return run.folder.relative_to(out).as_posix()

@@ -23,15 +23,15 @@ class NotMeasuredError(RunError):
 
 
 @dataclass(frozen=True)
-class Measured:
-    """Means at one length of episodes; ``score`` is none where it means nothing."""
+class Scores:
+    """What is scored at one length of episodes; ``score`` is none where it means nothing."""
 
     episode_steps: int
     rescues_per_episode: float
     score: float | None
 
 
-def read_measured(folder: Path, config: RunConfig) -> tuple[Measured, Measured]:
+def read_scores(folder: Path, config: RunConfig) -> tuple[Scores, Scores]:
     """What a run's evaluation found at the standard and at the second length of episodes.
 
     Args:
@@ -53,7 +53,7 @@ def read_measured(folder: Path, config: RunConfig) -> tuple[Measured, Measured]:
         found = json.loads(plain_file(path).read_text("utf-8"))
         parts = (found, found["long"])
         measured = tuple(
-            Measured(
+            Scores(
                 int(part["episode_steps"]),
                 float(part["rescues_per_episode"]["mean"]),
                 None if part["score"] is None else float(part["score"]["mean"]),
