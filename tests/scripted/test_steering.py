@@ -78,6 +78,10 @@ def test_faults_of_the_drive_by_hand() -> None:
     times = steering.arrival_times(still, still, places, faults)
     np.testing.assert_allclose(times[0], well[0])
     np.testing.assert_allclose(times[1, :, 0], [1.0, well[1, 1, 0], 0.5 + 0.3, well[1, 3, 0]], 1e-6)
+    faults["motor_gain"][0, 1] = 0.5  # what was found for other faults must not be used again
+    times = steering.arrival_times(still, still, places, faults)
+    fresh = Steering(SCENARIO).arrival_times(still, still, places, faults)
+    np.testing.assert_array_equal(times, fresh)
     faults["heading_bias"][1, 3] = np.pi / 2  # told to go +x it goes +y, told -y it goes +x
     actions = steering.actions(still, still, np.tile([0.9, 0.0], (2, 4, 1)), faults)
     assert actions.tolist() == [[1, 1, 1, 1], [1, 1, 1, 4]]

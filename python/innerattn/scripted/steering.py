@@ -41,6 +41,7 @@ class Steering:
         self._push = np.array([robot.drive_force_n / robot.mass_kg for robot in robots]) * self._dt
         self._continuous = scenario.actions == "continuous"
         self.speed, self.lag = self._speed_and_lag(self._push, self._limit)
+        self._known: tuple[Array, Array, Array] | None = None
 
     def _speed_and_lag(self, push: Array, limit: Array) -> tuple[Array, Array]:
         """Final speeds [m/s] and lags [s] of robots that gain ``push`` a period up to ``limit``."""
@@ -51,6 +52,17 @@ class Steering:
         final = speeds[-1]
         shortfall = 1.0 - speeds / np.maximum(final, 1e-12)
         return final, np.where(final > 0.0, shortfall.sum(0) * self._dt, 0.0)
+
+    def _of_cases(self, cases: Array) -> tuple[Array, Array]:
+        """Final speeds and lags (C, R) of drives that are left so much, (C, R * 2).
+
+        Drives seldom change from one step to the next, so the last answer is kept.
+        """
+        if self._known is None or not np.array_equal(self._known[0], cases):
+            gain, cap = np.moveaxis(cases.reshape(len(cases), -1, 2), -1, 0)
+            found = self._speed_and_lag(self._push * gain, self._limit * cap)
+            self._known = (cases, *found)
+        return self._known[1:]
 
     def arrival_times(
         self, positions: Any, velocities: Any, places: Any, faults: NDArray[np.void] | None = None
@@ -77,9 +89,7 @@ class Steering:
         if faults is not None:
             left = np.stack([faults["motor_gain"], faults["speed_limit"]], -1).astype(np.float64)
             cases, case = np.unique(left.reshape(len(left), -1), axis=0, return_inverse=True)
-            gain, cap = np.moveaxis(cases.reshape(len(cases), -1, 2), -1, 0)
-            speed, lag = self._speed_and_lag(self._push * gain, self._limit * cap)
-            speed, lag = speed[case.reshape(-1)], lag[case.reshape(-1)]
+            speed, lag = (found[case.reshape(-1)] for found in self._of_cases(cases))
         speed, lag = np.maximum(speed, 1e-9)[..., None], lag[..., None]
         times = gap / speed + np.maximum(lag * (1.0 - towards / speed), 0.0)
         return np.where(gap > 0.0, np.minimum(times, NEVER_S), 0.0)
