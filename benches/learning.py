@@ -1,7 +1,7 @@
 """What methods learn: trains every missing run, one core each, and tabulates scores over seeds.
 
-`python benches/learning.py RUNS` fills its place in `docs/learning.md`, and another when given
-`--warm-start hungarian`. A second call goes on where the first stopped; finished runs are kept.
+`python benches/learning.py RUNS` fills a place in `docs/learning.md` for each budget, and another
+when given `--warm-start hungarian`. A second call goes on where the first stopped.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from runs import Run, train_all
 from innerattn.evaluate.statistics import student_interval
 
 PRESETS = ("mixed", "double", "single")
+METHODS = {"quick": ["td-inner"], "short": ["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"]}
+SEEDS = {"quick": [0, 1, 2], "short": [0, 1, 2, 3, 4]}
 
 
 def row(found: list[dict[str, Any]]) -> list[str]:
@@ -41,30 +43,34 @@ def row(found: list[dict[str, Any]]) -> list[str]:
 
 
 def main() -> None:
-    """Train what is missing and publish the table."""
+    """Train what is missing and publish the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("runs", type=Path, help="folder of the runs")
     parser.add_argument("--warm-start", default="none", choices=["none", "hungarian", "greedy"])
-    parser.add_argument("--methods", nargs="+", default=["td-inner"])
-    parser.add_argument("--budgets", nargs="+", default=["quick", "short"])
-    parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2])
+    parser.add_argument("--budgets", nargs="+", default=list(METHODS), choices=list(METHODS))
+    parser.add_argument("--methods", nargs="+", help="others than a budget has by default")
+    parser.add_argument("--seeds", nargs="+", type=int, help="others than a budget has by default")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     given = parser.parse_args()
-    cases = list(product(given.methods, given.budgets, PRESETS))
-    wanted = [
-        Run(preset, method, budget, seed, given.warm_start)
-        for method, budget, preset in cases
-        for seed in given.seeds
-    ]
-    folders = iter(train_all(wanted, given.runs, given.workers))
-    rows = []
-    for method, budget, preset in cases:
-        records = [next(folders) / "evaluation" / "summary.json" for _ in given.seeds]
-        found = [json.loads(record.read_text()) for record in records]
-        rows.append([f"{method}, {budget}, {preset}", *row(found)])
-    head = ["", "rescues, 25 steps", "score, 25 steps", "score, 100 steps"]
-    section = "learning" if given.warm_start == "none" else "warm_start"
-    publish(section, table(head, rows), LEARNING)
+    for budget in given.budgets:
+        cases = list(product(given.methods or METHODS[budget], PRESETS))
+        seeds = given.seeds or SEEDS[budget]
+        wanted = [
+            Run(preset, method, budget, seed, given.warm_start)
+            for method, preset in cases
+            for seed in seeds
+        ]
+        folders = iter(train_all(wanted, given.runs, given.workers))
+        rows = []
+        for method, preset in cases:
+            records = [next(folders) / "evaluation" / "summary.json" for _ in seeds]
+            found = [json.loads(record.read_text()) for record in records]
+            rows.append([f"{method}, {preset}", *row(found)])
+        listed = ", ".join(map(str, seeds))
+        head = [f"{budget}, seeds {listed}", "rescues, 25 steps"]
+        head += ["score, 25 steps", "score, 100 steps"]
+        section = f"learning_{budget}" if given.warm_start == "none" else "warm_start"
+        publish(section, table(head, rows), LEARNING)
 
 
 if __name__ == "__main__":

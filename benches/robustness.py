@@ -145,15 +145,15 @@ def bounds(documents: Sequence[Document]) -> str:
             continue
         logit = [level["checks"]["logit"] for level in same]
         weight = [level["checks"]["weight"] for level in same]
-        median = statistics.mean
+        mean = statistics.mean
         rows.append(
             [
                 f"{one['changed']}, {one['direction']}, {one['radius']:g}",
-                f"{median(x['median_tightness'] for x in logit):.3f}",
+                f"{mean(x['median_tightness'] for x in logit):.3f}",
                 f"{max(x['largest_tightness'] for x in logit):.2f}",
-                f"{median(x['median_change'] for x in weight):.3f}",
+                f"{mean(x['median_change'] for x in weight):.3f}",
                 f"{max(x['largest_change'] for x in weight):.2f}",
-                f"{median(level['teammates']['median'] for level in same):.3f}",
+                f"{mean(level['teammates']['median'] for level in same):.3f}",
                 f"{max(level['teammates']['largest'] for level in same):.2f}",
                 _share([level["actor_flips"] for level in same]),
             ]

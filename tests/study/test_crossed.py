@@ -1,7 +1,6 @@
 """The crossed design: its arms, what a run shows, effects against plain sums, rules, files."""
 
 import csv
-import hashlib
 import json
 from dataclasses import replace
 from itertools import product
@@ -22,6 +21,7 @@ from innerattn.study.inventory import FinishedRun
 from innerattn.study.plan import PlannedRun
 from innerattn.study.run import StudyRun, read_measured
 from innerattn.train import read_info
+from innerattn.train.weights import digest_of
 
 OUT = Path("study")
 METHODS = ("td-inner", "td-uniform")
@@ -233,7 +233,7 @@ def test_files_are_the_same_twice_and_name_every_run(
     for run in runs:
         weights = run.folder / "checkpoints" / "0" / "weights.safetensors"
         assert f"`runs/{run.folder.name}`" in text
-        assert hashlib.sha256(weights.read_bytes()).hexdigest() in text
+        assert f"`{digest_of(weights)}`" in text
     document = json.loads(before["crossed.json"])
     (situation,) = document["situations"]
     assert len(situation["runs"]) == len(runs) == 16

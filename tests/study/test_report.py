@@ -11,6 +11,7 @@ import pytest
 from innerattn.errors import RunError
 from innerattn.study.report import write_report
 from innerattn.study.run import StudyRun
+from innerattn.train.weights import digest_of
 
 FIGURES = ("fig4", "fig5", "fig5_evidence")
 FILES = {
@@ -48,9 +49,9 @@ def test_the_report_opens_with_claims_and_ends_with_the_runs(
     assert "| even sharing with inner attention | single | ppo-inner |" in others
     for run in runs:
         assert f"`{run.folder}`" in text
-        for name in ("config.toml", "checkpoints/0/weights.safetensors"):
-            digest = hashlib.sha256((run.folder / name).read_bytes()).hexdigest()
-            assert f"`{digest}`" in text
+        digest = hashlib.sha256((run.folder / "config.toml").read_bytes()).hexdigest()
+        assert f"`{digest}`" in text
+        assert f"`{digest_of(run.folder / 'checkpoints/0/weights.safetensors')}`" in text
     for name in FIGURES:
         assert f"({name}.png)" in text
     assert (folder / "table2.md").read_text() in text

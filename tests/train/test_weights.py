@@ -8,7 +8,13 @@ import torch
 from safetensors.torch import load, save, save_file
 
 from innerattn.errors import RunError
-from innerattn.train.weights import FORMAT, SCHEMA_VERSION, read_weights, write_weights
+from innerattn.train.weights import (
+    FORMAT,
+    SCHEMA_VERSION,
+    digest_of,
+    read_weights,
+    write_weights,
+)
 
 TENSORS = {
     "actor.weight": torch.arange(12, dtype=torch.float32).reshape(3, 4).t(),  # not contiguous
@@ -102,6 +108,20 @@ def test_digest_covers_names_and_shapes(file: Path) -> None:
     tensors["actor.weight"] = tensors.pop("actor.weights").reshape(3, 4)
     file.write_bytes(save(tensors, metadata))
     assert "digest" in refusal(file)
+
+
+def test_the_same_tensors_have_the_same_digest_whatever_the_file(
+    file: Path, tmp_path: Path
+) -> None:
+    digest, again = digest_of(file), tmp_path / "again.safetensors"
+    for _ in range(8):  # the order of the header is drawn anew
+        write_weights(again, dict(reversed(TENSORS.items())))
+        assert digest_of(again) == digest
+    write_weights(again, {**TENSORS, "updates": torch.tensor(8)})
+    assert digest_of(again) != digest
+    file.write_bytes(file.read_bytes()[:-1])
+    with pytest.raises(RunError, match="safetensors"):
+        digest_of(file)
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:

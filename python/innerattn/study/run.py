@@ -15,6 +15,7 @@ from innerattn.errors import RunError
 from innerattn.evaluate.episodes import Record
 from innerattn.evaluate.records import read_records
 from innerattn.train.checkpoint import newest_weights, plain_file
+from innerattn.train.weights import digest_of
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,12 @@ class Measured:
 
 @dataclass(frozen=True)
 class Digests:
-    """SHA-256 of what a run was asked to do and of what it learnt, in hexadecimal."""
+    """SHA-256 of what a run was asked to do and of what it learnt, in hexadecimal.
+
+    Attributes:
+        config: of the file ``config.toml``.
+        weights: of the newest weights, see `innerattn.train.weights.digest_of`.
+    """
 
     config: str
     weights: str
@@ -142,9 +148,9 @@ def digests(folder: Path) -> Digests:
     """What tells the run in ``folder`` from any other.
 
     Raises:
-        RunError: a file is missing, or is no plain file.
+        RunError: a file is missing, is no plain file, or holds no whole weights.
     """
-    return Digests(_sha256(folder / "config.toml"), _sha256(newest_weights(folder)))
+    return Digests(_sha256(folder / "config.toml"), digest_of(newest_weights(folder)))
 
 
 def _sha256(path: Path) -> str:

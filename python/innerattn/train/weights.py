@@ -45,6 +45,23 @@ def read_weights(path: Path) -> dict[str, Tensor]:
         RunError: the file is missing, a link, truncated, altered, of another format or of another
             version; the message names the file.
     """
+    return _read(path)[0]
+
+
+def digest_of(path: Path) -> str:
+    """SHA-256 of the tensors in ``path``, in hexadecimal.
+
+    It is that of names, dtypes, shapes and bytes: the same training gives the same one, while the
+    file may differ in the order of its header.
+
+    Raises:
+        RunError: as of `read_weights`.
+    """
+    return _read(path)[1]
+
+
+def _read(path: Path) -> tuple[dict[str, Tensor], str]:
+    """Tensors and their digest."""
     if path.is_symlink() or not path.is_file():
         raise RunError(f"{path}: no weights here (a plain file is needed)")
     try:
@@ -58,9 +75,10 @@ def read_weights(path: Path) -> dict[str, Tensor]:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     except (SafetensorError, OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not readable as safetensors ({error})") from error
-    if metadata.get("sha256") != _digest(tensors):
+    digest = _digest(tensors)
+    if metadata.get("sha256") != digest:
         raise RunError(f"{path}: contents do not match their digest; the file was altered")
-    return tensors
+    return tensors, digest
 
 
 def _digest(tensors: Mapping[str, Tensor]) -> str:
