@@ -116,7 +116,7 @@ def test_another_configuration_is_named_and_neither_used_nor_changed(
     assert "4 runs of 2 seeds; 1 finished, 2 to train" in out
     assert "; 1 left out\n" in out
     assert f"  mixed td-inner seed 0: {why}\n" in out
-    (row,) = [line.split() for line in out.splitlines() if line.startswith("    td-inner")]
+    (row,) = [line.split() for line in out.splitlines() if line.split()[:1] == ["td-inner"]]
     assert row[1:4] == ["1", "of", "2"]
     assert "±" not in row
     assert times(foreign) == before

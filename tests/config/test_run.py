@@ -122,3 +122,18 @@ def test_every_key_says_what_it_is() -> None:
         assert info.annotation is not None
         for name, key in info.annotation.model_fields.items():
             assert key.description, f"{section}.{name} has no description"
+
+
+@pytest.mark.parametrize(
+    ("method", "warm_start", "unused"),
+    [
+        ("td-inner", "none", {"ppo", "imitation"}),
+        ("td-uniform", "greedy", {"ppo"}),
+        ("ppo-inner", "none", {"td", "imitation"}),
+        ("mappo", "hungarian", {"td"}),
+    ],
+)
+def test_what_a_run_depends_on(method: str, warm_start: str, unused: set[str]) -> None:
+    config = RunConfig.model_validate({"train": {"method": method, "warm_start": warm_start}})
+    assert config.in_use().keys() == RunConfig.model_fields.keys() - unused
+    assert config.in_use()["scenario"] == config.scenario.model_dump(mode="json")

@@ -69,13 +69,29 @@ def test_another_configuration_is_named_with_both_values(
 
 
 def test_many_differences_are_cut_short(small: dict[str, object], study: Path) -> None:
-    changes = {"td.gamma": 0.5, "td.polyak": 0.5, "ppo.gamma": 0.5, "ppo.clip": 0.5}
+    changes = {
+        "td.gamma": 0.5,
+        "td.polyak": 0.5,
+        "td.reward_scale": 1.0,
+        "network.precision": "bfloat16",
+    }
     planned = plan(("td-inner",), ("mixed",), (0,), "quick", study, {**small, **changes})
     (found,) = take_inventory(planned, study)
     assert found.why == (
-        "td.gamma = 0.95, planned 0.5; td.polyak = 0.02, planned 0.5; "
-        "ppo.gamma = 0.95, planned 0.5; and 1 more"
+        "network.precision = 'float32', planned 'bfloat16'; td.gamma = 0.95, planned 0.5; "
+        "td.polyak = 0.02, planned 0.5; and 1 more"
     )
+
+
+def test_numbers_that_a_run_does_not_look_at_do_not_count(
+    small: dict[str, object], study: Path
+) -> None:
+    inert = {"ppo.gamma": 0.5, "imitation.env_steps": 9}
+    warm = {"imitation.env_steps": 300_000, "train.warm_start": "greedy"}
+    for changes, state in ((inert, "finished"), (warm, "other_configuration")):
+        planned = plan(("td-inner",), ("mixed",), (0,), "quick", study, {**small, **changes})
+        (found,) = take_inventory(planned, study)
+        assert found.state == state
 
 
 def test_a_key_that_came_later_has_its_default(study: Path, planned: list[PlannedRun]) -> None:

@@ -42,8 +42,8 @@ def print_scores(console: Console, found: Sequence[Found]) -> None:
     lengths = next((two for runs in cells.values() for two in runs if two is not None), None)
     if lengths is None:
         return
-    table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("method")
+    table = Table(box=box.SIMPLE_HEAD, padding=0)
+    table.add_column("method", no_wrap=True)
     table.add_column("runs", justify="right")
     for measured_at in lengths:
         table.add_column(f"{measured_at.episode_steps} steps", justify="right")

@@ -278,6 +278,16 @@ class RunConfig(Model):
     train: TrainConfig = Field(default_factory=TrainConfig, description="the run")
     evaluate: EvaluateConfig = Field(default_factory=EvaluateConfig, description="measuring")
 
+    def in_use(self) -> dict[str, dict[str, Any]]:
+        """The values that the run depends on, as JSON values by section and key.
+
+        Numbers of the other algorithm, and those of a warm start where there is none, are left out.
+        """
+        unused = {"td" if on_policy(self.train.method) else "ppo"}
+        if self.train.warm_start == "none":
+            unused.add("imitation")
+        return self.model_dump(mode="json", exclude=unused)
+
     @model_validator(mode="before")
     @classmethod
     def _follow_method(cls, data: Any) -> Any:

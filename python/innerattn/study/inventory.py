@@ -88,8 +88,9 @@ def differences(config: RunConfig, planned: RunConfig) -> list[str]:
     """Where ``config`` differs from what is planned: key, its value and the planned one.
 
     What counts is the values, not what a file spells out: a key that came later has its default.
+    Numbers that the planned run does not look at do not count.
     """
-    values, wanted = _flat(config.model_dump()), _flat(planned.model_dump())
+    values, wanted = _flat(config.model_dump(mode="json")), _flat(planned.in_use())
     return [
         f"{key} = {_short(values[key])}, planned {_short(value)}"
         for key, value in wanted.items()

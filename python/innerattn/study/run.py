@@ -104,7 +104,7 @@ def read_configs(runs: Sequence[StudyRun]) -> list[RunConfig]:
                     f"{run.folder}: train.{name} = {getattr(config.train, name)!r}, "
                     f"but it is listed as {label!r}"
                 )
-        what = config.model_dump(mode="json")
+        what = config.in_use()
         for free in ("seed", "threads", "device", "compile", "log_every_env_steps"):
             what["train"].pop(free)
         other, known = seen.setdefault((run.situation, run.method), (run.folder, what))
