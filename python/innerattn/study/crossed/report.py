@@ -63,7 +63,7 @@ class Situation:
 
     def outcomes(self) -> dict[Arm, list[Outcome]]:
         """Figures of the runs by arm; arms without runs are there, empty."""
-        return {arm: [run.outcome for run in self.runs if run.arm == arm] for arm in ARMS}
+        return _by_arm(self.runs)
 
 
 def write_crossed(
@@ -115,10 +115,13 @@ def _situation(name: str, runs: Sequence[FinishedRun]) -> Situation:
     order = {arm: index for index, arm in enumerate(ARMS)}
     own.sort(key=lambda run: (order[arm_of(run.case)], run.case.seed))
     found = tuple(_run(run) for run in own)
-    situation = Situation(name, found, (), ())
-    compared = tuple(effects(name, situation.outcomes()))
-    said = tuple(answers(name, situation.outcomes(), compared))
-    return Situation(name, found, compared, said)
+    outcomes = _by_arm(found)
+    compared = tuple(effects(name, outcomes))
+    return Situation(name, found, compared, tuple(answers(name, outcomes, compared)))
+
+
+def _by_arm(runs: Sequence[CrossedRun]) -> dict[Arm, list[Outcome]]:
+    return {arm: [run.outcome for run in runs if run.arm == arm] for arm in ARMS}
 
 
 def _run(run: FinishedRun) -> CrossedRun:
