@@ -10,7 +10,7 @@ import pytest
 
 from innerattn.errors import RunError
 from innerattn.study.report import write_report
-from innerattn.study.run import StudyRun
+from innerattn.study.run import StudyRun, read_configs
 from innerattn.train.weights import digest_of
 
 FIGURES = ("fig4", "fig5", "fig5_evidence")
@@ -83,6 +83,23 @@ def test_parts_can_be_asked_for_alone(runs: list[StudyRun], tmp_path: Path) -> N
     assert findings.evidence is None
     with pytest.raises(ValueError, match=r"parts = \['fig6'\]: known are table2, fig4, fig5"):
         write_report(runs, tmp_path, "short", ("fig6",))
+
+
+def test_runs_with_and_without_a_warm_start_are_not_one_method(
+    runs: list[StudyRun], tmp_path: Path
+) -> None:
+    warm = tmp_path / "warm"
+    shutil.copytree(runs[0].folder, warm)
+    config = warm / "config.toml"
+    text = config.read_text()
+    assert 'warm_start = "none"' in text
+    config.write_text(text.replace('warm_start = "none"', 'warm_start = "greedy"'))
+    for pair in (
+        [replace(runs[0], folder=warm), runs[1]],
+        [runs[1], replace(runs[0], folder=warm)],
+    ):
+        with pytest.raises(RunError, match=r"listed as the same but for the seed.*train"):
+            read_configs(pair)
 
 
 def test_nothing_is_written_where_a_run_is_missing(runs: list[StudyRun], tmp_path: Path) -> None:

@@ -108,7 +108,7 @@ def read_configs(runs: Sequence[StudyRun]) -> list[RunConfig]:
         for free in ("seed", "threads", "device", "compile", "log_every_env_steps"):
             what["train"].pop(free)
         other, known = seen.setdefault((run.situation, run.method), (run.folder, what))
-        if differing := [name for name in what if what[name] != known[name]]:
+        if differing := [name for name in what if what[name] != known.get(name)]:
             raise RunError(
                 f"{run.folder} and {other}: are listed as the same but for the seed, and differ "
                 f"in {', '.join(differing)}"
