@@ -69,8 +69,8 @@ def main() -> None:
         listed = ", ".join(map(str, seeds))
         head = [f"{budget}, seeds {listed}", "rescues, 25 steps"]
         head += ["score, 25 steps", "score, 100 steps"]
-        section = f"learning_{budget}" if given.warm_start == "none" else "warm_start"
-        publish(section, table(head, rows), LEARNING)
+        start = "learning" if given.warm_start == "none" else "warm_start"
+        publish(f"{start}_{budget}", table(head, rows), LEARNING)
 
 
 if __name__ == "__main__":
