@@ -1,7 +1,8 @@
 """What methods learn: trains every missing run, one core each, and tabulates scores over seeds.
 
-`python benches/learning.py RUNS` fills a place in `docs/learning.md` for each budget, and another
-when given `--warm-start hungarian`. A second call goes on where the first stopped.
+`python benches/learning.py RUNS` fills a place in `docs/learning.md` for each budget, and others
+when given `--warm-start hungarian` or `--encoder entities`. A second call goes on where the first
+stopped.
 """
 
 from __future__ import annotations
@@ -47,16 +48,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("runs", type=Path, help="folder of the runs")
     parser.add_argument("--warm-start", default="none", choices=["none", "hungarian", "greedy"])
+    parser.add_argument("--encoder", default="flat", choices=["flat", "entities"])
+    parser.add_argument("--presets", nargs="+", default=list(PRESETS), choices=PRESETS)
     parser.add_argument("--budgets", nargs="+", default=list(METHODS), choices=list(METHODS))
     parser.add_argument("--methods", nargs="+", help="others than a budget has by default")
     parser.add_argument("--seeds", nargs="+", type=int, help="others than a budget has by default")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     given = parser.parse_args()
+    options = () if given.encoder == "flat" else ("--network.encoder", given.encoder)
     for budget in given.budgets:
-        cases = list(product(given.methods or METHODS[budget], PRESETS))
+        cases = list(product(given.methods or METHODS[budget], given.presets))
         seeds = given.seeds or SEEDS[budget]
         wanted = [
-            Run(preset, method, budget, seed, given.warm_start)
+            Run(preset, method, budget, seed, given.warm_start, options)
             for method, preset in cases
             for seed in seeds
         ]
@@ -70,7 +74,8 @@ def main() -> None:
         head = [f"{budget}, seeds {listed}", "rescues, 25 steps"]
         head += ["score, 25 steps", "score, 100 steps"]
         start = "learning" if given.warm_start == "none" else "warm_start"
-        publish(f"{start}_{budget}", table(head, rows), LEARNING)
+        end = "" if given.encoder == "flat" else f"_{given.encoder}"
+        publish(f"{start}_{budget}{end}", table(head, rows), LEARNING)
 
 
 if __name__ == "__main__":
