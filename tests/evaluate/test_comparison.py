@@ -9,10 +9,11 @@ from scipy.stats import nct, permutation_test, ttest_ind
 from scipy.stats import t as t_distribution
 from statsmodels.regression.linear_model import OLS
 from statsmodels.stats.meta_analysis import effectsize_smd
+from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.weightstats import ttost_ind
 
 from innerattn.evaluate import comparison
-from innerattn.evaluate.comparison import Comparison, compare, contrast
+from innerattn.evaluate.comparison import Comparison, compare, contrast, holm
 
 
 def groups(seed: int, n: int = 5, m: int = 7) -> tuple[np.ndarray, np.ndarray]:
@@ -46,6 +47,14 @@ def test_equivalence_against_statsmodels(seed: int, margin: float) -> None:
     assert found.equivalence_p == pytest.approx(p)
     ends = ttest_ind(x, y, equal_var=False).confidence_interval(0.9)
     assert found.equivalent == (-margin < ends.low and ends.high < margin) == (p < 0.05)
+
+
+@pytest.mark.parametrize("count", [1, 2, 12])
+def test_adjusted_p_values_against_statsmodels(count: int) -> None:
+    p_values = np.random.default_rng(count).uniform(size=count).round(1) / 2.0  # ties
+    expected = multipletests(p_values, method="holm")[1]
+    assert holm(p_values.tolist()) == pytest.approx(expected.tolist())
+    assert holm([]) == []
 
 
 @pytest.mark.parametrize(("n", "m"), [(3, 3), (2, 5), (5, 6)])

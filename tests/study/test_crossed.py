@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from made_run import made_run
 from scipy.stats import ttest_ind
+from statsmodels.stats.multitest import multipletests
 
 from innerattn.errors import RunError
 from innerattn.study.crossed.arms import ARMS, Arm, arm_of, plan_crossed
@@ -107,6 +108,15 @@ def test_effects_against_plain_means(figure: str) -> None:
     one = found["inner at penalty 0.0001 - uniform, team"]
     assert one is not None
     assert one.p == pytest.approx(ttest_ind(*pair, equal_var=False).pvalue)
+
+
+def test_p_values_are_adjusted_among_all_of_their_kind() -> None:
+    for main in (True, False):
+        kind = [one for one in effects("mixed", random_outcomes(5)) if one.main == main]
+        p_values = [one.found.p for one in kind if one.found]
+        assert len(p_values) == len(kind) == 3 * sum(m == main for _, m, _ in contrasts())
+        expected = multipletests(p_values, method="holm")[1]
+        assert [one.holm_p for one in kind] == pytest.approx(list(expected))
 
 
 def test_effects_need_two_runs_of_each_arm() -> None:

@@ -44,7 +44,7 @@ def test_the_report_opens_with_claims_and_ends_with_the_runs(
     text = (folder / "report.md").read_text()
     assert "**This is a smoke run.**" in text
     assert text.index("| claim |") < text.index("## Table II") < text.index("## Fig. 4")
-    mixed, others = text.split("### The same in the other situations")
+    mixed, others = text.split("## The same in the other situations")
     assert "| even sharing with inner attention | mixed | td-inner |" in mixed
     assert "| even sharing with inner attention | single | ppo-inner |" in others
     for run in runs:

@@ -94,9 +94,9 @@ def _claims(findings: Findings) -> str:
     others = [claim for claim in claims if claim.situation != PRINTED_SITUATION]
     parts = [_claim_table(assumed) if assumed else f"There is no {PRINTED_SITUATION} run.\n"]
     parts += ["Runs of a task are counted as even / uneven / undecided by themselves.\n"]
-    parts += ["### How it is decided\n", RULES]
     if others:
-        parts += ["### The same in the other situations\n", _claim_table(others)]
+        parts += ["## The same in the other situations\n", _claim_table(others)]
+    parts += ["## How it is decided\n", RULES]
     return "\n".join(parts)
 
 

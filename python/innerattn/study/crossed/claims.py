@@ -24,7 +24,9 @@ RULES = f"""\
 Intervals are 95 %, the run is the unit: Student's of one mean, Welch's and Satterthwaite's of
 differences, Wilson's of numbers of runs. Two means count as alike where two one-sided tests show
 them to be within the margin ({MARGINS["unevenness"]:g} of unevenness, {MARGINS["score"]:g} of the
-score, {MARGINS["entropy_share"]:g} of the entropy's share).
+score, {MARGINS["entropy_share"]:g} of the entropy's share). The rules go by intervals of single
+effects; beside each p-value of an effect stands Holm's, adjusted for all main effects of the
+situation on all figures, or for all its other effects.
 
 - **Attention makes sharing even; attention rescues more**: yes where the interval of inner minus
   uniform, over credits and penalties, lies on that side of 0; no where it lies on the other, or

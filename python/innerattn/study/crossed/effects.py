@@ -7,9 +7,9 @@ penalty, so that one arm stands against those with learnt attention at every pen
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from innerattn.evaluate.comparison import Contrast, contrast
+from innerattn.evaluate.comparison import Contrast, contrast, holm
 from innerattn.study.crossed.arms import ARMS, CREDITS, PENALTIES, Arm, Credit
 from innerattn.study.crossed.outcome import Outcome
 
@@ -30,6 +30,8 @@ class Effect:
         main: it is an average over the other factors, or an interaction; else within one level.
         runs: how many the compared arms have.
         found: None where an arm has less than two runs with the figure, or none has any scatter.
+        holm_p: its p-value, adjusted for all that is asked at once in its situation: the main
+            effects on all figures together, and likewise all the others.
     """
 
     situation: str
@@ -38,6 +40,7 @@ class Effect:
     main: bool
     runs: int
     found: Contrast | None
+    holm_p: float | None = None
 
 
 def contrasts() -> list[tuple[str, bool, Weights]]:
@@ -94,7 +97,14 @@ def effects(situation: str, outcomes: Mapping[Arm, Sequence[Outcome]]) -> list[E
             compared = contrast(groups, list(weights.values()), margin) if enough else None
             runs = sum(len(group) for group in groups)
             found.append(Effect(situation, figure, name, main, runs, compared))
-    return found
+    return _adjusted(found, main=True) + _adjusted(found, main=False)
+
+
+def _adjusted(asked: Sequence[Effect], main: bool) -> list[Effect]:
+    """The effects of one kind, with their p-values adjusted for each other."""
+    kind = [one for one in asked if one.main == main]
+    adjusted = iter(holm([one.found.p for one in kind if one.found is not None]))
+    return [replace(one, holm_p=next(adjusted)) if one.found else one for one in kind]
 
 
 def _attention(credit: Credit) -> Weights:

@@ -180,20 +180,24 @@ def _arms_table(situation: Situation) -> str:
 
 
 def _effects_table(situation: Situation) -> str:
-    head = ["effect", "on", "runs", "difference [95 %]", "Hedges g [95 %]", "p", "alike within"]
+    head = ["effect", "on", "runs", "difference [95 %]", "Hedges g [95 %]", "p", "p (Holm)"]
+    head += ["alike within"]
     rows = []
-    for effect in sorted(situation.effects, key=lambda effect: not effect.main):
+    for effect in situation.effects:
         found = effect.found
         name = f"**{effect.name}**" if effect.main else effect.name
         cells = [name, effect.figure.replace("_", " "), str(effect.runs)]
-        if found is None:
-            rows.append([*cells, NONE, NONE, NONE, NONE])
+        if found is None or effect.holm_p is None:
+            rows.append([*cells, *[NONE] * 5])
             continue
         alike = f"{found.margin:g}: {'yes' if found.equivalent else 'not shown'}"
-        p = "< 0.001" if found.p < 0.001 else f"{found.p:.3f}"
-        cells += [shown(found.difference, 3), shown(found.hedges_g, 1), p, alike]
-        rows.append(cells)
+        cells += [shown(found.difference, 3), shown(found.hedges_g, 1)]
+        rows.append([*cells, _p(found.p), _p(effect.holm_p), alike])
     return markdown_table(head, rows)
+
+
+def _p(value: float) -> str:
+    return "< 0.001" if value < 0.001 else f"{value:.3f}"
 
 
 def _runs_table(situations: Sequence[Situation], out: Path) -> str:
