@@ -18,11 +18,25 @@ from typing import Any
 from page import LEARNING, publish, table
 from runs import Run, train_all
 
+from innerattn.evaluate.comparison import compare
 from innerattn.evaluate.statistics import student_interval
+from innerattn.study.table2_text import shown
 
 PRESETS = ("mixed", "double", "single")
 METHODS = {"quick": ["td-inner"], "short": ["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"]}
 SEEDS = {"quick": [0, 1, 2], "short": [0, 1, 2, 3, 4]}
+ALIKE = 0.05
+"""Scores that differ by less than this are taken for alike."""
+Found = dict[tuple[str, str], list[dict[str, Any]]]
+"""Summaries of the runs of each method and preset, one per seed."""
+
+
+def _score(run: dict[str, Any]) -> float:
+    return float(run["score"]["mean"])
+
+
+def _long_score(run: dict[str, Any]) -> float:
+    return float(run["long"]["score"]["mean"])
 
 
 def row(found: list[dict[str, Any]]) -> list[str]:
@@ -38,9 +52,33 @@ def row(found: list[dict[str, Any]]) -> list[str]:
 
     return [
         over_seeds([one["rescues_per_episode"]["mean"] for one in found]),
-        over_seeds([one["score"]["mean"] for one in found]),
-        over_seeds([one["long"]["score"]["mean"] for one in found]),
+        over_seeds([_score(one) for one in found]),
+        over_seeds([_long_score(one) for one in found]),
     ]
+
+
+def attention_table(found: Found) -> str:
+    """Scores with learnt attention minus those with uniform weights, where both were trained."""
+    head = ["learnt - uniform attention"]
+    for length in (25, 100):
+        head += [f"score, {length} steps [95 %]", f"alike within {ALIKE}?"]
+    rows = []
+    for (method, preset), learnt in found.items():
+        uniform = found.get((method.replace("-inner", "-uniform"), preset))
+        if not method.endswith("-inner") or uniform is None or len(learnt) < 2:
+            continue
+        cells = []
+        for score in (_score, _long_score):
+            compared = compare(
+                [score(run) for run in learnt], [score(run) for run in uniform], ALIKE, seed=0
+            )
+            if compared is None:
+                cells += ["–", "–"]
+                continue
+            alike = "yes" if compared.equivalent else "not shown"
+            cells += [shown(compared.difference), alike]
+        rows.append([f"{method.removesuffix('-inner')}, {preset}", *cells])
+    return table(head, rows) if rows else ""
 
 
 def main() -> None:
@@ -65,17 +103,18 @@ def main() -> None:
             for seed in seeds
         ]
         folders = iter(train_all(wanted, given.runs, given.workers))
-        rows = []
-        for method, preset in cases:
+        found: Found = {}
+        for case in cases:
             records = [next(folders) / "evaluation" / "summary.json" for _ in seeds]
-            found = [json.loads(record.read_text()) for record in records]
-            rows.append([f"{method}, {preset}", *row(found)])
+            found[case] = [json.loads(record.read_text()) for record in records]
+        rows = [[f"{method}, {preset}", *row(found[method, preset])] for method, preset in cases]
         listed = ", ".join(map(str, seeds))
         head = [f"{budget}, seeds {listed}", "rescues, 25 steps"]
         head += ["score, 25 steps", "score, 100 steps"]
         start = "learning" if given.warm_start == "none" else "warm_start"
         end = "" if given.encoder == "flat" else f"_{given.encoder}"
-        publish(f"{start}_{budget}{end}", table(head, rows), LEARNING)
+        tables = [table(head, rows), attention_table(found)]
+        publish(f"{start}_{budget}{end}", "\n\n".join(filter(None, tables)), LEARNING)
 
 
 if __name__ == "__main__":
