@@ -8,7 +8,7 @@ import numpy as np
 
 from innerattn.evaluate.comparison import compare
 from innerattn.evaluate.sharing.evenness import MARGIN, Verdict
-from innerattn.evaluate.sharing.printed import TEXT
+from innerattn.evaluate.sharing.printed import TEXT, PrintedRow
 from innerattn.study.claims import Claim, Holds
 from innerattn.study.table2 import Row, Table2
 from innerattn.study.table2_text import NONE, share_shown, shown, verdicts_shown
@@ -31,7 +31,7 @@ def sharing_claims(table: Table2) -> list[Claim]:
                 claim="even sharing with inner attention" if inner else "uneven sharing without",
                 situation=situation,
                 method=method,
-                printed="; ".join(_printed_share(row) for row in own),
+                printed="; ".join(filter(None, map(_printed_share, own))) or NONE,
                 measured="; ".join(_measured_share(row) for row in own),
                 runs=len(own[0].seeds),
                 holds=_all_or_one(verdicts, wanted, other),
@@ -62,7 +62,7 @@ def _all_or_one(verdicts: Sequence[Verdict], wanted: str, other: str) -> Holds:
 
 def _printed_share(row: Row) -> str:
     if row.printed is None:
-        return f"{row.task}: {NONE}"
+        return ""
     first, second = row.printed.row.shares
     stated = TEXT.get((row.method, row.task))
     text = f" (text: {stated[0]:.2f} / {stated[1]:.2f})" if stated else ""
@@ -94,22 +94,23 @@ def _contrast(inner: Sequence[Row], uniform: Sequence[Row]) -> Claim:
         elif found.difference.high < 0.0 or found.equivalent:
             holds = "no"
     printed = "; ".join(
-        f"{row.task}: {_distance(row)} with, {_distance(other)} without"
+        f"{row.task}: {_distance(row.printed.row)} with, {_distance(other.printed.row)} without"
         for row, other in zip(inner, uniform, strict=True)
+        if row.printed and other.printed
     )
     return Claim(
         claim="more even with inner attention than without",
         situation=inner[0].situation,
         method=f"{inner[0].method}, {uniform[0].method}",
-        printed=printed,
+        printed=printed or NONE,
         measured=measured,
         runs=min(len(with_), len(without)),
         holds=holds,
     )
 
 
-def _distance(row: Row) -> str:
-    return f"{abs(row.printed.row.shares[0] - 0.5):.2f}" if row.printed else NONE
+def _distance(printed: PrintedRow) -> str:
+    return f"{abs(printed.shares[0] - 0.5):.2f}"
 
 
 def _mean(values: Sequence[float]) -> str:
