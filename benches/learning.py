@@ -15,7 +15,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from page import LEARNING, publish, table
+from page import LEARNING, publish, require, table
 from runs import Run, train_all
 
 from innerattn.evaluate.comparison import compare
@@ -94,7 +94,12 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     given = parser.parse_args()
     options = () if given.encoder == "flat" else ("--network.encoder", given.encoder)
-    for budget in given.budgets:
+    start = "learning" if given.warm_start == "none" else "warm_start"
+    end = "" if given.encoder == "flat" else f"_{given.encoder}"
+    places = {budget: f"{start}_{budget}{end}" for budget in given.budgets}
+    for place in places.values():
+        require(place, LEARNING)  # before hours of training, not after
+    for budget, place in places.items():
         cases = list(product(given.methods or METHODS[budget], given.presets))
         seeds = given.seeds or SEEDS[budget]
         wanted = [
@@ -111,10 +116,8 @@ def main() -> None:
         listed = ", ".join(map(str, seeds))
         head = [f"{budget}, seeds {listed}", "rescues, 25 steps"]
         head += ["score, 25 steps", "score, 100 steps"]
-        start = "learning" if given.warm_start == "none" else "warm_start"
-        end = "" if given.encoder == "flat" else f"_{given.encoder}"
         tables = [table(head, rows), attention_table(found)]
-        publish(f"{start}_{budget}{end}", "\n\n".join(filter(None, tables)), LEARNING)
+        publish(place, "\n\n".join(filter(None, tables)), LEARNING)
 
 
 if __name__ == "__main__":

@@ -48,6 +48,20 @@ def machine(*packages: str) -> str:
     return f"{processor}, {cores} cores, Python {python}, {versions}, {date.today()}"
 
 
+def require(section: str, page: Path = PERFORMANCE) -> tuple[str, str]:
+    """The text before and after what stands in a section of the page, with its marks.
+
+    Raises:
+        SystemExit: the page has no such section.
+    """
+    begin, end = f"<!-- {section}: begin -->\n", f"<!-- {section}: end -->"
+    before, found, rest = page.read_text().partition(begin)
+    _, found_end, after = rest.partition(end)
+    if not found or not found_end:
+        sys.exit(f"{page}: no marks {begin.strip()} and {end}")
+    return before + begin, end + after
+
+
 def publish(section: str, text: str, page: Path = PERFORMANCE) -> None:
     """Print text and put it between the marks of its section of the page.
 
@@ -55,11 +69,7 @@ def publish(section: str, text: str, page: Path = PERFORMANCE) -> None:
         SystemExit: the page has no such section.
     """
     print(text, flush=True)
-    begin, end = f"<!-- {section}: begin -->\n", f"<!-- {section}: end -->"
-    old = page.read_text()
-    if begin not in old or end not in old:
-        sys.exit(f"{page}: no marks {begin.strip()} and {end}")
-    before, rest = old.split(begin, 1)
+    before, after = require(section, page)
     new = page.with_suffix(".new")
-    new.write_text(before + begin + "\n" + text + "\n\n" + end + rest.split(end, 1)[1])
+    new.write_text(f"{before}\n{text}\n\n{after}")
     new.replace(page)
