@@ -1,8 +1,8 @@
 """What methods learn: trains every missing run, one core each, and tabulates scores over seeds.
 
-`python benches/learning.py RUNS` fills a place in `docs/learning.md` for each budget, and others
-when given `--warm-start hungarian` or `--encoder entities`. A second call goes on where the first
-stopped.
+`python benches/learning.py RUNS` fills a place in `docs/learning.md` for each budget and draws its
+learning curves, and others when given `--warm-start hungarian` or `--encoder entities`. A second
+call goes on where the first stopped.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from learning_figure import draw_curves
 from page import LEARNING, publish, require, table
 from runs import Run, train_all
 
 from innerattn.evaluate.comparison import compare
 from innerattn.evaluate.statistics import student_interval
+from innerattn.report.drawing import write_figure
 from innerattn.study.table2_text import shown
 
 PRESETS = ("mixed", "double", "single")
@@ -29,6 +31,11 @@ ALIKE = 0.05
 """Scores that differ by less than this are taken for alike."""
 Found = dict[tuple[str, str], list[dict[str, Any]]]
 """Summaries of the runs of each method and preset, one per seed."""
+
+
+def _summary(run: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((run / "evaluation" / "summary.json").read_text())
+    return found
 
 
 def _score(run: dict[str, Any]) -> float:
@@ -107,17 +114,16 @@ def main() -> None:
             for method, preset in cases
             for seed in seeds
         ]
-        folders = iter(train_all(wanted, given.runs, given.workers))
-        found: Found = {}
-        for case in cases:
-            records = [next(folders) / "evaluation" / "summary.json" for _ in seeds]
-            found[case] = [json.loads(record.read_text()) for record in records]
+        trained = iter(train_all(wanted, given.runs, given.workers))
+        folders = {case: [next(trained) for _ in seeds] for case in cases}
+        found: Found = {case: [_summary(run) for run in runs] for case, runs in folders.items()}
         rows = [[f"{method}, {preset}", *row(found[method, preset])] for method, preset in cases]
         listed = ", ".join(map(str, seeds))
         head = [f"{budget}, seeds {listed}", "rescues, 25 steps"]
         head += ["score, 25 steps", "score, 100 steps"]
         tables = [table(head, rows), attention_table(found)]
         publish(place, "\n\n".join(filter(None, tables)), LEARNING)
+        write_figure(LEARNING.parent / "images" / f"{place}.png", draw_curves(folders))
 
 
 if __name__ == "__main__":
