@@ -11,7 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from innerattn.report.drawing import BLACK, BLUE, GREEN, ORANGE, PAGE_WIDTH_IN, PURPLE, SKY
+from innerattn.report.drawing import (
+    BLACK,
+    BLUE,
+    COLUMN_WIDTH_IN,
+    GREEN,
+    ORANGE,
+    PAGE_WIDTH_IN,
+    PURPLE,
+    SKY,
+)
 from innerattn.study.over_runs import band
 
 PARTS = 40
@@ -29,7 +38,8 @@ def draw_curves(folders: Mapping[tuple[str, str], Sequence[Path]]) -> Figure:
     """
     methods = list(dict.fromkeys(method for method, _ in folders))
     presets = list(dict.fromkeys(preset for _, preset in folders))
-    figure = Figure(figsize=(PAGE_WIDTH_IN, 2.9), layout="constrained")
+    width = PAGE_WIDTH_IN if len(presets) > 1 else COLUMN_WIDTH_IN
+    figure = Figure(figsize=(width, 2.9), layout="constrained")
     panels = figure.subplots(1, len(presets), squeeze=False)[0]
     for panel, preset in zip(panels, presets, strict=True):
         for method, (colour, style) in zip(methods, STYLES, strict=False):
