@@ -199,6 +199,7 @@ CONFIGS = st.builds(
         hidden_width=st.sampled_from([4, 64]),
         mask_unavailable=st.booleans(),
         encoder=st.sampled_from(["flat", "entities"]),
+        parameter_sharing=st.sampled_from(["none", "kind"]),
     ),
     td=st.builds(
         TDConfig,

@@ -76,6 +76,7 @@ def test_only_mappo_goes_without_attention(method: str) -> None:
         ("network", "hidden_width", 0),
         ("network", "attention_heads", 0),
         ("network", "encoder", "rows"),
+        ("network", "parameter_sharing", "all"),
         ("td", "gamma", 1.5),
         ("td", "gamma", float("nan")),
         ("td", "polyak", 0.0),

@@ -34,6 +34,7 @@ def make(algorithm: str, robots: int, network: dict, numbers: dict) -> ActorCrit
         "dtype": torch.float64,
         "availability_column": AVAILABLE,
         "entities": columns(robots),
+        "kinds": ["one", *["another"] * (robots - 1)],
     }
     if algorithm == "td":
         few = {"batch_size": 7, "warmup_env_steps": 0, "update_every_env_steps": 12}
@@ -105,11 +106,20 @@ def test_the_traced_update_agrees_by_entities() -> None:
     agree("ppo", 4, "aot_eager", ENTITIES, {})
 
 
+def test_the_traced_update_agrees_by_kind() -> None:
+    agree("td", 4, "aot_eager", {"attention": "inner", "parameter_sharing": "kind"}, {})
+
+
 @pytest.mark.parametrize("algorithm", ["td", "ppo"])
 def test_the_compiled_update_agrees(algorithm: str) -> None:
     agree(algorithm, 4, "inductor", {"attention": "inner"}, {})
 
 
 @pytest.mark.slow
-def test_the_compiled_update_agrees_by_entities() -> None:
-    agree("td", 4, "inductor", ENTITIES, {})
+@pytest.mark.parametrize(
+    "network",
+    [ENTITIES, {"attention": "inner", "parameter_sharing": "kind"}],
+    ids=["entities", "kind"],
+)
+def test_the_compiled_update_agrees_with_other_networks(network: dict) -> None:
+    agree("td", 4, "inductor", network, {})

@@ -146,6 +146,13 @@ def test_masking_needs_a_column_of_the_observation(column: int | None) -> None:
         make(3, {"mask_unavailable": True}, availability_column=column)
 
 
+@pytest.mark.parametrize("kinds", [None, ["food", "food"]])
+def test_sharing_by_kind_needs_the_kinds_of_the_team(kinds: list[str] | None) -> None:
+    network, team = NetworkConfig(parameter_sharing="kind"), Team(3, 4, 5)
+    with pytest.raises(ValueError, match=r"^kinds = .*'kind' needs those of 3 robots$"):
+        TD(team, network, TDConfig(), seed=1, device=torch.device("cpu"), kinds=kinds)
+
+
 @pytest.mark.parametrize("attention", ["inner", "uniform"])
 @pytest.mark.parametrize("robots", [1, 2, 4])
 def test_attention_weights_agree_with_the_plain_form(robots: int, attention: str) -> None:

@@ -181,13 +181,34 @@ def test_damaged_weights_are_refused(run: Path) -> None:
     assert "altered" in refusal(run)
 
 
-def test_a_folder_from_before_encoders_were_a_choice_is_read(
-    small_config: Configure, run: Path
+@pytest.mark.parametrize("line", ['encoder = "flat"\n', 'parameter_sharing = "none"\n'])
+def test_a_folder_from_before_networks_were_a_choice_is_read(
+    small_config: Configure, run: Path, line: str
 ) -> None:
     text = (run / "config.toml").read_text()
-    assert text.count('encoder = "flat"\n') == 1
-    (run / "config.toml").write_text(text.replace('encoder = "flat"\n', ""))
+    assert text.count(line) == 1
+    (run / "config.toml").write_text(text.replace(line, ""))
     assert load_policy(run)[0] == small_config()
+
+
+@pytest.mark.parametrize("method", ["td-inner", "mappo"])
+def test_robots_of_a_kind_share_what_comes_back(
+    small_config: Configure, tmp_path: Path, method: str
+) -> None:
+    config = small_config(**{"network.parameter_sharing": "kind", "train.method": method})
+    run = train(config, tmp_path / "run")
+    found, learner = load_policy(run)
+    assert found == config
+    assert [robot.kind for robot in config.scenario.robots][:2] == ["food", "food"]
+    obs = torch.rand(5, 1, learner.actor.first.weight.shape[2]).expand(-1, 4, -1)
+    actions = learner.act(obs, greedy=True)
+    assert torch.equal(actions[:, 0], actions[:, 1])
+    assert learner.state()["actor.output.parametrizations.bias.original"].shape[0] == 3
+    hidden = [name for name in learner.state() if name.startswith("critic.hidden.")]
+    assert len(hidden) == (2 if method == "td-inner" else 0)
+    text = (run / "config.toml").read_text()
+    (run / "config.toml").write_text(text.replace('sharing = "kind"', 'sharing = "none"'))
+    assert "weights.safetensors" in refusal(run)
 
 
 @pytest.mark.parametrize("method", ["td-inner", "ppo-inner"])

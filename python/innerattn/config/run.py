@@ -51,7 +51,7 @@ def on_policy(method: object) -> bool:
 
 
 class NetworkConfig(Model):
-    """Sizes and kind of the networks; every robot has networks of its own."""
+    """Sizes and kind of the networks."""
 
     place: ClassVar[str] = "network"
 
@@ -68,6 +68,11 @@ class NetworkConfig(Model):
         "flat",
         description="first layer of actors and critic: of whole observations, or of teammates and "
         "victims apart, whatever their order; mappo needs the former",
+    )
+    parameter_sharing: Literal["none", "kind"] = Field(
+        "none",
+        description="none: actors, encoders and critics are each robot's own; kind: robots of a "
+        "kind have the same, but for a critic without attention",
     )
     precision: Literal["float32", "bfloat16"] = Field(
         "float32", description="of the products in an update; weights are float32 in any case"

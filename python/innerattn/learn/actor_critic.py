@@ -6,7 +6,7 @@ It acts, reports attention, saves and loads; when and how to update is each lear
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -54,6 +54,7 @@ class ActorCritic:
         availability_column: int | None = None,
         critic_outputs: int | None = None,
         entities: EntityColumns | None = None,
+        kinds: Sequence[str] | None = None,
     ) -> None:
         """Build networks and optimisers.
 
@@ -70,10 +71,11 @@ class ActorCritic:
                 (above 0.5); needed only where `network.mask_unavailable` is set.
             critic_outputs: Values that the critic gives for each robot; None: one for each action.
             entities: As in `draw_networks`.
+            kinds: As in `draw_networks`.
 
         Raises:
-            ValueError: `network.mask_unavailable` is set without a column of the observation, or
-                `network.encoder` is "entities" without columns that are those of the observation.
+            ValueError: `network.mask_unavailable` is set without a column of the observation, or as
+                in `draw_networks`.
         """
         if network.mask_unavailable and availability_column not in range(team.obs_width):
             raise ValueError(
@@ -91,7 +93,7 @@ class ActorCritic:
         self._noise = torch.Generator(device).manual_seed(noise_seed)
         # Drawn on the CPU in float32 and then moved: a seed gives the same weights everywhere.
         weights = torch.Generator().manual_seed(weights_seed)
-        actor, critic = draw_networks(team, network, weights, critic_outputs, entities)
+        actor, critic = draw_networks(team, network, weights, critic_outputs, entities, kinds)
         self.actor, self.critic = actor.to(device, dtype), critic.to(device, dtype)
         self.actor_frozen = False
         self._actor_descent = Descent(self.actor, learning_rate, weight_decay=0.0)

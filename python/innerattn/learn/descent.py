@@ -154,10 +154,10 @@ def clip_whole(gradients: dict[str, Tensor], limit: float) -> Tensor:
 def clip_each_robot(gradients: dict[str, Tensor], limit: float) -> Tensor:
     """Scale each robot's gradient down to a norm of at most ``limit``, in place.
 
-    Every gradient has robots first, (R, ...).
+    Every gradient has robots first, (R, ...), or kinds where robots of a kind share parameters.
 
     Returns:
-        (R,) the norms before clipping.
+        (R,) the norms before clipping, or of each kind.
     """
     per_robot = [
         torch.linalg.vector_norm(gradient.flatten(1), dim=1) for gradient in gradients.values()

@@ -6,6 +6,7 @@ Sources: Schulman et al. 2017; the baseline of Iqbal & Sha 2019, section 3.3.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
@@ -55,6 +56,7 @@ class PPO(ActorCritic):
         dtype: torch.dtype = torch.float32,
         availability_column: int | None = None,
         entities: EntityColumns | None = None,
+        kinds: Sequence[str] | None = None,
     ) -> None:
         """Build networks and optimisers; arguments as in `ActorCritic`, numbers in ``ppo``.
 
@@ -72,6 +74,7 @@ class PPO(ActorCritic):
             dtype=dtype,
             availability_column=availability_column,
             entities=entities,
+            kinds=kinds,
             critic_outputs=None if ppo.advantage == "counterfactual" else 1,
         )
         self._config = ppo

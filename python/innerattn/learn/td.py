@@ -7,6 +7,7 @@ the paper and Iqbal & Sha 2019, sections 3.1-3.3 ("MAAC").
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
 import torch
 from torch import Tensor, nn
@@ -54,6 +55,7 @@ class TD(ActorCritic):
         dtype: torch.dtype = torch.float32,
         availability_column: int | None = None,
         entities: EntityColumns | None = None,
+        kinds: Sequence[str] | None = None,
     ) -> None:
         """Build networks, optimisers and replay.
 
@@ -66,6 +68,7 @@ class TD(ActorCritic):
             dtype: Floating-point type of the networks.
             availability_column: As in `ActorCritic`.
             entities: As in `ActorCritic`.
+            kinds: As in `ActorCritic`.
 
         Raises:
             ValueError: As in `ActorCritic`.
@@ -81,6 +84,7 @@ class TD(ActorCritic):
             dtype=dtype,
             availability_column=availability_column,
             entities=entities,
+            kinds=kinds,
         )
         self._config = td
         self._step = self._update_all

@@ -10,6 +10,7 @@ from innerattn.nn.critic import Critic, CriticOutput
 from innerattn.nn.encoder import EntityColumns, EntityEncoder
 from innerattn.nn.joint_critic import JointCritic
 from innerattn.nn.linear import PerRobotLinear
+from innerattn.nn.sharing import share_by_kind
 
 __all__ = [
     "Actor",
@@ -24,4 +25,5 @@ __all__ = [
     "UniformAttention",
     "action_noise",
     "sample_actions",
+    "share_by_kind",
 ]

@@ -14,7 +14,7 @@ from innerattn.nn.linear import PerRobotLinear
 
 
 class Actor(nn.Module):
-    """Policies of all robots, two hidden layers each; nothing is shared between robots."""
+    """Policies of all robots, two hidden layers each; every robot has its own parameters."""
 
     def __init__(
         self,

@@ -66,5 +66,6 @@ class PerRobotLinear(nn.Module):
         softmax over actions, say) then runs along whole rows of memory. The result has the
         parameters' type, also where products are less precise.
         """
-        outputs = torch.baddbmm(self.bias.unsqueeze(2), self.weight, x.transpose(1, 2))
-        return outputs.to(self.weight.dtype)
+        weight = self.weight
+        outputs = torch.baddbmm(self.bias.unsqueeze(2), weight, x.transpose(1, 2))
+        return outputs.to(weight.dtype)

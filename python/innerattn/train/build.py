@@ -36,6 +36,7 @@ def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
     names = env.observation_names()
     column = names.index("own.available")
     entities = entity_columns(names) if config.network.encoder == "entities" else None
+    kinds = [robot.kind for robot in config.scenario.robots]
     seed = config.train.seed
     if on_policy(config.train.method):
         return PPO(
@@ -46,6 +47,7 @@ def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
             device=device,
             availability_column=column,
             entities=entities,
+            kinds=kinds,
         )
     return TD(
         team,
@@ -55,6 +57,7 @@ def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
         device=device,
         availability_column=column,
         entities=entities,
+        kinds=kinds,
     )
 
 
