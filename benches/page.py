@@ -14,6 +14,7 @@ PERFORMANCE = Path(__file__).parents[1] / "docs" / "performance.md"
 LEARNING = PERFORMANCE.with_name("learning.md")
 ROBUSTNESS = PERFORMANCE.with_name("robustness.md")
 REPRODUCTION = PERFORMANCE.with_name("reproduction.md")
+CROSSED = PERFORMANCE.with_name("crossed.md")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -16,7 +16,7 @@ from innerattn.study.run import Digests, StudyRun, named_from
 from innerattn.study.scene import SCENE_RULE
 from innerattn.study.sharing_claims import sharing_claims
 from innerattn.study.table2 import PRINTED_SITUATION, Table2
-from innerattn.study.table2_text import NONE, markdown_table, shown, table2_markdown
+from innerattn.study.table2_text import NONE, markdown_table, p_shown, shown, table2_markdown
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ def _evidence_rows(part: Evidence) -> list[list[str]]:
     before, before_control = part.robot["before"], part.control["before"]
     rows = []
     for n, seed in enumerate(part.seeds):
-        p, control_p = (_p(role.p_by_run[n]) for role in (to_be, control))
+        p, control_p = (p_shown(role.p_by_run[n]) for role in (to_be, control))
         rows.append(
             [
                 *(part.situation, part.method, str(seed)),
@@ -206,7 +206,3 @@ def _seeds(seeds: Sequence[int]) -> str:
 
 def _signed(value: float | None) -> str:
     return NONE if value is None else f"{round(value, 2) + 0.0:+.2f}"
-
-
-def _p(value: float | None) -> str:
-    return NONE if value is None else f"{value:.4f}"

@@ -106,6 +106,13 @@ def fixed(value: float, decimals: int = 2) -> str:
     return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
+def p_shown(value: float | None) -> str:
+    """A p-value."""
+    if value is None:
+        return NONE
+    return "< 0.001" if value < 0.001 else fixed(value, 3)
+
+
 def share_shown(sharing: Sharing) -> str:
     """The share of the first robot in all runs; without an interval where it has none."""
     whole = sharing.all
@@ -177,10 +184,7 @@ def _competence_table(parts: Sequence[Competence]) -> str:
 
 
 def _chi_squared(found: ChiSquared | None) -> str:
-    if found is None:
-        return NONE
-    p = "p < 0.001" if found.p < 0.001 else f"p = {found.p:.3f}"
-    return f"{found.statistic:.2f} ({p})"
+    return NONE if found is None else f"{found.statistic:.2f} ({p_shown(found.p)})"
 
 
 def _listed(values: Sequence[int]) -> str:

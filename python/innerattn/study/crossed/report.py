@@ -21,7 +21,7 @@ from innerattn.study.inventory import FinishedRun
 from innerattn.study.over_runs import OverRuns, over_runs
 from innerattn.study.plan import smoke_note
 from innerattn.study.run import Digests, StudyRun, digests, named_from, read_measured
-from innerattn.study.table2_text import NONE, fixed, markdown_table, shown
+from innerattn.study.table2_text import NONE, fixed, markdown_table, p_shown, shown
 
 SCHEMA_VERSION = 1
 
@@ -192,12 +192,8 @@ def _effects_table(situation: Situation) -> str:
             continue
         alike = f"{found.margin:g}: {'yes' if found.equivalent else 'not shown'}"
         cells += [shown(found.difference, 3), shown(found.hedges_g, 1)]
-        rows.append([*cells, _p(found.p), _p(effect.holm_p), alike])
+        rows.append([*cells, p_shown(found.p), p_shown(effect.holm_p), alike])
     return markdown_table(head, rows)
-
-
-def _p(value: float) -> str:
-    return "< 0.001" if value < 0.001 else f"{value:.3f}"
 
 
 def _runs_table(situations: Sequence[Situation], out: Path) -> str:
