@@ -38,7 +38,7 @@ def planned(out: Path = OUT, seeds: range = range(2)) -> list[PlannedRun]:
 
 def test_all_combinations_are_planned_and_are_what_they_say() -> None:
     runs = planned()
-    assert len({one.folder for one in runs}) == len(runs) == 2 * 2 * 8
+    assert len({one.folder for one in runs}) == len(runs) == 2 * 2 * 9
     found = set()
     for one in runs:
         config, arm = one.config, arm_of(one.case)
@@ -48,8 +48,10 @@ def test_all_combinations_are_planned_and_are_what_they_say() -> None:
         assert config.scenario.rescue_credit == arm.credit
         if arm.penalty is not None:
             assert config.td.attention_logit_penalty == arm.penalty
+        assert config.network.parameter_sharing == ("kind" if arm.shared else "none")
         found.add((one.case.situation, one.case.seed, arm))
     assert found == set(product(("single", "mixed"), range(2), ARMS))
+    assert [arm for arm in ARMS if arm.shared] == [Arm("team", 0.0, shared=True)]
     inner = {(arm.credit, arm.penalty) for arm in ARMS if arm.method == "td-inner"}
     assert inner == set(product(("helpers", "team"), (0.0, 1e-4, 1e-3)))
     alone = plan_crossed(("td-uniform",), ("single",), (0,), "quick", OUT)
@@ -77,7 +79,9 @@ def test_effects_against_plain_means(figure: str) -> None:
     mean = {
         (arm.credit, arm.penalty): np.mean([getattr(run, figure) for run in runs])
         for arm, runs in outcomes.items()
+        if not arm.shared
     }
+    shared = np.mean([getattr(run, figure) for run in outcomes[Arm("team", 0.0, shared=True)]])
     found = {e.name: e.found for e in effects("mixed", outcomes) if e.figure == figure}
     inner = {c: np.mean([mean[c, p] for p in (0.0, 1e-4, 1e-3)]) for c in ("helpers", "team")}
     uniform = {c: mean[c, None] for c in inner}
@@ -97,6 +101,8 @@ def test_effects_against_plain_means(figure: str) -> None:
         "team - helpers, uniform": uniform["team"] - uniform["helpers"],
         "team - helpers, inner at penalty 0": mean["team", 0.0] - mean["helpers", 0.0],
         "penalty 0.0001 - 0, helpers": mean["helpers", 1e-4] - mean["helpers", 0.0],
+        "parameters shared by kind - each robot's own, team, inner at penalty 0": shared
+        - mean["team", 0.0],
     }
     for name, difference in expected.items():
         one = found[name]
@@ -143,6 +149,7 @@ def scattered(like: Outcome, seed: int, runs: int = 10) -> list[Outcome]:
 
 TEAM_IDLE = "the team's credit leaves a food robot idle with either attention"
 HELPERS_EVEN = "with the helpers' credit sharing is even with either attention"
+SHARED_EVEN = "robots of a kind with the same parameters share evenly under the team's credit, too"
 HELD = "a penalty of 0.001 holds attention even"
 
 
@@ -158,6 +165,7 @@ def test_what_was_expected_can_be_confirmed() -> None:
     assert found[TEAM_IDLE].holds == found[HELPERS_EVEN].holds == found[HELD].holds == "yes"
     assert found[TEAM_IDLE].measured.startswith("inner: 30 of 30 [0.89, 1.00]; uniform: 10 of 10 [")
     assert found["the team's credit makes sharing uneven"].holds == "yes"
+    assert found[SHARED_EVEN].holds == "no"
     # Both attentions do the same, so neither is to be credited with it.
     assert found["attention makes sharing even"].holds == "no"
     assert found["attention rescues more"].holds == "no"
@@ -174,6 +182,7 @@ def test_what_was_expected_can_be_refuted() -> None:
     assert found[TEAM_IDLE].holds == "no"  # with learnt attention none is idle
     assert found[HELPERS_EVEN].holds == "no"  # with uniform weights one is
     assert found[HELD].holds == "no"
+    assert found[SHARED_EVEN].holds == "yes"
     assert found["the team's credit makes sharing uneven"].holds == "no"
 
 
@@ -246,7 +255,7 @@ def test_files_are_the_same_twice_and_name_every_run(
         assert f"`{digest_of(weights)}`" in text
     document = json.loads(before["crossed.json"])
     (situation,) = document["situations"]
-    assert len(situation["runs"]) == len(runs) == 16
+    assert len(situation["runs"]) == len(runs) == 18
     rows = list(csv.DictReader(before["crossed.csv"].decode().splitlines()))
     assert [float(row["score"]) for row in rows] == [run["score"] for run in situation["runs"]]
     write_crossed(runs, out, "short")

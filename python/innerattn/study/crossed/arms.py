@@ -28,10 +28,12 @@ class Arm:
         credit: who is paid for a rescue.
         penalty: of attention logits; None with uniform weights, which have no logits, so that one
             arm stands for all penalties.
+        shared: robots of a kind have the same parameters.
     """
 
     credit: Credit
     penalty: float | None
+    shared: bool = False
 
     @property
     def method(self) -> str:
@@ -41,21 +43,30 @@ class Arm:
     @property
     def variant(self) -> str:
         """What is not said by the method, as a word."""
-        return self.credit if self.penalty is None else f"{self.credit}-penalty-{self.penalty:g}"
+        word = self.credit if self.penalty is None else f"{self.credit}-penalty-{self.penalty:g}"
+        return f"{word}-shared" if self.shared else word
 
     def __str__(self) -> str:
         """How tables name it."""
         penalty = "" if self.penalty is None else f", penalty {self.penalty:g}"
-        return f"{self.method}, {self.credit}{penalty}"
+        return f"{self.method}, {self.credit}{penalty}{', shared by kind' if self.shared else ''}"
 
     def overrides(self) -> dict[str, object]:
         """Values by dotted key that make the arm what it is."""
         penalty = 0.0 if self.penalty is None else self.penalty
-        return {"scenario.rescue_credit": self.credit, "td.attention_logit_penalty": penalty}
+        return {
+            "scenario.rescue_credit": self.credit,
+            "td.attention_logit_penalty": penalty,
+            "network.parameter_sharing": "kind" if self.shared else "none",
+        }
 
 
-ARMS = tuple(Arm(credit, penalty) for credit in CREDITS for penalty in (None, *PENALTIES))
-"""All arms: both attentions, with learnt attention at every penalty, under both credits."""
+CROSSED = tuple(Arm(credit, penalty) for credit in CREDITS for penalty in (None, *PENALTIES))
+"""Both attentions, with learnt attention at every penalty, under both credits."""
+SHARED = Arm("team", PENALTIES[0], shared=True)
+"""A further arm: can robots that have the same parameters be unlike in what they do?"""
+ARMS = (*CROSSED, SHARED)
+"""All arms."""
 
 
 def plan_crossed(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from scipy.stats import binomtest
 
 from innerattn.study.claims import Holds
-from innerattn.study.crossed.arms import CREDITS, PENALTIES, Arm, Credit
+from innerattn.study.crossed.arms import CREDITS, PENALTIES, SHARED, Arm, Credit
 from innerattn.study.crossed.effects import MARGINS, Effect
 from innerattn.study.crossed.outcome import IDLE, Outcome
 from innerattn.study.over_runs import over_runs
@@ -39,6 +39,8 @@ situation on all figures, or for all its other effects.
 - **With the helpers' credit sharing is even with either attention**: yes where no robot is idle and
   both intervals of the unevenness lie below {MARGINS["unevenness"]:g}; no where a robot is idle or
   one interval lies above.
+- **Robots of a kind with the same parameters share evenly under the team's credit, too**: decided
+  as the claim before, for the arm in which they have the same (learnt attention, no penalty).
 - **The largest penalty holds attention even**: yes where the interval of the entropy's share lies
   above {EVEN_ENTROPY:g}; no where it lies below.
 """
@@ -80,6 +82,7 @@ def answers(situation: str, outcomes: Outcomes, effects: Sequence[Effect]) -> li
         *found,
         _idle_with_team(situation, outcomes),
         _even_with_helpers(situation, outcomes),
+        _even_if_shared(situation, outcomes),
         _held_even(situation, outcomes),
     ]
 
@@ -112,10 +115,10 @@ def _of_effect(effect: Effect, sign: float) -> tuple[str, Holds]:
 
 
 def _of(outcomes: Outcomes, credit: Credit) -> dict[str, list[Outcome]]:
-    """The runs of one credit by attention, at all penalties."""
+    """The runs of one credit by attention, at all penalties, every robot's parameters its own."""
     found: dict[str, list[Outcome]] = {"inner": [], "uniform": []}
     for arm, runs in outcomes.items():
-        if arm.credit == credit:
+        if arm.credit == credit and not arm.shared:
             found[arm.method.removeprefix("td-")] += runs
     return found
 
@@ -134,26 +137,31 @@ def _idle_with_team(situation: str, outcomes: Outcomes) -> Answer:
 
 
 def _even_with_helpers(situation: str, outcomes: Outcomes) -> Answer:
-    by_attention = _of(outcomes, "helpers")
-    means = {
-        name: over_runs([run.unevenness for run in runs]) for name, runs in by_attention.items()
-    }
+    claim = "with the helpers' credit sharing is even with either attention"
+    return Answer(claim, situation, *_even_in_all(_of(outcomes, "helpers")))
+
+
+def _even_if_shared(situation: str, outcomes: Outcomes) -> Answer:
+    claim = "robots of a kind with the same parameters share evenly under the team's credit, too"
+    return Answer(claim, situation, *_even_in_all({"shared": outcomes.get(SHARED, ())}))
+
+
+def _even_in_all(groups: Mapping[str, Sequence[Outcome]]) -> tuple[str, Holds]:
+    """Whether sharing is even in all groups of runs, by their names."""
+    means = {name: over_runs([run.unevenness for run in runs]) for name, runs in groups.items()}
     measured = "; ".join(
-        f"{name}: {shown(means[name])}, idle {idle_shown(runs)}"
-        for name, runs in by_attention.items()
+        f"{name}: {shown(means[name])}, idle {idle_shown(runs)}" for name, runs in groups.items()
     )
-    idle = any(idle_runs(runs)[0] for runs in by_attention.values())
+    idle = any(idle_runs(runs)[0] for runs in groups.values())
     margin = MARGINS["unevenness"]
     found = [mean for mean in means.values() if mean is not None]
-    holds: Holds = "undecided"
     if idle or any(mean.low is not None and mean.low > margin for mean in found):
-        holds = "no"
-    elif len(found) == len(means) and all(
+        return measured, "no"
+    if len(found) == len(means) and all(
         mean.high is not None and mean.high < margin for mean in found
     ):
-        holds = "yes"
-    claim = "with the helpers' credit sharing is even with either attention"
-    return Answer(claim, situation, measured, holds)
+        return measured, "yes"
+    return measured, "undecided"
 
 
 def _held_even(situation: str, outcomes: Outcomes) -> Answer:

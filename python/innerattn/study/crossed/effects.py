@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from innerattn.evaluate.comparison import Contrast, contrast, holm
-from innerattn.study.crossed.arms import ARMS, CREDITS, PENALTIES, Arm, Credit
+from innerattn.study.crossed.arms import CREDITS, CROSSED, PENALTIES, SHARED, Arm, Credit
 from innerattn.study.crossed.outcome import Outcome
 
 MARGINS = {"unevenness": 0.1, "score": 0.05, "entropy_share": 0.02}
@@ -50,7 +50,7 @@ def contrasts() -> list[tuple[str, bool, Weights]]:
     helpers, team = (attention[credit] for credit in ("helpers", "team"))
     asked: list[tuple[str, bool, Weights]] = [
         ("inner - uniform, over credits and penalties", True, _mean([helpers, team])),
-        ("team - helpers, over attentions and penalties", True, _credit(ARMS)),
+        ("team - helpers, over attentions and penalties", True, _credit(CROSSED)),
         (
             f"penalty {most:g} - {least:g}, over credits",
             True,
@@ -75,7 +75,9 @@ def contrasts() -> list[tuple[str, bool, Weights]]:
         arms = [Arm(credit, penalty) for credit in CREDITS]
         words = "uniform" if penalty is None else f"inner at penalty {penalty:g}"
         asked.append((f"team - helpers, {words}", False, _credit(arms)))
-    return asked
+    own = Arm(SHARED.credit, SHARED.penalty)
+    name = f"parameters shared by kind - each robot's own, {own.credit}, inner at penalty {least:g}"
+    return [*asked, (name, False, {SHARED: 1.0, own: -1.0})]
 
 
 def effects(situation: str, outcomes: Mapping[Arm, Sequence[Outcome]]) -> list[Effect]:

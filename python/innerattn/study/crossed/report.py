@@ -146,7 +146,8 @@ def _markdown(
         f"{count} runs, budget `{budget}`, training seeds {', '.join(map(str, seeds))}: attention "
         "(inner, uniform), rescue credit (helpers, team) and the penalty of attention logits are "
         "crossed, in worlds of their own credit. With uniform weights there are no logits, so one "
-        "arm stands for all penalties.\n",
+        "arm stands for all penalties. In one further arm robots of a kind have the same "
+        "parameters.\n",
         *(missing if left_out else []),
         markdown_table(
             ["claim", "situation", "measured here", "holds?"],
@@ -220,13 +221,16 @@ def _csv(situations: Sequence[Situation]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     names = [field.name for field in fields(Outcome)]
-    writer.writerow(["situation", "method", "credit", "penalty", "seed", *names])
+    writer.writerow(["situation", "method", "credit", "penalty", "shared", "seed", *names])
     for situation in situations:
         for run in situation.runs:
             arm = run.arm
             values = [getattr(run.outcome, name) for name in names]
             writer.writerow(
-                [situation.name, arm.method, arm.credit, arm.penalty, run.seed, *values]
+                [
+                    *(situation.name, arm.method, arm.credit, arm.penalty, arm.shared, run.seed),
+                    *values,
+                ]
             )
     return text.getvalue()
 
