@@ -1,5 +1,7 @@
 """The run configuration: ranges, contradictions, and what follows from the method."""
 
+import hashlib
+import json
 import re
 
 import pytest
@@ -138,3 +140,13 @@ def test_what_a_run_depends_on(method: str, warm_start: str, unused: set[str]) -
     config = RunConfig.model_validate({"train": {"method": method, "warm_start": warm_start}})
     assert config.in_use().keys() == RunConfig.model_fields.keys() - unused
     assert config.in_use()["scenario"] == config.scenario.model_dump(mode="json")
+
+
+def test_a_digest_is_that_of_the_values_in_use() -> None:
+    config = RunConfig()
+    text = json.dumps(config.in_use(), sort_keys=True, separators=(",", ":"))
+    assert config.digest() == hashlib.sha256(text.encode()).hexdigest()
+    for unused in ({"ppo": {"epochs": 1}}, {"imitation": {"env_steps": 1}}):
+        assert RunConfig(**unused).digest() == config.digest()
+    for used in ({"td": {"gamma": 0.5}}, {"train": {"seed": 3}}, {"scenario": {"dt_s": 0.2}}):
+        assert RunConfig(**used).digest() != config.digest()

@@ -1,6 +1,5 @@
 """The whole report on made runs: its files, the same bytes twice, and what it says."""
 
-import hashlib
 import json
 import shutil
 from dataclasses import replace
@@ -8,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from innerattn.config import read_toml
 from innerattn.errors import RunError
 from innerattn.study.report import write_report
 from innerattn.study.run import StudyRun, read_configs
@@ -49,8 +49,7 @@ def test_the_report_opens_with_claims_and_ends_with_the_runs(
     assert "| even sharing with inner attention | single | ppo-inner | – |" in others  # not printed
     for run in runs:
         assert f"`{run.folder}`" in text
-        digest = hashlib.sha256((run.folder / "config.toml").read_bytes()).hexdigest()
-        assert f"`{digest}`" in text
+        assert f"`{read_toml(run.folder / 'config.toml').digest()}`" in text
         assert f"`{digest_of(run.folder / 'checkpoints/0/weights.safetensors')}`" in text
     for name in FIGURES:
         assert f"({name}.png)" in text

@@ -5,6 +5,8 @@ Ranges of the sections below live here; those of a scenario live in the compiled
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
@@ -292,6 +294,14 @@ class RunConfig(Model):
         if self.train.warm_start == "none":
             unused.add("imitation")
         return self.model_dump(mode="json", exclude=unused)
+
+    def digest(self) -> str:
+        """SHA-256, in hexadecimal, of the values `in_use` as JSON with sorted keys.
+
+        It does not depend on how a file writes them or on keys that it leaves to their defaults.
+        """
+        text = json.dumps(self.in_use(), sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()
 
     @model_validator(mode="before")
     @classmethod

@@ -186,7 +186,7 @@ def _evidence_rows(part: Evidence) -> list[list[str]]:
 
 def _runs(findings: Findings) -> str:
     head = ["situation", "method", "seed", "folder", "trained [env-steps]"]
-    head += ["SHA-256 of config.toml", "SHA-256 of the weights"]
+    head += ["SHA-256 of the configuration", "SHA-256 of the weights"]
     rows = [
         [
             *(run.situation, run.method, str(run.seed)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -57,7 +56,7 @@ class Digests:
     """SHA-256 of what a run was asked to do and of what it learnt, in hexadecimal.
 
     Attributes:
-        config: of the file ``config.toml``.
+        config: of its configuration, see `innerattn.config.RunConfig.digest`.
         weights: of the newest weights, see `innerattn.train.weights.digest_of`.
     """
 
@@ -149,12 +148,7 @@ def digests(folder: Path) -> Digests:
 
     Raises:
         RunError: a file is missing, is no plain file, or holds no whole weights.
+        ConfigError: ``config.toml`` is not valid.
     """
-    return Digests(_sha256(folder / "config.toml"), digest_of(newest_weights(folder)))
-
-
-def _sha256(path: Path) -> str:
-    try:
-        return hashlib.sha256(plain_file(path).read_bytes()).hexdigest()
-    except OSError as error:
-        raise RunError(f"{path}: cannot be read ({error.strerror})") from error
+    config = read_toml(plain_file(folder / "config.toml"))
+    return Digests(config.digest(), digest_of(newest_weights(folder)))

@@ -199,7 +199,7 @@ def _effects_table(situation: Situation) -> str:
 
 def _runs_table(situations: Sequence[Situation], out: Path) -> str:
     head = ["situation", "arm", "seed", "unevenness", "least share", "score", "folder"]
-    head += ["SHA-256 of config.toml", "SHA-256 of the weights"]
+    head += ["SHA-256 of the configuration", "SHA-256 of the weights"]
     rows = []
     for situation in situations:
         for run in situation.runs:
