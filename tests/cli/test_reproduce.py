@@ -128,6 +128,23 @@ def test_another_configuration_is_named_and_neither_used_nor_changed(
     )
 
 
+def test_a_report_alone_trains_nothing_and_names_what_is_missing(
+    study: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    missing, there = (study / "runs" / name for name in NAMES)
+    shutil.rmtree(missing)
+    before = times(there)
+    assert command("table2", study, "td-inner,td-uniform", "--seeds", "1", "--report-only") == 1
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert out.startswith("table2, budget quick: 2 runs of 1 seed; 1 finished, 1 not\n")
+    assert "  mixed td-inner seed 0: missing\n" in out
+    assert not missing.exists()
+    assert times(there) == before
+    assert states(study) == ["missing", "finished"]
+    assert "- mixed td-inner seed 0: missing\n" in (study / "report.md").read_text()
+
+
 @pytest.mark.usefixtures("in_this_process")
 def test_the_crossed_design_has_runs_and_files_of_its_own(
     tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]

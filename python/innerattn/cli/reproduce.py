@@ -52,6 +52,8 @@ class Reproduce(Command):
     """Methods, separated by commas; all: what the target needs."""
     situations: str = "all"
     """Situations, separated by commas; all: what the target needs."""
+    report_only: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Train nothing: report on the runs that are finished, and name the others."""
 
     def run(self) -> int:
         """Plan, train, print, write.
@@ -78,7 +80,8 @@ class Reproduce(Command):
             found = take_inventory(planned, out)
             self._print_plan(console, found, out)
             try:
-                self._train(found, out, lock)
+                if not self.report_only:
+                    self._train(found, out, lock)
             except KeyboardInterrupt:
                 found = take_inventory(planned, out)
                 write_account(out, self.target, self.budget, found)
@@ -119,8 +122,11 @@ class Reproduce(Command):
         count = len(to_train(found))
         left_out = len(found) - count - states["finished"]
         line = f"{self.target}, budget {self.budget}: {len(found)} runs of {_seeds(self.seeds)}; "
-        line += f"{states['finished']} finished, {count} to train"
-        line += f", {places(count)} at a time" if count else ""
+        line += f"{states['finished']} finished, "
+        if self.report_only:
+            line += f"{count} not"
+        else:
+            line += f"{count} to train" + (f", {places(count)} at a time" if count else "")
         line += f"; {left_out} left out" if left_out else ""
         console.print(line, soft_wrap=True)
         note = smoke_note(self.budget)
