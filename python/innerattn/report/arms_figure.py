@@ -41,12 +41,15 @@ class ArmPanel:
         label: what is drawn, with its unit.
         arms: from top to bottom.
         marks: values at which a line is drawn.
+        limits: what values there can be; of an interval beyond them nothing is drawn. None: as wide
+            as needed.
     """
 
     situation: str
     label: str
     arms: tuple[ArmDots, ...]
     marks: tuple[float, ...] = ()
+    limits: tuple[float, float] | None = None
 
 
 def draw_arms(rows: Sequence[Sequence[ArmPanel]]) -> Figure:
@@ -68,6 +71,10 @@ def draw_arms(rows: Sequence[Sequence[ArmPanel]]) -> Figure:
         panels[row, 0].set_title(drawn[0].situation, fontsize=9, loc="left")
     for column, part in enumerate(rows[-1]):
         panels[-1, column].set_xlabel(part.label, fontsize=7)
+        if part.limits is not None:
+            low, high = part.limits
+            margin = 0.05 * (high - low)
+            panels[-1, column].set_xlim(low - margin, high + margin)
     panels[0, 0].set_ylim(arms - 0.4, -0.6)
     return figure
 

@@ -26,11 +26,12 @@ from innerattn.study.table2_text import NONE, fixed, markdown_table, p_shown, sh
 SCHEMA_VERSION = 1
 
 _DRAWN = {
-    "unevenness": ("unevenness of shares", (MARGINS["unevenness"],)),
-    "least_share": ("share of the idler robot", (IDLE,)),
-    "score": ("score", ()),
-    "entropy_share": ("entropy / ln(N - 1)", (1.0,)),
+    "unevenness": ("unevenness of shares", (MARGINS["unevenness"],), (0.0, 0.5)),
+    "least_share": ("share of the idler robot", (IDLE,), (0.0, 0.5)),
+    "score": ("score", (), None),
+    "entropy_share": ("entropy / ln(N - 1)", (1.0,), (0.0, 1.0)),
 }
+"""Label, marks and limits of the figures that are drawn."""
 
 
 @dataclass(frozen=True)
@@ -269,7 +270,7 @@ def _json(situation: Situation, out: Path) -> dict[str, Any]:
 
 def _panels(situation: Situation) -> list[ArmPanel]:
     panels = []
-    for name, (label, marks) in _DRAWN.items():
+    for name, (label, marks, limits) in _DRAWN.items():
         dots = []
         for arm, runs in situation.outcomes().items():
             mean = _mean(runs, name)
@@ -278,7 +279,7 @@ def _panels(situation: Situation) -> list[ArmPanel]:
             if mean is not None and mean.low is not None and mean.high is not None:
                 bar = (mean.mean, mean.low, mean.high)
             dots.append(ArmDots(str(arm), arm.penalty is not None, values, bar))
-        panels.append(ArmPanel(situation.name, label, tuple(dots), marks))
+        panels.append(ArmPanel(situation.name, label, tuple(dots), marks, limits))
     return panels
 
 
