@@ -5,12 +5,10 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from scipy.stats import nct, permutation_test, ttest_ind
-from scipy.stats import t as t_distribution
-from statsmodels.regression.linear_model import OLS
+from scipy.stats import nct, permutation_test, ttest_1samp, ttest_ind
 from statsmodels.stats.meta_analysis import effectsize_smd
 from statsmodels.stats.multitest import multipletests
-from statsmodels.stats.weightstats import ttost_ind
+from statsmodels.stats.weightstats import ttost_ind, ttost_paired
 
 from innerattn.evaluate import comparison
 from innerattn.evaluate.comparison import Comparison, compare, contrast, holm
@@ -112,65 +110,62 @@ def test_effect_size_against_statsmodels_and_the_noncentral_t() -> None:
 WEIGHTS = (0.5, 0.5, -1.0, 0.0)
 
 
-def several(seed: int) -> list[np.ndarray]:
+def rows_of(seed: int, n: int = 6) -> np.ndarray:
+    """A row for each seed: what its runs have in common, and what is each run's own."""
     rng = np.random.default_rng(seed)
-    return [rng.normal(mean, 1.0 + mean, 5 + i) for i, mean in enumerate((0.1, 0.5, 0.0, 9.0))]
+    return rng.normal(0.0, 3.0, (n, 1)) + rng.normal([0.1, 0.5, 0.0, 9.0], 1.0, (n, 4))
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_contrast_of_several_groups(seed: int) -> None:
-    x = several(seed)
-    found = contrast(x, WEIGHTS, 1.0)
+def test_contrast_over_seeds_against_scipy_and_statsmodels(seed: int) -> None:
+    rows = rows_of(seed)
+    found = contrast(rows, WEIGHTS, 1.0)
     assert found is not None
-    # Satterthwaite's formula, and the noncentral t of a regression on indicators of the groups.
-    parts = [w**2 * np.var(v, ddof=1) / len(v) for v, w in zip(x, WEIGHTS, strict=True)]
-    dof = sum(parts) ** 2 / sum(p**2 / (len(v) - 1) for p, v in zip(parts, x, strict=True))
-    difference = x[0].mean() / 2 + x[1].mean() / 2 - x[2].mean()
-    half = t_distribution.ppf(0.975, dof) * np.sqrt(sum(parts))
-    assert found.dof == pytest.approx(dof)
-    assert found.difference.low == pytest.approx(difference - half)
-    assert found.difference.high == pytest.approx(difference + half)
-    within = [
-        t_distribution.cdf((side * difference - 1.0) / np.sqrt(sum(parts)), dof) for side in (1, -1)
-    ]
-    assert found.equivalence_p == pytest.approx(max(within))
-    counted = x[:3]
-    indicators = np.repeat(np.eye(3), [len(v) for v in counted], axis=0)
-    pooled = OLS(np.concatenate(counted), indicators).fit().t_test(np.array(WEIGHTS[:3]))
-    scale = np.sqrt(sum(w**2 / len(v) for v, w in zip(counted, WEIGHTS, strict=False)))
-    g = found.hedges_g
-    assert nct.cdf(pooled.tvalue, pooled.df_denom, g.low / scale) == pytest.approx(0.975, abs=1e-6)
-    assert nct.cdf(pooled.tvalue, pooled.df_denom, g.high / scale) == pytest.approx(0.025, abs=1e-6)
+    sums = np.array([row[0] / 2 + row[1] / 2 - row[2] for row in rows])
+    expected = ttest_1samp(sums, 0.0)
+    ends = expected.confidence_interval()
+    assert (found.dof, found.p) == pytest.approx((expected.df, expected.pvalue))
+    assert found.difference.mean == pytest.approx(sums.mean())
+    assert (found.difference.low, found.difference.high) == pytest.approx((ends.low, ends.high))
+    p, _, _ = ttost_paired(sums, np.zeros_like(sums), -1.0, 1.0)
+    assert found.equivalence_p == pytest.approx(p)
+    assert found.equivalent == (p < 0.05)
+    g, scale = found.hedges_g, np.sqrt(len(rows))
     assert g.mean == pytest.approx(
-        float(pooled.tvalue.item()) * scale * (1 - 3 / (4 * pooled.df_denom - 1)), rel=1e-3
+        sums.mean() / sums.std(ddof=1) * (1 - 3 / (4 * expected.df - 1)), rel=3e-3
     )
-
-
-def test_a_contrast_of_two_is_a_comparison() -> None:
-    x, y = groups(2)
-    assert vars(contrast([x, y], [1.0, -1.0], 0.5)).items() <= vars(found_of(x, y, 0.5)).items()
+    assert nct.cdf(expected.statistic, 5, g.low * scale) == pytest.approx(0.975, abs=1e-6)
+    assert nct.cdf(expected.statistic, 5, g.high * scale) == pytest.approx(0.025, abs=1e-6)
 
 
 @pytest.mark.parametrize("weights", [(1.0, -0.5, 0.0, 0.0), (1.0, -1.0), ()])
 def test_weights_that_compare_nothing_are_refused(weights: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="weights = "):
-        contrast(several(0), weights, 1.0)
+        contrast(rows_of(0), weights, 1.0)
 
 
-def test_a_group_of_one_is_refused_by_its_place() -> None:
-    with pytest.raises(ValueError, match=r"groups\[1\] = "):
-        contrast([[1.0, 2.0], [3.0]], [1.0, -1.0], 1.0)
+@pytest.mark.parametrize("values", [[[1.0, 2.0], [3.0, 4.0]], [1.0, 2.0, 3.0], [[np.nan, 1.0]] * 3])
+def test_rows_that_are_none_or_too_few_are_refused(values: list) -> None:
+    with pytest.raises(ValueError, match="values = "):
+        contrast(values, [1.0, -1.0], 1.0)
 
 
-def test_contrasts_are_false_as_rarely_as_they_say() -> None:
+def test_contrasts_are_false_as_rarely_as_they_say_however_alike_runs_of_a_seed_are() -> None:
     rng, draws = np.random.default_rng(4), 1000
-    weights = (1 / 3, 1 / 3, 1 / 3, -1.0)
-    found = [
-        contrast([rng.normal(0.0, s, 6) for s in (1.0, 1.0, 2.0, 2.0)], weights, 1.0)
-        for _ in range(draws)
-    ]
-    rate = np.mean([one is None or one.p < 0.05 for one in found])
-    assert rate == pytest.approx(0.05, abs=3 * np.sqrt(0.05 * 0.95 / draws))
+    weights, spread = (1 / 3, 1 / 3, 1 / 3, -1.0), [1.0, 1.0, 2.0, 2.0]
+    for common in (0.0, 5.0):
+        found = [
+            contrast(
+                rng.normal(0.0, common, (6, 1)) + rng.normal(0.0, spread, (6, 4)), weights, 1.0
+            )
+            for _ in range(draws)
+        ]
+        rate = np.mean([one is None or one.p < 0.05 for one in found])
+        assert rate == pytest.approx(0.05, abs=3 * np.sqrt(0.05 * 0.95 / draws))
+
+
+def test_seeds_that_do_not_differ_leave_nothing_to_judge_by() -> None:
+    assert contrast([[1.0, 2.0], [2.0, 3.0], [5.0, 6.0]], [1.0, -1.0], 0.5) is None
 
 
 def test_document() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_run import made_run
-from scipy.stats import ttest_ind
+from scipy.stats import ttest_1samp, ttest_rel
 from statsmodels.stats.multitest import multipletests
 
 from innerattn.errors import RunError
@@ -29,7 +29,7 @@ METHODS = ("td-inner", "td-uniform")
 EVEN = Outcome(0.02, 0.48, 2.0, 0.7, 0.9)
 IDLE = replace(EVEN, unevenness=0.4, least_share=0.1)
 
-Outcomes = dict[Arm, list[Outcome]]
+Outcomes = dict[Arm, dict[int, Outcome]]
 
 
 def planned(out: Path = OUT, seeds: range = range(2)) -> list[PlannedRun]:
@@ -60,7 +60,7 @@ def test_all_combinations_are_planned_and_are_what_they_say() -> None:
 
 def random_outcomes(seed: int, runs: int = 4) -> Outcomes:
     rng = np.random.default_rng(seed)
-    return {arm: [Outcome(*rng.uniform(size=5)) for _ in range(runs)] for arm in ARMS}
+    return {arm: {seed: Outcome(*rng.uniform(size=5)) for seed in range(runs)} for arm in ARMS}
 
 
 def test_contrasts_compare_whole_means() -> None:
@@ -77,11 +77,12 @@ def test_contrasts_compare_whole_means() -> None:
 def test_effects_against_plain_means(figure: str) -> None:
     outcomes = random_outcomes(3)
     mean = {
-        (arm.credit, arm.penalty): np.mean([getattr(run, figure) for run in runs])
+        (arm.credit, arm.penalty): np.mean([getattr(run, figure) for run in runs.values()])
         for arm, runs in outcomes.items()
         if not arm.shared
     }
-    shared = np.mean([getattr(run, figure) for run in outcomes[Arm("team", 0.0, shared=True)]])
+    alike = outcomes[Arm("team", 0.0, shared=True)].values()
+    shared = np.mean([getattr(run, figure) for run in alike])
     found = {e.name: e.found for e in effects("mixed", outcomes) if e.figure == figure}
     inner = {c: np.mean([mean[c, p] for p in (0.0, 1e-4, 1e-3)]) for c in ("helpers", "team")}
     uniform = {c: mean[c, None] for c in inner}
@@ -109,11 +110,12 @@ def test_effects_against_plain_means(figure: str) -> None:
         assert one is not None
         assert one.difference.mean == pytest.approx(difference), name
     pair = [
-        [getattr(run, figure) for run in outcomes[Arm("team", penalty)]] for penalty in (1e-4, None)
+        [getattr(run, figure) for run in outcomes[Arm("team", penalty)].values()]
+        for penalty in (1e-4, None)
     ]
     one = found["inner at penalty 0.0001 - uniform, team"]
     assert one is not None
-    assert one.p == pytest.approx(ttest_ind(*pair, equal_var=False).pvalue)
+    assert one.p == pytest.approx(ttest_rel(*pair).pvalue)
 
 
 def test_p_values_are_adjusted_among_all_of_their_kind() -> None:
@@ -125,13 +127,17 @@ def test_p_values_are_adjusted_among_all_of_their_kind() -> None:
         assert [one.holm_p for one in kind] == pytest.approx(list(expected))
 
 
-def test_effects_need_two_runs_of_each_arm() -> None:
+def test_effects_need_three_seeds_with_all_arms() -> None:
     outcomes = random_outcomes(1)
-    outcomes[Arm("team", None)] = outcomes[Arm("team", None)][:1]
+    for seed in (0, 2):
+        del outcomes[Arm("team", None)][seed]
+    del outcomes[Arm("team", 0.0)][3]
     found = {e.name: e for e in effects("mixed", outcomes) if e.figure == "score"}
     assert found["team - helpers, uniform"].found is None
-    assert found["team - helpers, uniform"].runs == 5
+    assert found["team - helpers, uniform"].seeds == 2
     assert found["team - helpers, inner at penalty 0"].found is not None
+    assert found["team - helpers, inner at penalty 0"].seeds == 3
+    assert found["inner at penalty 0 - uniform, team"].seeds == 1
     assert all(one.found is None for one in effects("mixed", {}))
 
 
@@ -139,12 +145,12 @@ def said(outcomes: Outcomes) -> dict[str, Answer]:
     return {one.claim: one for one in answers("mixed", outcomes, effects("mixed", outcomes))}
 
 
-def scattered(like: Outcome, seed: int, runs: int = 10) -> list[Outcome]:
+def scattered(like: Outcome, seed: int, runs: int = 10) -> dict[int, Outcome]:
     rng = np.random.default_rng(seed)
-    return [
-        Outcome(*(np.array(list(vars(like).values())) + rng.normal(0.0, 0.005, 5)).tolist())
-        for _ in range(runs)
-    ]
+    return {
+        run: Outcome(*(np.array(list(vars(like).values())) + rng.normal(0.0, 0.005, 5)).tolist())
+        for run in range(runs)
+    }
 
 
 TEAM_IDLE = "the team's credit leaves a food robot idle with either attention"
@@ -163,7 +169,7 @@ def test_what_was_expected_can_be_confirmed() -> None:
     }
     found = said(outcomes)
     assert found[TEAM_IDLE].holds == found[HELPERS_EVEN].holds == found[HELD].holds == "yes"
-    assert found[TEAM_IDLE].measured.startswith("inner: 30 of 30 [0.89, 1.00]; uniform: 10 of 10 [")
+    assert found[TEAM_IDLE].measured.startswith("inner: 10 of 10 [0.72, 1.00]; uniform: 10 of 10 [")
     assert found["the team's credit makes sharing uneven"].holds == "yes"
     assert found[SHARED_EVEN].holds == "no"
     # Both attentions do the same, so neither is to be credited with it.
@@ -186,8 +192,30 @@ def test_what_was_expected_can_be_refuted() -> None:
     assert found["the team's credit makes sharing uneven"].holds == "no"
 
 
+def test_runs_of_one_seed_count_once() -> None:
+    outcomes = {arm: scattered(EVEN, i) for i, arm in enumerate(ARMS)}
+    for arm, seed in ((Arm("team", 0.0), 3), (Arm("team", 1e-3), 3), (Arm("team", None), 7)):
+        outcomes[arm][seed] = IDLE
+    del outcomes[Arm("team", 1e-4)][5]  # a seed without a run of each arm says nothing
+    measured = said(outcomes)[TEAM_IDLE].measured
+    assert measured.startswith("inner: 1 of 9 [")
+    assert "uniform: 1 of 10 [" in measured
+    low, high = student(
+        [
+            np.mean([outcomes[Arm("helpers", p)][seed].unevenness for p in (0.0, 1e-4, 1e-3)])
+            for seed in range(10)
+        ]
+    )
+    assert f"[{low:.2f}, {high:.2f}], idle 0 of 10" in said(outcomes)[HELPERS_EVEN].measured
+
+
+def student(values: list[float]) -> tuple[float, float]:
+    ends = ttest_1samp(values, 0.0).confidence_interval()
+    return float(ends.low), float(ends.high)
+
+
 def test_few_runs_decide_nothing() -> None:
-    few = {arm: [EVEN] for arm in ARMS if arm.credit == "team"}
+    few = {arm: {0: EVEN} for arm in ARMS if arm.credit == "team"}
     assert {one.holds for one in said(few).values()} == {"undecided"}
     assert {one.holds for one in said({}).values()} == {"undecided"}
 

@@ -23,21 +23,20 @@ _SHUFFLES = 9_999
 
 @dataclass(frozen=True)
 class Contrast:
-    """A weighted sum of the means of several groups of runs; of two, their difference.
+    """A difference of two methods, or another weighted sum of the means of several.
 
     Attributes:
-        difference: the weighted sum, and its 95 % interval by Welch and Satterthwaite, which
-            grants every group a variance of its own.
-        dof: Satterthwaite's degrees of freedom; Welch's, of two groups.
+        difference: it and its 95 % interval, by the t distribution.
+        dof: degrees of freedom of that.
         p: two-sided, of the t-test against 0.
         margin: differences smaller than this count as none.
         equivalence_p: the larger of the p-values of two one-sided tests against a difference of at
             least ``margin`` either way.
         equivalent: equivalence_p is below 5 %, which is that the 90 % interval lies within ±
             ``margin``.
-        hedges_g: standardised difference, ``J difference / s`` with the pooled deviation s of all
-            groups and J the correction for few runs (Hedges 1981), and the exact 95 % interval of
-            the true one by the noncentral t; both take equal variances for granted.
+        hedges_g: standardised difference, ``J difference / s`` with a deviation s and J the
+            correction for few runs (Hedges 1981), and the exact 95 % interval of the true one by
+            the noncentral t.
     """
 
     difference: Interval
@@ -66,58 +65,43 @@ class Comparison(Contrast):
     permutation_p: float
 
 
-def contrast(
-    groups: Sequence[ArrayLike], weights: Sequence[float], margin: float
-) -> Contrast | None:
-    """Compare weighted means of groups of runs, such as a main effect of a crossed design.
+def contrast(values: ArrayLike, weights: Sequence[float], margin: float) -> Contrast | None:
+    """Compare methods that were run with the same seeds, such as the arms of a crossed design.
+
+    The seed is the unit: each gives one weighted sum, and Student's t looks at these. Runs of one
+    seed may therefore be as alike as they like, whatever the method.
 
     Args:
-        groups: of each (n,) one value per run, n >= 2.
-        weights: of each group; they sum to 0. With two groups, 1 and -1 compare the first with the
-            second.
+        values: (n, k), a row for each seed, n >= 3, with the value of each method's run.
+        weights: (k,) of the methods; they sum to 0.
         margin: the largest difference that does not matter, above 0, in the values' unit.
 
     Returns:
-        The comparison; None where the runs of no group that counts differ among themselves, which
-        leaves nothing to judge a difference by.
+        The comparison, ``hedges_g`` by the deviation of the weighted sum between seeds; None where
+        that is the same for all, which leaves nothing to judge it by.
 
     Raises:
-        ValueError: a group has less than two values, the weights do not fit, or the margin is not
+        ValueError: there are less than three seeds, the weights do not fit, or the margin is not
             above 0.
     """
-    if len(groups) != len(weights) or not math.isclose(sum(weights), 0.0, abs_tol=1e-12):
-        raise ValueError(f"weights = {list(weights)}: must be one of each group and sum to 0")
-    if not (math.isfinite(margin) and margin > 0.0):
-        raise ValueError(f"margin = {margin}: must be finite and above 0")
-    known = [
-        (_values(f"groups[{i}]", values), weight)
-        for i, (values, weight) in enumerate(zip(groups, weights, strict=True))
-    ]
-    parts = [(values, weight) for values, weight in known if weight]
-    if all(np.ptp(values) == 0.0 for values, _ in parts):
+    rows, parts = np.asarray(values, np.float64), np.asarray(weights, np.float64)
+    if rows.ndim != 2 or len(rows) < 3 or not np.isfinite(rows).all():
+        raise ValueError(f"values = {rows.tolist()}: must be (3 or more, k) finite numbers")
+    if parts.shape != rows.shape[1:] or not math.isclose(parts.sum(), 0.0, abs_tol=1e-12):
+        raise ValueError(f"weights = {parts.tolist()}: must be one of each method and sum to 0")
+    sums = rows @ parts
+    if np.ptp(sums) == 0.0:
         return None
-    difference = float(sum(weight * values.mean() for values, weight in parts))
-    squares = [weight**2 * values.var(ddof=1) / len(values) for values, weight in parts]
-    error = math.sqrt(sum(squares))
-    spread = sum(
-        square**2 / (len(values) - 1) for square, (values, _) in zip(squares, parts, strict=True)
-    )
-    dof = float(error**4 / spread)
-    half = float(stdtrit(dof, 1.0 - ALPHA / 2.0)) * error
-    equivalence_p = float(stdtr(dof, -(margin - abs(difference)) / error))
+    n, deviation = len(sums), float(sums.std(ddof=1))
+    difference = float(sums.mean())
     return Contrast(
-        difference=Interval(difference, difference - half, difference + half),
-        dof=dof,
-        p=float(2.0 * stdtr(dof, -abs(difference) / error)),
-        margin=margin,
-        equivalence_p=equivalence_p,
-        equivalent=equivalence_p < ALPHA,
-        hedges_g=_hedges_g(parts, difference),
+        **_judged(difference, deviation / math.sqrt(n), n - 1.0, margin),
+        hedges_g=_hedges_g(difference / deviation, math.sqrt(1 / n), n - 1),
     )
 
 
 def compare(x: ArrayLike, y: ArrayLike, margin: float, seed: int) -> Comparison | None:
-    """Compare two methods.
+    """Compare two methods, whatever the seeds of their runs; by Welch and Satterthwaite.
 
     Args:
         x: (n,) one value per run, n >= 2.
@@ -126,18 +110,32 @@ def compare(x: ArrayLike, y: ArrayLike, margin: float, seed: int) -> Comparison 
         seed: seed of random divisions, where there are too many for all.
 
     Returns:
-        The comparison; None where the runs of neither method differ among themselves, which leaves
+        The comparison, ``hedges_g`` by the pooled deviation of both, which takes equal variances
+        for granted; None where the runs of neither method differ among themselves, which leaves
         nothing to judge a difference by.
 
     Raises:
         ValueError: there are less than two values, or the margin is not above 0.
     """
     ours, theirs = _values("x", x), _values("y", y)
-    found = contrast([ours, theirs], [1.0, -1.0], margin)
-    if found is None:
+    groups = (ours, theirs)
+    difference = float(ours.mean() - theirs.mean())
+    squares = [float(values.var(ddof=1)) / len(values) for values in groups]
+    error = math.sqrt(sum(squares))
+    if error == 0.0:
         return None
-    permutation_p = _permutation_p(np.concatenate([ours, theirs]), len(ours), seed)
-    return Comparison(**vars(found), permutation_p=permutation_p)
+    spread = sum(
+        square**2 / (len(values) - 1) for square, values in zip(squares, groups, strict=True)
+    )
+    pooled_dof = len(ours) + len(theirs) - 2
+    within = sum((len(values) - 1) * float(values.var(ddof=1)) for values in groups)
+    effect = difference / math.sqrt(within / pooled_dof)
+    scale = math.sqrt(1 / len(ours) + 1 / len(theirs))
+    return Comparison(
+        **_judged(difference, error, error**4 / spread, margin),
+        hedges_g=_hedges_g(effect, scale, pooled_dof),
+        permutation_p=_permutation_p(np.concatenate(groups), len(ours), seed),
+    )
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
@@ -182,14 +180,26 @@ def _welch_t(values: NDArray[np.float64], chosen: NDArray[np.int64]) -> NDArray[
     return np.where(error > 0.0, apart / np.where(error > 0.0, error, 1.0), np.inf)
 
 
-def _hedges_g(parts: Sequence[tuple[NDArray[np.float64], float]], difference: float) -> Interval:
-    dofs = [len(values) - 1 for values, _ in parts]
-    dof = sum(dofs)
-    within = sum(n * values.var(ddof=1) for n, (values, _) in zip(dofs, parts, strict=True))
-    scale = math.sqrt(sum(weight**2 / len(values) for values, weight in parts))
-    effect = difference / math.sqrt(within / dof)
+def _judged(difference: float, error: float, dof: float, margin: float) -> dict[str, Any]:
+    """What t-tests say of a difference, as fields of `Contrast`."""
+    if not (math.isfinite(margin) and margin > 0.0):
+        raise ValueError(f"margin = {margin}: must be finite and above 0")
+    half = float(stdtrit(dof, 1.0 - ALPHA / 2.0)) * error
+    equivalence_p = float(stdtr(dof, -(margin - abs(difference)) / error))
+    return {
+        "difference": Interval(difference, difference - half, difference + half),
+        "dof": dof,
+        "p": float(2.0 * stdtr(dof, -abs(difference) / error)),
+        "margin": margin,
+        "equivalence_p": equivalence_p,
+        "equivalent": equivalence_p < ALPHA,
+    }
+
+
+def _hedges_g(effect: float, scale: float, dof: int) -> Interval:
+    """The corrected standardised difference; ``effect / scale`` is the t of ``dof`` degrees."""
     correction = math.exp(gammaln(dof / 2) - gammaln((dof - 1) / 2)) / math.sqrt(dof / 2)
-    # Effect / scale is the t of the pooled test; its noncentrality is the true effect / scale.
+    # The noncentrality of that t is the true effect / scale.
     low, high = (
         float(nctdtrinc(dof, quantile, effect / scale)) * scale
         for quantile in (1.0 - ALPHA / 2.0, ALPHA / 2.0)

@@ -5,25 +5,29 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from innerattn.study.claims import Holds
-from innerattn.study.crossed.arms import CREDITS, PENALTIES, SHARED, Arm, Credit
+from innerattn.study.crossed.arms import CREDITS, CROSSED, PENALTIES, SHARED, Arm, Credit
 from innerattn.study.crossed.effects import MARGINS, Effect
-from innerattn.study.crossed.outcome import IDLE, Outcome
-from innerattn.study.over_runs import over_runs
+from innerattn.study.crossed.outcome import IDLE, Outcomes
+from innerattn.study.over_runs import OverRuns, over_runs
 from innerattn.study.table2_text import NONE, shown
 
-LEAST_RUNS = 10
-"""So many runs without an idle robot say that there is none; fewer say nothing."""
+LEAST_SEEDS = 10
+"""So many seeds without an idle robot say that there is none; fewer say nothing."""
 
 EVEN_ENTROPY = 1.0 - MARGINS["entropy_share"]
 """Attention whose entropy is a larger share of ln(N - 1) than this counts as even."""
 
 RULES = f"""\
-Intervals are 95 %, the run is the unit: Student's of one mean, Welch's and Satterthwaite's of
-differences, Wilson's of numbers of runs. Two means count as alike where two one-sided tests show
-them to be within the margin ({MARGINS["unevenness"]:g} of unevenness, {MARGINS["score"]:g} of the
+The seed is the unit: runs of one seed begin with the same weights in the same worlds, so that they
+may be alike in all arms. Where several arms are put together, or compared, every seed that has a
+run of each gives one number. Intervals are 95 %: Student's over seeds, Wilson's of numbers of
+seeds; an effect needs three seeds. Two means count as alike where two one-sided tests show them to
+be within the margin ({MARGINS["unevenness"]:g} of unevenness, {MARGINS["score"]:g} of the
 score, {MARGINS["entropy_share"]:g} of the entropy's share). The rules go by intervals of single
 effects; beside each p-value of an effect stands Holm's, adjusted for all main effects of the
 situation on all figures, or for all its other effects.
@@ -34,8 +38,8 @@ situation on all figures, or for all its other effects.
 - **The team's credit makes sharing uneven**: yes where the interval of team minus helpers, over
   attentions and penalties, lies above 0; no where it lies below, or where they are alike.
 - **The team's credit leaves a food robot idle with either attention**: yes where both attentions
-  have such runs (a share of the rescues below {IDLE:g}); no where one of them has none in at least
-  {LEAST_RUNS} runs.
+  seeds with such a run (a share of the rescues below {IDLE:g}); no where one of them has none in at
+  least {LEAST_SEEDS} seeds.
 - **With the helpers' credit sharing is even with either attention**: yes where no robot is idle and
   both intervals of the unevenness lie below {MARGINS["unevenness"]:g}; no where a robot is idle or
   one interval lies above.
@@ -45,8 +49,6 @@ situation on all figures, or for all its other effects.
   above {EVEN_ENTROPY:g}; no where it lies below.
 """
 """How `Answer.holds` is found, in Markdown."""
-
-Outcomes = Mapping[Arm, Sequence[Outcome]]
 
 
 @dataclass(frozen=True)
@@ -87,19 +89,32 @@ def answers(situation: str, outcomes: Outcomes, effects: Sequence[Effect]) -> li
     ]
 
 
-def idle_shown(outcomes: Sequence[Outcome]) -> str:
-    """How many runs have an idle robot, with Wilson's interval of their share."""
-    idle, known = idle_runs(outcomes)
+def idle_shown(outcomes: Outcomes, arms: Sequence[Arm]) -> str:
+    """In how many seeds some run of the arms has an idle robot, with Wilson's interval."""
+    idle, known = idle_seeds(outcomes, arms)
     if not known:
         return NONE
     ends = binomtest(idle, known).proportion_ci(method="wilson")
     return f"{idle} of {known} [{ends.low:.2f}, {ends.high:.2f}]"
 
 
-def idle_runs(outcomes: Sequence[Outcome]) -> tuple[int, int]:
-    """How many runs have an idle robot, and how many have rescues at all."""
-    shares = [run.least_share for run in outcomes if run.least_share is not None]
-    return sum(share < IDLE for share in shares), len(shares)
+def idle_seeds(outcomes: Outcomes, arms: Sequence[Arm]) -> tuple[int, int]:
+    """In how many seeds some run of the arms has an idle robot, and how many have all runs."""
+    least = _by_seed(outcomes, arms, "least_share").min(axis=1, initial=1.0)
+    return int((least < IDLE).sum()), len(least)
+
+
+def _by_seed(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> NDArray[np.float64]:
+    """A figure of the runs of the arms: a row for each seed that has it in all of them."""
+    runs = [outcomes.get(arm, {}) for arm in arms]
+    seeds = sorted(set.intersection(*(set(by_seed) for by_seed in runs)))
+    rows = [[getattr(by_seed[seed], figure) for by_seed in runs] for seed in seeds]
+    return np.array([row for row in rows if None not in row], np.float64).reshape(-1, len(arms))
+
+
+def _mean(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> OverRuns | None:
+    """The mean over seeds of a figure that is averaged over the arms."""
+    return over_runs(_by_seed(outcomes, arms, figure).mean(axis=1).tolist())
 
 
 def _of_effect(effect: Effect, sign: float) -> tuple[str, Holds]:
@@ -114,23 +129,23 @@ def _of_effect(effect: Effect, sign: float) -> tuple[str, Holds]:
     return measured, "no" if high < 0.0 or found.equivalent else "undecided"
 
 
-def _of(outcomes: Outcomes, credit: Credit) -> dict[str, list[Outcome]]:
-    """The runs of one credit by attention, at all penalties, every robot's parameters its own."""
-    found: dict[str, list[Outcome]] = {"inner": [], "uniform": []}
-    for arm, runs in outcomes.items():
-        if arm.credit == credit and not arm.shared:
-            found[arm.method.removeprefix("td-")] += runs
-    return found
+def _by_attention(credit: Credit) -> dict[str, list[Arm]]:
+    """The crossed arms of one credit by their attention."""
+    arms = [arm for arm in CROSSED if arm.credit == credit]
+    return {
+        "inner": [arm for arm in arms if arm.penalty is not None],
+        "uniform": [arm for arm in arms if arm.penalty is None],
+    }
 
 
 def _idle_with_team(situation: str, outcomes: Outcomes) -> Answer:
-    by_attention = _of(outcomes, "team")
-    measured = "; ".join(f"{name}: {idle_shown(runs)}" for name, runs in by_attention.items())
-    counts = [idle_runs(runs) for runs in by_attention.values()]
+    groups = _by_attention("team")
+    measured = "; ".join(f"{name}: {idle_shown(outcomes, arms)}" for name, arms in groups.items())
+    counts = [idle_seeds(outcomes, arms) for arms in groups.values()]
     holds: Holds = "undecided"
     if all(idle for idle, _ in counts):
         holds = "yes"
-    elif any(not idle and known >= LEAST_RUNS for idle, known in counts):
+    elif any(not idle and known >= LEAST_SEEDS for idle, known in counts):
         holds = "no"
     claim = "the team's credit leaves a food robot idle with either attention"
     return Answer(claim, situation, measured, holds)
@@ -138,21 +153,22 @@ def _idle_with_team(situation: str, outcomes: Outcomes) -> Answer:
 
 def _even_with_helpers(situation: str, outcomes: Outcomes) -> Answer:
     claim = "with the helpers' credit sharing is even with either attention"
-    return Answer(claim, situation, *_even_in_all(_of(outcomes, "helpers")))
+    return Answer(claim, situation, *_even_in_all(outcomes, _by_attention("helpers")))
 
 
 def _even_if_shared(situation: str, outcomes: Outcomes) -> Answer:
     claim = "robots of a kind with the same parameters share evenly under the team's credit, too"
-    return Answer(claim, situation, *_even_in_all({"shared": outcomes.get(SHARED, ())}))
+    return Answer(claim, situation, *_even_in_all(outcomes, {"shared": [SHARED]}))
 
 
-def _even_in_all(groups: Mapping[str, Sequence[Outcome]]) -> tuple[str, Holds]:
-    """Whether sharing is even in all groups of runs, by their names."""
-    means = {name: over_runs([run.unevenness for run in runs]) for name, runs in groups.items()}
+def _even_in_all(outcomes: Outcomes, groups: Mapping[str, Sequence[Arm]]) -> tuple[str, Holds]:
+    """Whether sharing is even in all groups of arms, by their names."""
+    means = {name: _mean(outcomes, arms, "unevenness") for name, arms in groups.items()}
     measured = "; ".join(
-        f"{name}: {shown(means[name])}, idle {idle_shown(runs)}" for name, runs in groups.items()
+        f"{name}: {shown(means[name])}, idle {idle_shown(outcomes, arms)}"
+        for name, arms in groups.items()
     )
-    idle = any(idle_runs(runs)[0] for runs in groups.values())
+    idle = any(idle_seeds(outcomes, arms)[0] for arms in groups.values())
     margin = MARGINS["unevenness"]
     found = [mean for mean in means.values() if mean is not None]
     if idle or any(mean.low is not None and mean.low > margin for mean in found):
@@ -165,8 +181,8 @@ def _even_in_all(groups: Mapping[str, Sequence[Outcome]]) -> tuple[str, Holds]:
 
 
 def _held_even(situation: str, outcomes: Outcomes) -> Answer:
-    runs = [run for credit in CREDITS for run in outcomes.get(Arm(credit, PENALTIES[-1]), ())]
-    mean = over_runs([run.entropy_share for run in runs])
+    arms = [Arm(credit, PENALTIES[-1]) for credit in CREDITS]
+    mean = _mean(outcomes, arms, "entropy_share")
     holds: Holds = "undecided"
     if mean is not None and mean.low is not None and mean.low > EVEN_ENTROPY:
         holds = "yes"

@@ -1,4 +1,4 @@
-"""Effects of attention, credit and penalty on the runs' figures; the run is the unit.
+"""Effects of attention, credit and penalty on the runs' figures; the seed is the unit.
 
 An effect is a contrast of arms: a weighted sum of their means. With uniform weights there is no
 penalty, so that one arm stands against those with learnt attention at every penalty.
@@ -11,10 +11,13 @@ from dataclasses import dataclass, replace
 
 from innerattn.evaluate.comparison import Contrast, contrast, holm
 from innerattn.study.crossed.arms import CREDITS, CROSSED, PENALTIES, SHARED, Arm, Credit
-from innerattn.study.crossed.outcome import Outcome
+from innerattn.study.crossed.outcome import Outcomes
 
 MARGINS = {"unevenness": 0.1, "score": 0.05, "entropy_share": 0.02}
 """The figures that effects are asked of, and the largest difference that counts as none."""
+
+LEAST_SEEDS = 3
+"""An effect needs so many seeds that have a run of each arm."""
 
 Weights = Mapping[Arm, float]
 
@@ -28,8 +31,8 @@ class Effect:
         figure: one of `MARGINS`.
         name: what is compared with what.
         main: it is an average over the other factors, or an interaction; else within one level.
-        runs: how many the compared arms have.
-        found: None where an arm has less than two runs with the figure, or none has any scatter.
+        seeds: how many have the figure in each of the compared arms.
+        found: None where these are less than `LEAST_SEEDS`, or do not differ.
         holm_p: its p-value, adjusted for all that is asked at once in its situation: the main
             effects on all figures together, and likewise all the others.
     """
@@ -38,7 +41,7 @@ class Effect:
     figure: str
     name: str
     main: bool
-    runs: int
+    seeds: int
     found: Contrast | None
     holm_p: float | None = None
 
@@ -80,7 +83,7 @@ def contrasts() -> list[tuple[str, bool, Weights]]:
     return [*asked, (name, False, {SHARED: 1.0, own: -1.0})]
 
 
-def effects(situation: str, outcomes: Mapping[Arm, Sequence[Outcome]]) -> list[Effect]:
+def effects(situation: str, outcomes: Outcomes) -> list[Effect]:
     """All effects on all figures in one situation.
 
     Args:
@@ -90,15 +93,21 @@ def effects(situation: str, outcomes: Mapping[Arm, Sequence[Outcome]]) -> list[E
     found = []
     for figure, margin in MARGINS.items():
         values = {
-            arm: [value for run in runs if (value := getattr(run, figure)) is not None]
+            arm: {
+                seed: value
+                for seed, run in runs.items()
+                if (value := getattr(run, figure)) is not None
+            }
             for arm, runs in outcomes.items()
         }
         for name, main, weights in contrasts():
-            groups = [values.get(arm, []) for arm in weights]
-            enough = all(len(group) > 1 for group in groups)
-            compared = contrast(groups, list(weights.values()), margin) if enough else None
-            runs = sum(len(group) for group in groups)
-            found.append(Effect(situation, figure, name, main, runs, compared))
+            arms = [values.get(arm, {}) for arm in weights]
+            seeds = sorted(set.intersection(*(set(by_seed) for by_seed in arms)))
+            compared = None
+            if len(seeds) >= LEAST_SEEDS:
+                rows = [[by_seed[seed] for by_seed in arms] for seed in seeds]
+                compared = contrast(rows, list(weights.values()), margin)
+            found.append(Effect(situation, figure, name, main, len(seeds), compared))
     return _adjusted(found, main=True) + _adjusted(found, main=False)
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from innerattn.errors import RunError
 from innerattn.evaluate.sharing.evenness import counts_by_episode
+from innerattn.study.crossed.arms import Arm
 from innerattn.study.run import Measured
 
 IDLE = 0.2
@@ -33,6 +34,10 @@ class Outcome:
     rescues_per_episode: float
     score: float | None
     entropy_share: float | None
+
+
+Outcomes = Mapping[Arm, Mapping[int, Outcome]]
+"""What the runs of each arm show, by their seeds."""
 
 
 def outcome_of(measured: Measured) -> Outcome:

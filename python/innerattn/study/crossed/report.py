@@ -14,7 +14,7 @@ from innerattn.config.files import write_whole
 from innerattn.report.arms_figure import ArmDots, ArmPanel, draw_arms
 from innerattn.report.drawing import check_format, write_figure
 from innerattn.study.crossed.arms import ARMS, Arm, arm_of
-from innerattn.study.crossed.claims import RULES, Answer, answers, idle_runs, idle_shown
+from innerattn.study.crossed.claims import RULES, Answer, answers, idle_seeds, idle_shown
 from innerattn.study.crossed.effects import MARGINS, Effect, effects
 from innerattn.study.crossed.outcome import IDLE, OUTCOMES, Outcome, outcome_of
 from innerattn.study.inventory import FinishedRun
@@ -62,8 +62,8 @@ class Situation:
     effects: tuple[Effect, ...]
     answers: tuple[Answer, ...]
 
-    def outcomes(self) -> dict[Arm, list[Outcome]]:
-        """Figures of the runs by arm; arms without runs are there, empty."""
+    def outcomes(self) -> dict[Arm, dict[int, Outcome]]:
+        """Figures of the runs by arm and seed; arms without runs are there, empty."""
         return _by_arm(self.runs)
 
 
@@ -121,8 +121,8 @@ def _situation(name: str, runs: Sequence[FinishedRun]) -> Situation:
     return Situation(name, found, compared, tuple(answers(name, outcomes, compared)))
 
 
-def _by_arm(runs: Sequence[CrossedRun]) -> dict[Arm, list[Outcome]]:
-    return {arm: [run.outcome for run in runs if run.arm == arm] for arm in ARMS}
+def _by_arm(runs: Sequence[CrossedRun]) -> dict[Arm, dict[int, Outcome]]:
+    return {arm: {run.seed: run.outcome for run in runs if run.arm == arm} for arm in ARMS}
 
 
 def _run(run: FinishedRun) -> CrossedRun:
@@ -157,7 +157,7 @@ def _markdown(
         "## How it is decided\n",
         RULES,
         "![All runs](crossed.png)\n",
-        "A dot is a run; bars are means and 95 % intervals over runs.\n",
+        "A dot is a run; bars are means and 95 % intervals over seeds.\n",
     ]
     for situation in situations:
         parts += [f"## {situation.name}\n", _arms_table(situation), _effects_table(situation)]
@@ -168,12 +168,14 @@ def _arms_table(situation: Situation) -> str:
     head = ["arm", "runs", "unevenness", "least share", "runs with an idle robot"]
     head += ["rescues per episode", "score", "entropy / ln(N − 1)"]
     rows = []
-    for arm, runs in situation.outcomes().items():
+    outcomes = situation.outcomes()
+    for arm, by_seed in outcomes.items():
+        runs = list(by_seed.values())
         rows.append(
             [
                 *(str(arm), str(len(runs))),
                 *(shown(_mean(runs, name)) for name in ("unevenness", "least_share")),
-                idle_shown(runs),
+                idle_shown(outcomes, [arm]),
                 *(shown(_mean(runs, name)) for name in ("rescues_per_episode", "score")),
                 shown(_mean(runs, "entropy_share"), 3),
             ]
@@ -182,13 +184,13 @@ def _arms_table(situation: Situation) -> str:
 
 
 def _effects_table(situation: Situation) -> str:
-    head = ["effect", "on", "runs", "difference [95 %]", "Hedges g [95 %]", "p", "p (Holm)"]
+    head = ["effect", "on", "seeds", "difference [95 %]", "Hedges g [95 %]", "p", "p (Holm)"]
     head += ["alike within"]
     rows = []
     for effect in situation.effects:
         found = effect.found
         name = f"**{effect.name}**" if effect.main else effect.name
-        cells = [name, effect.figure.replace("_", " "), str(effect.runs)]
+        cells = [name, effect.figure.replace("_", " "), str(effect.seeds)]
         if found is None or effect.holm_p is None:
             rows.append([*cells, *[NONE] * 5])
             continue
@@ -237,6 +239,7 @@ def _csv(situations: Sequence[Situation]) -> str:
 
 
 def _json(situation: Situation, out: Path) -> dict[str, Any]:
+    outcomes = situation.outcomes()
     return {
         "situation": situation.name,
         "answers": [asdict(answer) for answer in situation.answers],
@@ -245,12 +248,13 @@ def _json(situation: Situation, out: Path) -> dict[str, Any]:
                 **asdict(arm),
                 "method": arm.method,
                 "runs": len(runs),
-                "idle": idle_runs(runs)[0],
+                "idle": idle_seeds(outcomes, [arm])[0],
                 "mean": {
-                    name: asdict(mean) if (mean := _mean(runs, name)) else None for name in OUTCOMES
+                    name: asdict(mean) if (mean := _mean(list(runs.values()), name)) else None
+                    for name in OUTCOMES
                 },
             }
-            for arm, runs in situation.outcomes().items()
+            for arm, runs in outcomes.items()
         ],
         "effects": [asdict(effect) for effect in situation.effects],
         "runs": [
@@ -272,7 +276,8 @@ def _panels(situation: Situation) -> list[ArmPanel]:
     panels = []
     for name, (label, marks, limits) in _DRAWN.items():
         dots = []
-        for arm, runs in situation.outcomes().items():
+        for arm, by_seed in situation.outcomes().items():
+            runs = list(by_seed.values())
             mean = _mean(runs, name)
             values = tuple(value for run in runs if (value := getattr(run, name)) is not None)
             bar = None
