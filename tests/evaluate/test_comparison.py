@@ -176,6 +176,7 @@ def test_document() -> None:
 
 def test_nothing_to_judge_by() -> None:
     assert compare([1.0, 1.0], [2.0, 2.0], 0.5, 0) is None
+    assert compare([0.1] * 3, [0.2] * 3, 0.5, 0) is None  # whose means are rounded
     assert compare([1.0, 1.0], [2.0, 2.1], 0.5, 0) is not None
 
 
@@ -191,6 +192,8 @@ def test_what_is_no_group_is_refused(x: list, margin: float) -> None:
 def test_a_margin_is_needed(margin: float) -> None:
     with pytest.raises(ValueError, match="margin = "):
         compare([1.0, 2.0], [1.0, 3.0], margin, 0)
+    with pytest.raises(ValueError, match="margin = "):
+        contrast([[1.0, 2.0]] * 3, [1.0, -1.0], margin)
 
 
 def test_verdicts_are_false_as_rarely_as_they_say() -> None:

@@ -84,6 +84,7 @@ def contrast(values: ArrayLike, weights: Sequence[float], margin: float) -> Cont
         ValueError: there are less than three seeds, the weights do not fit, or the margin is not
             above 0.
     """
+    _check_margin(margin)
     rows, parts = np.asarray(values, np.float64), np.asarray(weights, np.float64)
     if rows.ndim != 2 or len(rows) < 3 or not np.isfinite(rows).all():
         raise ValueError(f"values = {rows.tolist()}: must be (3 or more, k) finite numbers")
@@ -117,13 +118,14 @@ def compare(x: ArrayLike, y: ArrayLike, margin: float, seed: int) -> Comparison 
     Raises:
         ValueError: there are less than two values, or the margin is not above 0.
     """
+    _check_margin(margin)
     ours, theirs = _values("x", x), _values("y", y)
     groups = (ours, theirs)
+    if all(np.ptp(values) == 0.0 for values in groups):
+        return None
     difference = float(ours.mean() - theirs.mean())
     squares = [float(values.var(ddof=1)) / len(values) for values in groups]
     error = math.sqrt(sum(squares))
-    if error == 0.0:
-        return None
     spread = sum(
         square**2 / (len(values) - 1) for square, values in zip(squares, groups, strict=True)
     )
@@ -182,8 +184,6 @@ def _welch_t(values: NDArray[np.float64], chosen: NDArray[np.int64]) -> NDArray[
 
 def _judged(difference: float, error: float, dof: float, margin: float) -> dict[str, Any]:
     """What t-tests say of a difference, as fields of `Contrast`."""
-    if not (math.isfinite(margin) and margin > 0.0):
-        raise ValueError(f"margin = {margin}: must be finite and above 0")
     half = float(stdtrit(dof, 1.0 - ALPHA / 2.0)) * error
     equivalence_p = float(stdtr(dof, -(margin - abs(difference)) / error))
     return {
@@ -205,6 +205,11 @@ def _hedges_g(effect: float, scale: float, dof: int) -> Interval:
         for quantile in (1.0 - ALPHA / 2.0, ALPHA / 2.0)
     )
     return Interval(correction * effect, low, high)
+
+
+def _check_margin(margin: float) -> None:
+    if not (math.isfinite(margin) and margin > 0.0):
+        raise ValueError(f"margin = {margin}: must be finite and above 0")
 
 
 def _values(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from innerattn.study.claims import Holds
 from innerattn.study.crossed.arms import CREDITS, CROSSED, PENALTIES, SHARED, Arm, Credit
 from innerattn.study.crossed.effects import MARGINS, Effect
-from innerattn.study.crossed.outcome import IDLE, Outcomes
+from innerattn.study.crossed.outcome import IDLE, Outcomes, by_seed
 from innerattn.study.over_runs import OverRuns, over_runs
 from innerattn.study.table2_text import NONE, shown
 
@@ -100,21 +98,13 @@ def idle_shown(outcomes: Outcomes, arms: Sequence[Arm]) -> str:
 
 def idle_seeds(outcomes: Outcomes, arms: Sequence[Arm]) -> tuple[int, int]:
     """In how many seeds some run of the arms has an idle robot, and how many have all runs."""
-    least = _by_seed(outcomes, arms, "least_share").min(axis=1, initial=1.0)
+    least = by_seed(outcomes, arms, "least_share").min(axis=1, initial=1.0)
     return int((least < IDLE).sum()), len(least)
-
-
-def _by_seed(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> NDArray[np.float64]:
-    """A figure of the runs of the arms: a row for each seed that has it in all of them."""
-    runs = [outcomes.get(arm, {}) for arm in arms]
-    seeds = sorted(set.intersection(*(set(by_seed) for by_seed in runs)))
-    rows = [[getattr(by_seed[seed], figure) for by_seed in runs] for seed in seeds]
-    return np.array([row for row in rows if None not in row], np.float64).reshape(-1, len(arms))
 
 
 def _mean(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> OverRuns | None:
     """The mean over seeds of a figure that is averaged over the arms."""
-    return over_runs(_by_seed(outcomes, arms, figure).mean(axis=1).tolist())
+    return over_runs(by_seed(outcomes, arms, figure).mean(axis=1).tolist())
 
 
 def _of_effect(effect: Effect, sign: float) -> tuple[str, Holds]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from innerattn.evaluate.comparison import Contrast, contrast, holm
 from innerattn.study.crossed.arms import CREDITS, CROSSED, PENALTIES, SHARED, Arm, Credit
-from innerattn.study.crossed.outcome import Outcomes
+from innerattn.study.crossed.outcome import Outcomes, by_seed
 
 MARGINS = {"unevenness": 0.1, "score": 0.05, "entropy_share": 0.02}
 """The figures that effects are asked of, and the largest difference that counts as none."""
@@ -92,22 +92,11 @@ def effects(situation: str, outcomes: Outcomes) -> list[Effect]:
     """
     found = []
     for figure, margin in MARGINS.items():
-        values = {
-            arm: {
-                seed: value
-                for seed, run in runs.items()
-                if (value := getattr(run, figure)) is not None
-            }
-            for arm, runs in outcomes.items()
-        }
         for name, main, weights in contrasts():
-            arms = [values.get(arm, {}) for arm in weights]
-            seeds = sorted(set.intersection(*(set(by_seed) for by_seed in arms)))
-            compared = None
-            if len(seeds) >= LEAST_SEEDS:
-                rows = [[by_seed[seed] for by_seed in arms] for seed in seeds]
-                compared = contrast(rows, list(weights.values()), margin)
-            found.append(Effect(situation, figure, name, main, len(seeds), compared))
+            rows = by_seed(outcomes, list(weights), figure)
+            enough = len(rows) >= LEAST_SEEDS
+            compared = contrast(rows, list(weights.values()), margin) if enough else None
+            found.append(Effect(situation, figure, name, main, len(rows), compared))
     return _adjusted(found, main=True) + _adjusted(found, main=False)
 
 

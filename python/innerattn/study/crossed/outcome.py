@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from innerattn.errors import RunError
 from innerattn.evaluate.sharing.evenness import counts_by_episode
@@ -63,6 +64,14 @@ def outcome_of(measured: Measured) -> Outcome:
         score=None if summary["score"] is None else float(summary["score"]["mean"]),
         entropy_share=_mean(summary["attention_entropy_share"]),
     )
+
+
+def by_seed(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> NDArray[np.float64]:
+    """A figure of the runs of some arms: (n, k), a row for each seed that has it in all k arms."""
+    runs = [outcomes.get(arm, {}) for arm in arms]
+    seeds = sorted(set.intersection(*(set(of_arm) for of_arm in runs)))
+    rows = [[getattr(of_arm[seed], figure) for of_arm in runs] for seed in seeds]
+    return np.array([row for row in rows if None not in row], np.float64).reshape(-1, len(arms))
 
 
 def _counts(measured: Measured) -> dict[str, np.ndarray[tuple[int], np.dtype[np.int64]]]:
