@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_run import made_run
 from scipy.stats import ttest_1samp, ttest_rel
 from statsmodels.stats.multitest import multipletests
 
@@ -21,7 +20,6 @@ from innerattn.study.crossed.report import write_crossed
 from innerattn.study.inventory import FinishedRun
 from innerattn.study.plan import PlannedRun
 from innerattn.study.run import StudyRun, read_measured
-from innerattn.train import read_info
 from innerattn.train.weights import digest_of
 
 OUT = Path("study")
@@ -251,23 +249,10 @@ def test_a_task_that_two_robots_do_not_share_is_refused(runs: list[StudyRun]) ->
         outcome_of(replace(measured, scored=scored))
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[FinishedRun]]:
-    """Runs of all arms in mixed, two of each, in a study's folder."""
-    out = tmp_path_factory.mktemp("crossed")
-    found = []
-    for one in plan_crossed(METHODS, ("mixed",), range(2), "quick", out):
-        made = made_run(out / "made", "mixed", one.case.method, one.case.seed)
-        one.folder.parent.mkdir(exist_ok=True)
-        made.folder.rename(one.folder)
-        found.append(FinishedRun(one.case, one.folder, one.config, read_info(one.folder)))
-    return out, found
-
-
 def test_files_are_the_same_twice_and_name_every_run(
-    finished: tuple[Path, list[FinishedRun]],
+    crossed_study: tuple[Path, list[FinishedRun]],
 ) -> None:
-    out, runs = finished
+    out, runs = crossed_study
     names = [f"crossed.{kind}" for kind in ("md", "json", "csv", "pdf", "png")]
     write_crossed(runs, out, "quick", ["mixed td-inner seed 9: failed"])
     before = {name: (out / name).read_bytes() for name in names}

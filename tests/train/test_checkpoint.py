@@ -15,6 +15,8 @@ from innerattn.config import RunConfig, read_toml
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.train import RunFolder, checkpoint, load_policy, read_info, train
+from innerattn.train.checkpoint import newest_weights
+from innerattn.train.weights import digest_of
 
 Configure = Callable[..., RunConfig]
 
@@ -97,6 +99,16 @@ def test_a_newer_checkpoint_is_the_one_loaded(run: Path) -> None:
     folder.save_weights(state, 10_000)
     _, newer = load_policy(run)
     assert all(torch.equal(tensor, state[name]) for name, tensor in newer.state().items())
+
+
+def test_the_newest_weights_are_named(run: Path) -> None:
+    info, weights = read_info(run), newest_weights(run)
+    assert info.weights_sha256 == digest_of(weights)
+    folder = RunFolder(run, info)
+    folder.save_weights(load_policy(run)[1].state() | {"more": torch.ones(2)}, 10_000)
+    folder.mark("done", 10_000, info.updates, info.seconds)
+    assert newest_weights(run) != weights
+    assert read_info(run).weights_sha256 == digest_of(newest_weights(run)) != info.weights_sha256
 
 
 @pytest.mark.parametrize("bad", [math.nan, -math.inf])

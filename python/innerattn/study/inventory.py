@@ -12,9 +12,10 @@ from innerattn.config import RunConfig, read_toml
 from innerattn.errors import InnerattnError
 from innerattn.study.failures import read_failures
 from innerattn.study.plan import Case, PlannedRun
+from innerattn.study.run import digests
 from innerattn.study.scores import NotMeasuredError, read_scores
 from innerattn.train import RunInfo, read_info
-from innerattn.train.checkpoint import newest_weights, plain_file
+from innerattn.train.checkpoint import plain_file
 
 State = Literal["missing", "unfinished", "failed", "finished", "other_configuration", "unreadable"]
 """``failed``: an earlier try ended with an error. A folder of one of the last two states is neither
@@ -112,7 +113,7 @@ def _find(planned: PlannedRun) -> Found:
             return Found(planned, "other_configuration", _some(differing))
         if info.state != "done":
             return Found(planned, "unfinished", f"its state is {info.state!r}")
-        plain_file(newest_weights(folder))
+        digests(folder)
         read_scores(folder, config)
     except NotMeasuredError:
         return Found(planned, "unfinished", "trained, but not measured as a whole")

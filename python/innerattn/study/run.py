@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,7 +14,7 @@ from innerattn.config import RunConfig, read_toml
 from innerattn.errors import RunError
 from innerattn.evaluate.episodes import Record
 from innerattn.evaluate.records import read_records
-from innerattn.train.checkpoint import newest_weights, plain_file
+from innerattn.train.checkpoint import newest_weights, plain_file, read_info
 from innerattn.train.weights import digest_of
 
 
@@ -115,8 +116,12 @@ def read_configs(runs: Sequence[StudyRun]) -> list[RunConfig]:
     return configs
 
 
-def read_measured(run: StudyRun) -> Measured:
+def read_measured(run: StudyRun, *, step_by_step: bool = True) -> Measured:
     """What evaluation recorded of a run.
+
+    Args:
+        run: which.
+        step_by_step: whether every step of ``recorded`` is needed, which `kept.keep` leaves out.
 
     Raises:
         RunError: there is no finished evaluation of the run's method in its folder.
@@ -132,7 +137,9 @@ def read_measured(run: StudyRun) -> Measured:
         if record.first_episode != sum(part.num_episodes for part in scored):
             break
         scored.append(record)
-    if not scored or not scored[0].steps or summary.get("method") != run.method:
+    if not scored or summary.get("method") != run.method:
+        raise RunError(f"{folder}: holds no episodes of {run.method}")
+    if step_by_step and not scored[0].steps:
         raise RunError(f"{folder}: holds no episodes of {run.method} recorded step by step")
     return Measured(run, scored[0], tuple(scored), summary)
 
@@ -146,9 +153,12 @@ def named_from(folder: Path, base: Path) -> str:
 def digests(folder: Path) -> Digests:
     """What tells the run in ``folder`` from any other.
 
+    A run that was kept without its weights has the digest of theirs written down.
+
     Raises:
         RunError: a file is missing, is no plain file, or holds no whole weights.
         ConfigError: ``config.toml`` is not valid.
     """
     config = read_toml(plain_file(folder / "config.toml"))
-    return Digests(config.digest(), digest_of(newest_weights(folder)))
+    kept = None if os.path.lexists(folder / "checkpoints") else read_info(folder).weights_sha256
+    return Digests(config.digest(), kept or digest_of(plain_file(newest_weights(folder))))

@@ -27,7 +27,7 @@ from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.learn.types import Learner
 from innerattn.train.build import build_learner
-from innerattn.train.weights import read_weights, write_weights
+from innerattn.train.weights import digest_of, read_weights, write_weights
 
 SCHEMA_VERSION = 1
 State = Literal["running", "done", "interrupted"]
@@ -37,7 +37,11 @@ _PACKAGES = ("innerattn", "torch", "numpy")
 
 @dataclass(frozen=True)
 class RunInfo:
-    """How a run was made and how far it came; the contents of ``run.json``."""
+    """How a run was made and how far it came; the contents of ``run.json``.
+
+    ``weights_sha256`` is the digest of its newest weights, see `innerattn.train.weights.digest_of`;
+    runs made before it was written down have none.
+    """
 
     schema_version: int
     versions: dict[str, str]
@@ -52,6 +56,7 @@ class RunInfo:
     compiled: bool = False
     products: str = "default"
     warm_start: str = "none"
+    weights_sha256: str | None = None
 
 
 class RunFolder:
@@ -108,7 +113,8 @@ class RunFolder:
     def save_weights(self, tensors: Mapping[str, Tensor], env_steps: int) -> None:
         """Write a checkpoint named after ``env_steps`` and make it the newest one.
 
-        Whatever is raised, the newest checkpoint stays what it was.
+        Whatever is raised, the newest checkpoint stays what it was. Its digest is written down with
+        the next `mark`.
 
         Raises:
             RunError: a value is not finite, which means that training has diverged.
@@ -122,8 +128,10 @@ class RunFolder:
                 )
         folder = self.path / "checkpoints" / str(env_steps)
         folder.mkdir(exist_ok=True)
-        write_weights(folder / "weights.safetensors", tensors)
+        weights = folder / "weights.safetensors"
+        write_weights(weights, tensors)
         write_whole(folder.with_name("latest"), f"{env_steps}\n".encode())
+        self.info = replace(self.info, weights_sha256=digest_of(weights))
 
     def mark(self, state: State, env_steps: int, updates: int, seconds: float) -> None:
         """Write down how far the run has come."""

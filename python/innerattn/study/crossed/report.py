@@ -127,7 +127,8 @@ def _by_arm(runs: Sequence[CrossedRun]) -> dict[Arm, dict[int, Outcome]]:
 
 def _run(run: FinishedRun) -> CrossedRun:
     case = run.case
-    measured = read_measured(StudyRun(case.situation, case.method, case.seed, run.folder))
+    labelled = StudyRun(case.situation, case.method, case.seed, run.folder)
+    measured = read_measured(labelled, step_by_step=False)
     return CrossedRun(
         arm_of(case), case.seed, run.folder, digests(run.folder), outcome_of(measured)
     )
