@@ -36,8 +36,8 @@ situation on all figures, or for all its other effects.
 - **The team's credit makes sharing uneven**: yes where the interval of team minus helpers, over
   attentions and penalties, lies above 0; no where it lies below, or where they are alike.
 - **The team's credit leaves a food robot idle with either attention**: yes where both attentions
-  seeds with such a run (a share of the rescues below {IDLE:g}); no where one of them has none in at
-  least {LEAST_SEEDS} seeds.
+  have seeds with such a run (a share of the rescues below {IDLE:g}); no where one of them has none
+  in at least {LEAST_SEEDS} seeds.
 - **With the helpers' credit sharing is even with either attention**: yes where no robot is idle and
   both intervals of the unevenness lie below {MARGINS["unevenness"]:g}; no where a robot is idle or
   one interval lies above.
