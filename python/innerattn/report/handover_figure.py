@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 from innerattn.report.drawing import BLACK, PAGE_WIDTH_IN, ROBOT_COLOURS, VERMILION
+from innerattn.report.names import place_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
+
+    _Names: TypeAlias = tuple[Sequence[Annotation], Sequence[Annotation]]
+    """Of robots and of victims."""
 
 _MARKERS = "oo^s"  # of robots by index; further ones are diamonds
 _VICTIM_MARKERS = "*XP"
-_NAME_HEIGHT = 0.14  # distance of names, as a share of half the arena
+_ROBOT_PT, _VICTIM_PT = 6.0, 8.0  # sizes of markers
+_GAP_PT = 3.0  # between a name and what it names
 _STAGES = ("(i) before", "(ii) between", "(iii) after")
 
 
@@ -69,9 +76,10 @@ def draw_handover(scene: HandoverScene) -> Figure:
     parts: Any = figure.subfigures(3, 1, height_ratios=(2.55, 1.75, 1.6))
     upper, middle, lower = parts
     arenas = upper.subplots(1, len(_STAGES), squeeze=False)[0]
-    for panel, name, (since, now) in zip(arenas, _STAGES, scene.stages, strict=True):
-        _arena(panel, scene, since, now)
-        panel.set_title(f"{name}: step {now}", fontsize=8)
+    named = []
+    for panel, name, stage in zip(arenas, _STAGES, scene.stages, strict=True):
+        named.append(_arena(panel, scene, stage))
+        panel.set_title(f"{name}: step {stage[1]}", fontsize=8)
     panel_b = middle.subplots(1, 1)
     _weights(panel_b, scene, scene.weights.mean(1))
     panel_b.set_ylabel("weight, mean over heads", fontsize=8)
@@ -105,13 +113,18 @@ def draw_handover(scene: HandoverScene) -> Figure:
     )
     robot = scene.scenario.robots[scene.robot].name
     figure.suptitle(f"{robot} hands over: {scene.title}", fontsize=9)
+    figure.draw_without_rendering()  # lays it out, so that it is known what covers what
+    for panel, names, stage in zip(arenas, named, scene.stages, strict=True):
+        _place(panel, names, scene, stage, figure.dpi / 72.0)
     return figure
 
 
-def _arena(panel: Axes, scene: HandoverScene, since: int, now: int) -> None:
+def _arena(panel: Axes, scene: HandoverScene, stage: tuple[int, int]) -> _Names:
+    """Draw a stage; its names are yet to be placed."""
     from matplotlib.patches import Circle, Rectangle
     from matplotlib.patheffects import withStroke
 
+    since, now = stage
     half = scene.scenario.arena_half_width_m
     panel.set(xlim=(-1.08 * half, 1.08 * half), ylim=(-1.08 * half, 1.08 * half), aspect="equal")
     panel.add_patch(Rectangle((-half, -half), 2 * half, 2 * half, fill=False, linewidth=1.2))
@@ -121,44 +134,71 @@ def _arena(panel: Axes, scene: HandoverScene, since: int, now: int) -> None:
     panel.set_yticks([-half, 0, half])
     panel.tick_params(labelsize=7, length=2)
     halo = [withStroke(linewidth=1.8, foreground="white")]
-    text: dict[str, Any] = {"fontsize": 6, "textcoords": "offset points", "path_effects": halo}
-    tasks = scene.scenario.tasks
-    for victim in scene.victims[now][scene.victims[now]["present"].astype(bool)]:
-        x, y, task = float(victim["x"]), float(victim["y"]), int(victim["task"])
-        marker = _VICTIM_MARKERS[task % len(_VICTIM_MARKERS)]
-        panel.plot([x], [y], marker, color=VERMILION, markersize=8, markeredgewidth=0.0, zorder=2)
-        ring = Circle((x, y), scene.scenario.rescue_radius_m, fill=False, linestyle="--")
-        ring.set(edgecolor=VERMILION, linewidth=0.7)
-        panel.add_patch(ring)
-        style: dict[str, Any] = {"ha": "center", "color": VERMILION, "zorder": 6}
-        panel.annotate(tasks[task].name, (x, y), (0, -15), **style, **text)
-    heights = _apart(scene.positions[now, :, 1], _NAME_HEIGHT * half)
+    text: dict[str, Any] = {
+        "fontsize": 6,
+        "xytext": (0, 0),
+        "textcoords": "offset points",
+        "path_effects": halo,
+        "zorder": 6,
+        "in_layout": False,
+    }
+    robots, victims = [], []
     for r, robot in enumerate(scene.scenario.robots):
         colour, own = ROBOT_COLOURS[r % len(ROBOT_COLOURS)], r == scene.robot
         trail = scene.positions[since : now + 1, r]
         panel.plot(*trail.T, color=colour, linewidth=1.6 if own else 0.9, zorder=3)
         edge: dict[str, Any] = {"markeredgecolor": BLACK, "markeredgewidth": 1.2 if own else 0.4}
-        panel.plot(*trail[-1:].T, _marker(r), color=colour, markersize=6, zorder=4, **edge)
-        x = float(trail[-1, 0])
-        style = {"ha": "left" if x < 0 else "right", "va": "center", "zorder": 5}
+        style: dict[str, Any] = {"color": colour, "markersize": _ROBOT_PT, "zorder": 4, **edge}
+        panel.plot(*trail[-1:].T, _marker(r), **style)
         weight = "bold" if own else "normal"
-        beside = (6 if x < 0 else -6, 0)
-        panel.annotate(robot.name, (x, heights[r]), beside, fontweight=weight, **style, **text)
+        robots.append(panel.annotate(robot.name, tuple(trail[-1]), fontweight=weight, **text))
+    radius = scene.scenario.rescue_radius_m
+    for victim in _present(scene, now):
+        x, y, task = float(victim["x"]), float(victim["y"]), int(victim["task"])
+        marker = _VICTIM_MARKERS[task % len(_VICTIM_MARKERS)]
+        style = {"color": VERMILION, "markersize": _VICTIM_PT, "markeredgewidth": 0.0, "zorder": 2}
+        panel.plot([x], [y], marker, **style)
+        ring = Circle((x, y), radius, fill=False, linestyle="--")
+        ring.set(edgecolor=VERMILION, linewidth=0.7)
+        panel.add_patch(ring)
+        name = scene.scenario.tasks[task].name
+        victims.append(panel.annotate(name, (x, y), color=VERMILION, **text))
+    return robots, victims
 
 
-def _apart(values: NDArray[np.float32], least: float) -> list[float]:
-    """Values pushed apart until neighbours differ by ``least``, about the place where they were."""
-    order = np.argsort(values)
-    placed = values[order].astype(np.float64)
-    for _ in range(len(placed) ** 2):
-        for low in range(len(placed) - 1):
-            overlap = least - (placed[low + 1] - placed[low])
-            if overlap > 0.0:
-                placed[low] -= overlap / 2.0
-                placed[low + 1] += overlap / 2.0
-    found = np.empty(len(placed))
-    found[order] = placed
-    return [float(value) for value in found]
+def _present(scene: HandoverScene, now: int) -> NDArray[np.void]:
+    """The victims that are there at a step."""
+    victims: NDArray[np.void] = scene.victims[now]
+    there: NDArray[np.void] = victims[victims["present"].astype(bool)]
+    return there
+
+
+def _place(
+    panel: Axes, names: _Names, scene: HandoverScene, stage: tuple[int, int], point_px: float
+) -> None:
+    """Put the names where they cover no robot, victim or trail, as far as that can be."""
+    from matplotlib.transforms import Bbox
+
+    since, now = stage
+    robots, victims = names
+    half, radius = scene.scenario.arena_half_width_m, scene.scenario.rescue_radius_m
+    to_px = panel.transData.transform
+    arena = Bbox(to_px([(-half, -half), (half, half)]))
+    ring_pt = radius * arena.width / (2.0 * half) / point_px
+    there = _present(scene, now)
+    marks = []
+    for points, size_pt in (
+        (scene.positions[now], _ROBOT_PT),
+        (np.stack([there["x"], there["y"]], -1), _VICTIM_PT),
+        (scene.positions[since:now].reshape(-1, 2), 1.0),
+    ):
+        side = size_pt * point_px
+        corners = np.asarray(to_px(points)) - side / 2.0
+        marks += [Bbox.from_bounds(x, y, side, side) for x, y in corners]
+    own_first = sorted(robots, key=lambda name: name is not robots[scene.robot])
+    beside = [(name, _ROBOT_PT / 2.0 + _GAP_PT) for name in own_first]
+    beside += [(name, ring_pt + _GAP_PT) for name in victims]
+    place_names(beside, arena, marks)
 
 
 def _weights(panel: Axes, scene: HandoverScene, weights: NDArray[np.float32]) -> None:
