@@ -15,6 +15,7 @@ LEARNING = PERFORMANCE.with_name("learning.md")
 ROBUSTNESS = PERFORMANCE.with_name("robustness.md")
 REPRODUCTION = PERFORMANCE.with_name("reproduction.md")
 CROSSED = PERFORMANCE.with_name("crossed.md")
+PAPER_PROTOCOL = PERFORMANCE.with_name("paper_protocol.md")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -1,44 +1,70 @@
-"""Puts what `innerattn reproduce` made into the documentation, text and pictures; it makes nothing.
+"""Puts what `innerattn reproduce` made into the documentation: text, pictures, records of runs.
 
-`python benches/reproduction.py STUDY` fills a place in `docs/reproduction.md` from the report in
-STUDY, and one in `docs/crossed.md` from its crossed design, whichever are there.
+`python benches/reproduction.py STUDY` fills the place of STUDY's newest report: of budget `short`
+in `docs/reproduction.md`, of budget `paper` in `docs/paper_protocol.md`, and of the crossed design
+in `docs/crossed.md`. Small copies of its runs go to the page's folder in `docs/records`. It makes
+no figure.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
-from page import CROSSED, REPRODUCTION, publish
+from page import CROSSED, PAPER_PROTOCOL, REPRODUCTION, publish
 
-PAGES = {"report.md": REPRODUCTION, "crossed.md": CROSSED}
-"""Where each report of a study goes."""
+from innerattn.study.kept import keep
+from innerattn.study.run import StudyRun
+
+PLACES = {
+    ("report.md", "short"): (REPRODUCTION, "reproduction"),
+    ("report.md", "paper"): (PAPER_PROTOCOL, "paper-protocol"),
+    ("crossed.md", "short"): (CROSSED, "reproduction"),
+}
+"""Where a report goes by its budget, and how the names of its pictures begin."""
+DOCS = REPRODUCTION.parent
 
 
 def main() -> None:
-    """Copy the pictures and the reports, a level of headings deeper."""
+    """Copy the pictures, the report, a level of headings deeper, and the records."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("study", type=Path, help="folder of the study")
     study = parser.parse_args().study
-    reports = [study / name for name in PAGES if (study / name).exists()]
-    if not reports:
-        sys.exit(f"{study}: none of {', '.join(PAGES)}")
-    for report in reports:
-        publish("report", _with_pictures(report), PAGES[report.name])
+    try:
+        account = json.loads((study / "runs.json").read_text())
+    except FileNotFoundError:
+        sys.exit(f"{study}: no study; `innerattn reproduce` makes one")
+    name = "crossed.md" if account["target"] == "crossed" else "report.md"
+    place = PLACES.get((name, account["budget"]))
+    if place is None or not (study / name).exists():
+        sys.exit(f"{study}: no {name} of budget {account['budget']!r} that a page has a place for")
+    page, pictures = place
+    publish("report", _with_pictures(study / name, pictures), page)
+    _keep_runs(account["runs"], study, DOCS / "records" / page.stem)
 
 
-def _with_pictures(report: Path) -> str:
+def _with_pictures(report: Path, prefix: str) -> str:
     """A report as part of a page; its pictures are copied to where the page shows them."""
     text = report.read_text()
     for name in re.findall(r"\]\(([^)]+)\.png\)", text):
-        target = REPRODUCTION.parent / "images" / f"reproduction-{name}"
+        target = DOCS / "images" / f"{prefix}-{name}"
         for kind in (".png", ".pdf"):
             shutil.copyfile(report.with_name(f"{name}{kind}"), target.with_suffix(kind))
         text = text.replace(f"({name}.png)", f"(images/{target.name}.png)")
     return re.sub("^#", "##", text, flags=re.MULTILINE).strip()
+
+
+def _keep_runs(runs: list[dict[str, Any]], study: Path, records: Path) -> None:
+    """Small copies of the runs that a report is made of."""
+    for run in runs:
+        if run["state"] == "finished":
+            labelled = StudyRun(run["situation"], run["method"], run["seed"], study / run["folder"])
+            keep(labelled, records / run["folder"])
 
 
 if __name__ == "__main__":

@@ -1,0 +1,62 @@
+"""The runs kept in the documentation are those that its pages show, and show what they say."""
+
+from pathlib import Path
+
+import pytest
+
+from innerattn.config import read_toml
+from innerattn.evaluate.sharing.evenness import counts_by_episode
+from innerattn.study.crossed.outcome import outcome_of
+from innerattn.study.run import Measured, StudyRun, digests, read_measured
+from innerattn.study.scores import read_scores
+
+DOCS = Path(__file__).parents[1] / "docs"
+KEPT = sorted((DOCS / "records").glob("*/runs/*"))
+
+
+def measured(folder: Path) -> Measured:
+    config = read_toml(folder / "config.toml")
+    train = config.train
+    run = StudyRun(config.scenario.situation, train.method, train.seed, folder)
+    assert read_scores(folder, config)
+    return read_measured(run, step_by_step=False)
+
+
+def page(folder: Path) -> list[list[str]]:
+    """Cells of every table of the page that a run was kept for."""
+    text = (DOCS / f"{folder.parents[1].name}.md").read_text("utf-8")
+    return [line.strip("| ").split(" | ") for line in text.splitlines() if line[:2] == "| "]
+
+
+def row(folder: Path) -> list[str]:
+    """Cells of the row that names the run."""
+    (found,) = [cells for cells in page(folder) if f"`runs/{folder.name}`" in cells]
+    return found
+
+
+def of_page(name: str) -> list[Path]:
+    found = [folder for folder in KEPT if folder.parents[1].name == name]
+    assert found
+    return found
+
+
+@pytest.mark.parametrize("folder", KEPT, ids=lambda folder: folder.name)
+def test_the_page_names_the_run(folder: Path) -> None:
+    named = digests(folder)
+    assert row(folder)[-2:] == [f"`{named.config}`", f"`{named.weights}`"]
+
+
+@pytest.mark.parametrize("folder", of_page("crossed"), ids=lambda folder: folder.name)
+def test_figures_of_the_crossed_design(folder: Path) -> None:
+    found = outcome_of(measured(folder))
+    shown = [float(cell) for cell in row(folder)[3:6]]
+    assert shown == pytest.approx([found.unevenness, found.least_share, found.score], abs=0.0051)
+
+
+@pytest.mark.parametrize("folder", of_page("paper_protocol"), ids=lambda folder: folder.name)
+def test_counts_of_the_paper_protocol(folder: Path) -> None:
+    found = measured(folder)
+    for task in found.scored[0].scenario.tasks:
+        first, second = sum(counts_by_episode(part)[task.name].sum(0) for part in found.scored)
+        cells = [found.run.method, task.name, str(found.run.seed), f"{first} + {second}"]
+        assert cells in [line[:4] for line in page(folder)]
