@@ -109,6 +109,22 @@ def test_several_runs_share_one_display() -> None:
     ]
 
 
+def test_hours_are_told_once_the_pace_is_known() -> None:
+    out = io.StringIO()
+    now = [0.0]
+    runs = [Run(RunConfig(), Path(f"run-s{seed}")) for seed in range(4)]
+    with SeveralRuns(Console(file=out, width=120), clock=lambda: now[0]) as show:
+        for share in (0.001, 0.02, 0.03, 0.5):
+            runs[0].state, runs[0].share = "running", share
+            runs[1].state, runs[1].share = "running", share
+            show(runs)
+            now[0] += 1800.0
+            show(runs)
+    lefts = [line.split(" | ")[1] for line in out.getvalue().splitlines()]
+    # Half of two runs in two hours of both: four hours each, and another round of four.
+    assert lefts == ["-:-- left", "-:-- left", "98:30:00 left", "6:00:00 left"]
+
+
 def test_runs_one_after_the_other_leave_a_place_free_between_them() -> None:
     out = io.StringIO()
     now = [0.0]

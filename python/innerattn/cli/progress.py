@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _PLAIN_EVERY_S = 10.0
 _STATES = ("running", "done", "failed")
+_TELLING = 0.05  # of a run; less says little of the pace, since runs begin slowly
 
 
 class Work:
@@ -57,22 +58,33 @@ class Work:
         if self._bar is not None:
             self._bar.stop()
 
-    def show(self, done: float, total: float, note: str, left_s: float | None = None) -> None:
+    def show(self, done: float, total: float, note: str) -> None:
         """Show that ``done`` of ``total`` units are done, and a note.
 
-        Time left is ``left_s``; None: as long as the rest takes at the pace so far.
+        The rest is taken to go at the pace so far.
         """
         now = self._clock()
-        share = min(done / total, 1.0)
-        if left_s is None and share > 0.0:
-            left_s = (now - self._start) * (1.0 / share - 1.0)
-        left = "-:--" if left_s is None else f"{int(left_s) // 60}:{int(left_s) % 60:02d}"
-        head = f"{self.title} {share:4.0%} | {left} left"
+        left_s = (now - self._start) * (total / done - 1.0) if done > 0.0 else None
+        self._put(now, done / total, note, left_s)
+
+    def _put(self, now: float, share: float, note: str, left_s: float | None) -> None:
+        """Show the share that is done and the time left [s]; none where it is not known yet."""
+        share = min(share, 1.0)
+        head = f"{self.title} {share:4.0%} | {_clock_text(left_s)} left"
         if self._bar is not None:
             self._bar.update(self._task, completed=share, description=f"{head}\n{note}")
         elif now - self._last_line >= _PLAIN_EVERY_S:
             self._console.print(f"{head} | {note}", soft_wrap=True)
             self._last_line = now
+
+
+def _clock_text(seconds: float | None) -> str:
+    """As M:SS, from an hour on as H:MM:SS."""
+    if seconds is None:
+        return "-:--"
+    minutes, rest = divmod(max(int(seconds), 0), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
 class Training(Work):
@@ -158,12 +170,12 @@ class SeveralRuns(Work):
         note = f"{count['done']} of {len(runs)} runs done, {count['running']} running"
         if count["failed"]:
             note += f", {count['failed']} failed"
-        self.show(done, len(runs), note, self._left(runs))
+        self._put(now, done / len(runs), note, self._left(runs))
 
     def _left(self, runs: Sequence[Run]) -> float | None:
         """Time until the last run is done [s]; each waiting one takes the first free place."""
         progress = sum(run.share for run in runs)
-        if not (progress and self._spent):
+        if progress < _TELLING or not self._spent:
             return None
         a_run = self._spent / progress
         places = [(1.0 - run.share) * a_run for run in runs if run.state == "running"]
