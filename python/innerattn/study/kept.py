@@ -30,7 +30,7 @@ def keep(run: StudyRun, target: Path) -> None:
         target: the copy; one that is there already stays as it is.
 
     Raises:
-        RunError: the run is not finished, or another run is at ``target``.
+        RunError: the run has no weights or no finished evaluation, or another is at ``target``.
         OSError: a file cannot be read or written; the copy is made whole or not at all.
     """
     named = digests(run.folder)
