@@ -1,9 +1,9 @@
-//! `Scenario`: what a rescue world is made of, as plain data, and the rules a valid one obeys.
-//! Nothing here moves or draws anything.
+//! `Scenario`: what a rescue world is made of, as plain data. Nothing here moves or draws anything.
+
+mod validity;
 
 use serde::{Deserialize, Serialize};
 
-use crate::check::{broken, counts, named, within};
 use crate::error::{Error, Result};
 use crate::fault::Fault;
 
@@ -316,152 +316,11 @@ impl Scenario {
         self.tasks.iter().map(|task| task.needs.len()).max().unwrap_or(0)
     }
 
-    /// Checks every value and every rule between values.
-    ///
-    /// # Errors
-    /// [`Error::Scenario`] for the first rule that is broken.
-    pub fn validate(&self) -> Result<()> {
-        self.validate_numbers()?;
-        self.validate_robots()?;
-        self.validate_tasks()?;
-        self.validate_obstacles()?;
-        self.validate_faults()
-    }
-
-    fn validate_numbers(&self) -> Result<()> {
-        within("arena_half_width_m", self.arena_half_width_m, 0.2, 100.0, "m")?;
-        within("rescue_radius_m", self.rescue_radius_m, 0.001, 10.0, "m")?;
-        within("spawn_clearance_m", self.spawn_clearance_m, 0.0, 10.0, "m")?;
-        within("wall_clearance_m", self.wall_clearance_m, 0.0, 10.0, "m")?;
-        within("dt_s", self.dt_s, 0.001, 1.0, "s")?;
-        within("damping", self.damping, 0.0, 1.0, "")?;
-        within("friction", self.friction, 0.0, 10.0, "")?;
-        within("rescue_reward", self.rescue_reward, -1e6, 1e6, "")?;
-        within("shaping_weight", self.shaping_weight, -1e6, 1e6, "per m")?;
-        within("shaping_discount", self.shaping_discount, 0.0, 1.0, "")?;
-        within("contact_cost", self.contact_cost, -1e6, 1e6, "")?;
-        within("action_cost", self.action_cost, -1e6, 1e6, "")?;
-        if self.engine == Engine::Discs && self.friction != 0.0 {
-            return broken("friction", &self.friction, "must be 0 where engine = \"discs\"");
-        }
-        counts("episode_steps", self.episode_steps as usize, 1, 1_000_000)?;
-        counts("substeps", self.substeps as usize, 1, 1000)?;
-        counts("max_victims", self.max_victims, 1, MAX_VICTIMS)?;
-        if let Some(rescues) = self.end_when_rescued {
-            counts("end_when_rescued", rescues as usize, 1, 1_000_000)?;
-        }
-        Ok(())
-    }
-
-    fn validate_robots(&self) -> Result<()> {
-        counts("robots (their number)", self.robots.len(), 1, MAX_ROBOTS)?;
-        for (index, robot) in self.robots.iter().enumerate() {
-            let key = |name: &str| format!("robots[{index}].{name}");
-            named(&key("name"), &robot.name)?;
-            named(&key("kind"), &robot.kind)?;
-            if self.robots[..index].iter().any(|other| other.name == robot.name) {
-                return broken(&key("name"), &robot.name, "names must differ");
-            }
-            for ability in &robot.abilities {
-                named(&key("abilities"), ability)?;
-            }
-            within(&key("max_speed_mps"), robot.max_speed_mps, 0.01, 100.0, "m/s")?;
-            within(&key("mass_kg"), robot.mass_kg, 0.01, 1000.0, "kg")?;
-            within(&key("radius_m"), robot.radius_m, 0.005, 10.0, "m")?;
-            within(&key("drive_force_n"), robot.drive_force_n, 0.0, 1e5, "N")?;
-        }
-        let ratio = self.mass_ratio();
-        if ratio > MAX_MASS_RATIO {
-            let rule = format!("must be at most {MAX_MASS_RATIO}");
-            return broken("robots (heaviest to lightest mass_kg)", &ratio, &rule);
-        }
-        counts("robots (their different abilities)", self.abilities().len(), 0, MAX_ABILITIES)
-    }
-
     /// What the heaviest robot weighs, in weights of the lightest.
     #[must_use]
     pub fn mass_ratio(&self) -> f64 {
         let masses = || self.robots.iter().map(|robot| robot.mass_kg);
         masses().fold(0.0, f64::max) / masses().fold(f64::INFINITY, f64::min)
-    }
-
-    fn validate_tasks(&self) -> Result<()> {
-        counts("tasks (their number)", self.tasks.len(), 1, MAX_VICTIMS)?;
-        for (index, task) in self.tasks.iter().enumerate() {
-            let key = |name: &str| format!("tasks[{index}].{name}");
-            named(&key("name"), &task.name)?;
-            if self.tasks[..index].iter().any(|other| other.name == task.name) {
-                return broken(&key("name"), &task.name, "names must differ");
-            }
-            counts(&key("needs (their number)"), task.needs.len(), 1, MAX_NEEDS)?;
-            if !self.can_serve(&task.needs) {
-                let needs = task.needs.join(" + ");
-                return broken(&key("needs"), &needs, "the team has no distinct able robot for each need");
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether distinct robots can fill all needs at once: a matching, found by augmenting paths.
-    fn can_serve(&self, needs: &[String]) -> bool {
-        fn fill(
-            team: &[Robot],
-            needs: &[String],
-            need: usize,
-            tried: &mut [bool],
-            by: &mut [Option<usize>],
-        ) -> bool {
-            for robot in 0..team.len() {
-                if tried[robot] || !team[robot].abilities.contains(&needs[need]) {
-                    continue;
-                }
-                tried[robot] = true;
-                if by[robot].is_none_or(|other| fill(team, needs, other, tried, by)) {
-                    by[robot] = Some(need);
-                    return true;
-                }
-            }
-            false
-        }
-        let mut by = vec![None; self.robots.len()];
-        (0..needs.len())
-            .all(|need| fill(&self.robots, needs, need, &mut vec![false; self.robots.len()], &mut by))
-    }
-
-    fn validate_faults(&self) -> Result<()> {
-        counts("faults (their number)", self.faults.len(), 0, MAX_FAULTS)?;
-        let names: Vec<&str> = self.robots.iter().map(|robot| robot.name.as_str()).collect();
-        let checked = |(index, fault): (usize, &Fault)| {
-            fault.validate(&format!("faults[{index}]"), &names, self.episode_steps)
-        };
-        self.faults.iter().enumerate().try_for_each(checked)
-    }
-
-    fn validate_obstacles(&self) -> Result<()> {
-        counts("obstacles (their number)", self.obstacles.len(), 0, MAX_OBSTACLES)?;
-        for (index, obstacle) in self.obstacles.iter().enumerate() {
-            let key = |name: &str| format!("obstacles[{index}].{name}");
-            match (obstacle.shape, obstacle.radius_m, obstacle.half_extents_m) {
-                (Shape::Disc, Some(radius), None) => {
-                    within(&key("radius_m"), radius, 0.005, self.arena_half_width_m, "m")?;
-                }
-                (Shape::Box, None, Some(half)) => {
-                    within(&key("half_extents_m[0]"), half[0], 0.005, self.arena_half_width_m, "m")?;
-                    within(&key("half_extents_m[1]"), half[1], 0.005, self.arena_half_width_m, "m")?;
-                }
-                (Shape::Disc, ..) => {
-                    return broken(&key("shape"), &"disc", "a disc has radius_m and no half_extents_m");
-                }
-                (Shape::Box, ..) => {
-                    return broken(&key("shape"), &"box", "a box has half_extents_m and no radius_m");
-                }
-            }
-            if let Some([x, y]) = obstacle.position_m {
-                within(&key("position_m[0]"), x, -self.arena_half_width_m, self.arena_half_width_m, "m")?;
-                within(&key("position_m[1]"), y, -self.arena_half_width_m, self.arena_half_width_m, "m")?;
-            }
-        }
-        Ok(())
     }
 }
 
