@@ -75,7 +75,8 @@ def train_in_turn(
     assert at_once >= 1
     for run in runs:
         try:
-            train(run.config, run.folder)
+            if not run.trained:
+                train(run.config, run.folder)
             evaluation = evaluate_run(run.folder)
             evaluation.write(run.folder / "evaluation")
             run.state, run.share, run.summary = "done", 1.0, evaluation.summary

@@ -165,10 +165,25 @@ def test_the_crossed_design_has_runs_and_files_of_its_own(
     }
 
 
+def test_a_run_that_is_not_measured_is_measured_and_not_trained(
+    study: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    left, kept = (study / "runs" / name for name in NAMES)
+    before, trained = times(kept), times(left / "checkpoints")
+    lost = left / "evaluation" / "summary.json"
+    summary = lost.read_bytes()
+    lost.unlink()
+    assert command("table2", study, "td-inner,td-uniform", "--seeds", "1") == 0
+    assert "1 finished, 0 to train, 1 to measure only, 1 at a time" in capsys.readouterr().out
+    assert lost.read_bytes() == summary
+    assert (times(kept), times(left / "checkpoints")) == (before, trained)
+
+
 @pytest.mark.usefixtures("in_this_process")
 def test_an_unfinished_run_is_trained_again(study: Path, command: Command) -> None:
     left, kept = (study / "runs" / name for name in NAMES)
-    (left / "evaluation" / "summary.json").unlink()
+    info = json.loads((left / "run.json").read_text())
+    (left / "run.json").write_text(json.dumps(info | {"state": "interrupted"}))
     (left / "of an earlier try").touch()
     before_it = weights(left)
     before = times(kept)

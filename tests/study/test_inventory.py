@@ -1,6 +1,7 @@
 """What is found of planned runs: only what is whole and as planned is used."""
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from innerattn.errors import RunError
 from innerattn.study.failures import forget_failures, note_failure
 from innerattn.study.inventory import Found, finished_runs, take_inventory
 from innerattn.study.plan import PlannedRun, plan
+from innerattn.study.run import digests
 
 
 @pytest.fixture
@@ -49,14 +51,41 @@ def test_a_run_that_did_not_end_is_unfinished(
 
 
 @pytest.mark.parametrize("name", ["summary.json", "episodes.parquet", "rescues.parquet"])
-def test_a_run_without_its_whole_evaluation_is_unfinished(
+def test_a_run_without_its_whole_evaluation_is_unmeasured(
     name: str, study: Path, planned: list[PlannedRun]
 ) -> None:
     file = planned[0].folder / "evaluation" / name
     file.write_bytes(file.read_bytes()[:-20])
-    assert find(planned, study).state == "unfinished"
+    assert find(planned, study).state == "unmeasured"
     file.unlink()
-    assert find(planned, study).state == "unfinished"
+    assert find(planned, study).state == "unmeasured"
+    note_failure(study, planned[0], "its disk was full")
+    assert find(planned, study).state == "unmeasured"
+
+
+def test_what_cannot_be_measured_again_is_left_alone(
+    study: Path, planned: list[PlannedRun]
+) -> None:
+    folder = planned[0].folder
+    digest = digests(folder).weights
+    shutil.rmtree(folder / "checkpoints")  # a small copy of a run has no weights
+    edit(folder / "run.json", lambda info: info.update(weights_sha256=digest))
+    assert find(planned, study).state == "finished"
+    (folder / "evaluation" / "summary.json").unlink()
+    found = find(planned, study)
+    assert (found.state, found.why) == (
+        "unreadable",
+        f"kept without its weights, and {folder / 'evaluation' / 'summary.json'}: missing",
+    )
+
+
+def test_an_evaluation_of_another_version_is_left_alone(
+    study: Path, planned: list[PlannedRun]
+) -> None:
+    path = planned[0].folder / "evaluation" / "summary.json"
+    path.write_text('{"schema_version": 2, "what comes then": []}')
+    found = find(planned, study)
+    assert (found.state, found.why) == ("unreadable", f"{path}: schema_version = 2: must be 1")
 
 
 def test_another_configuration_is_named_with_both_values(

@@ -1,14 +1,17 @@
 """Which runs a study needs: all of them, seed by seed, and the same as `innerattn train` makes."""
 
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from innerattn.cli.main import main
 from innerattn.config import BUDGETS, RunConfig
 from innerattn.errors import ConfigError, RunError
-from innerattn.study.plan import METHODS, SITUATIONS, TARGETS, Case, plan, smoke_note
+from innerattn.study.crossed.arms import plan_crossed
+from innerattn.study.plan import METHODS, SITUATIONS, TARGETS, Case, PlannedRun, plan, smoke_note
 
 OUT = Path("study")
 
@@ -33,6 +36,15 @@ def test_a_run_is_what_its_name_says() -> None:
         assert one.folder == OUT / "runs" / f"{case.situation}-{case.method}-short-s{case.seed}"
 
 
+@pytest.mark.parametrize("make", [plan, plan_crossed])
+def test_only_runs_of_one_seed_are_measured_in_the_same_worlds(make: Callable[..., Any]) -> None:
+    planned: list[PlannedRun] = make(
+        ("td-inner", "td-uniform"), ("mixed",), (0, 1, 5), "short", OUT
+    )
+    worlds = {(one.case.seed, one.config.evaluate.seed) for one in planned}
+    assert worlds == {(0, 12_345), (1, 12_346), (5, 12_350)}
+
+
 def test_targets() -> None:
     assert set(TARGETS) == {"table2", "fig4", "fig5", "all", "crossed"}
     assert TARGETS["fig5"] == ("td-inner", "ppo-inner")
@@ -55,7 +67,8 @@ def test_the_command_for_one_run_trains_the_same(
 
     monkeypatch.setattr("innerattn.train.train", note)
     options = ["--preset", situation, "--method", method, "--budget", budget]
-    assert main(["train", *options, "--seed", "3", "--train.threads", "1"]) == 1
+    options += ["--seed", "3", "--train.threads", "1", "--evaluate.seed", "12348"]
+    assert main(["train", *options]) == 1
     (one,) = plan((method,), (situation,), (3,), budget, OUT)
     assert asked == [one.config]
 

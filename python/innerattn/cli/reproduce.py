@@ -116,17 +116,19 @@ class Reproduce(Command):
         return make(methods, situations, range(self.seeds), self.budget, out)
 
     def _print_plan(self, console: Console, found: Sequence[Found], out: Path) -> None:
-        from innerattn.study.train import places, to_train
+        from innerattn.study.train import places, to_measure, to_train
 
         states = Counter(one.state for one in found)
-        count = len(to_train(found))
+        train, measure = len(to_train(found)), len(to_measure(found))
+        count = train + measure
         left_out = len(found) - count - states["finished"]
         line = f"{self.target}, budget {self.budget}: {len(found)} runs of {_seeds(self.seeds)}; "
         line += f"{states['finished']} finished, "
         if self.report_only:
             line += f"{count} not"
         else:
-            line += f"{count} to train" + (f", {places(count)} at a time" if count else "")
+            line += f"{train} to train" + (f", {measure} to measure only" if measure else "")
+            line += f", {places(count)} at a time" if count else ""
         line += f"; {left_out} left out" if left_out else ""
         console.print(line, soft_wrap=True)
         note = smoke_note(self.budget)

@@ -17,11 +17,20 @@ from innerattn.study.scores import NotMeasuredError, read_scores
 from innerattn.train import RunInfo, read_info
 from innerattn.train.checkpoint import plain_file
 
-State = Literal["missing", "unfinished", "failed", "finished", "other_configuration", "unreadable"]
-"""``failed``: an earlier try ended with an error. A folder of one of the last two states is neither
-used nor changed."""
+State = Literal[
+    "missing",
+    "unfinished",
+    "failed",
+    "unmeasured",
+    "finished",
+    "other_configuration",
+    "unreadable",
+]
+"""``failed``: an earlier try ended with an error; ``unmeasured``: trained to the end, without a
+whole evaluation. A folder of one of the last two states is neither used nor changed."""
 
 TO_TRAIN: frozenset[State] = frozenset({"missing", "unfinished", "failed"})
+"""What is trained, from the beginning."""
 _MOST_KEYS, _MOST_LETTERS = 3, 60
 
 
@@ -115,8 +124,10 @@ def _find(planned: PlannedRun) -> Found:
             return Found(planned, "unfinished", f"its state is {info.state!r}")
         digests(folder)
         read_scores(folder, config)
-    except NotMeasuredError:
-        return Found(planned, "unfinished", "trained, but not measured as a whole")
+    except NotMeasuredError as error:
+        if not os.path.lexists(folder / "checkpoints"):
+            return Found(planned, "unreadable", f"kept without its weights, and {error}")
+        return Found(planned, "unmeasured", "trained, but not measured as a whole")
     except (InnerattnError, OSError) as error:
         return Found(planned, "unreadable", " ".join(str(error).split()))
     return Found(planned, "finished")

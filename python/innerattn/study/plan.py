@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from innerattn.config import RunConfig, load_run_config
+from innerattn.config import EvaluateConfig, RunConfig, load_run_config
 
 METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform")
 """The methods that are compared."""
@@ -74,8 +74,8 @@ def plan(
     """The runs of a study, in the order in which they are trained.
 
     Each is what ``innerattn train --preset SITUATION --method METHOD --budget BUDGET --seed SEED
-    --train.threads 1`` trains. All runs of one seed come before those of the next, so that a study
-    that is stopped has whole seeds.
+    --train.threads 1 --evaluate.seed WORLDS`` trains, see `of_seed`. All runs of one seed come
+    before those of the next, so that a study that is stopped has whole seeds.
 
     Args:
         methods: values of `train.method`.
@@ -95,7 +95,7 @@ def plan(
                 situation,
                 method,
                 budget,
-                overrides={**(overrides or {}), "train.seed": seed, "train.threads": 1},
+                overrides={**(overrides or {}), **of_seed(seed)},
             ),
             out / "runs" / f"{situation}-{method}-{budget}-s{seed}",
         )
@@ -103,6 +103,20 @@ def plan(
         for situation in situations
         for method in methods
     ]
+
+
+def of_seed(seed: int) -> dict[str, object]:
+    """Values by dotted key of a run with this seed of training, in a study.
+
+    Runs of one seed are measured in the same worlds, so that they can be compared pairwise; runs of
+    different seeds in different ones, so that chance of the worlds is part of what differs between
+    seeds, which are the unit of every claim.
+    """
+    return {
+        "train.seed": seed,
+        "train.threads": 1,
+        "evaluate.seed": EvaluateConfig().seed + seed,
+    }
 
 
 def smoke_note(budget: str) -> str | None:

@@ -107,6 +107,7 @@ def read_configs(runs: Sequence[StudyRun]) -> list[RunConfig]:
         what = config.in_use()
         for free in ("seed", "threads", "device", "compile", "log_every_env_steps"):
             what["train"].pop(free)
+        what["evaluate"].pop("seed")
         other, known = seen.setdefault((run.situation, run.method), (run.folder, what))
         if differing := [name for name in what if what[name] != known.get(name)]:
             raise RunError(

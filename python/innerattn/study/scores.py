@@ -40,7 +40,9 @@ def read_scores(folder: Path, config: RunConfig) -> tuple[Scores, Scores]:
 
     Raises:
         NotMeasuredError: a file of the evaluation is missing or damaged.
-        RunError: a file is a link, or the run was measured otherwise than its configuration says.
+        RunError: a file is a link, or the run was measured otherwise than its configuration says,
+            or by another version.
+        OSError: a file cannot be read.
     """
     path = folder / "evaluation" / "summary.json"
     records = [path.with_name(name) for name in RECORD_FILES]
@@ -51,6 +53,7 @@ def read_scores(folder: Path, config: RunConfig) -> tuple[Scores, Scores]:
         for file in records:
             pq.read_metadata(plain_file(file))
         found = json.loads(plain_file(path).read_text("utf-8"))
+        _refuse_other_schema(path, found["schema_version"])
         parts = (found, found["long"])
         measured = tuple(
             Scores(
@@ -61,15 +64,19 @@ def read_scores(folder: Path, config: RunConfig) -> tuple[Scores, Scores]:
             for part in parts
         )
         _refuse_other_measures(path, found, config)
-    except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
+    except (ValueError, KeyError, TypeError, pa.ArrowException) as error:
         raise NotMeasuredError(f"{path}: not a whole evaluation") from error
     return measured[0], measured[1]
+
+
+def _refuse_other_schema(path: Path, version: object) -> None:
+    if version != SCHEMA_VERSION:
+        raise RunError(f"{path}: schema_version = {version!r}: must be {SCHEMA_VERSION}")
 
 
 def _refuse_other_measures(path: Path, found: dict[str, Any], config: RunConfig) -> None:
     settings, scenario = config.evaluate, config.scenario
     expected = {
-        "schema_version": (found["schema_version"], SCHEMA_VERSION),
         "method": (found["method"], config.train.method),
         "situation": (found["situation"], scenario.situation),
         "seed": (found["seed"], settings.seed),

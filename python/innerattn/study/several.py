@@ -38,6 +38,7 @@ class Run:
     Attributes:
         config: what is trained.
         folder: where.
+        trained: it is trained already, and only measured.
         state: what it is doing.
         share: part that is done, 0 to 1.
         summary: what its evaluation found, once it is done.
@@ -46,6 +47,7 @@ class Run:
 
     config: RunConfig
     folder: Path
+    trained: bool = False
     state: Literal["waiting", "running", "done", "failed"] = "waiting"
     share: float = 0.0
     summary: Summary | None = None
@@ -56,7 +58,7 @@ def refuse_what_cannot_run(runs: Sequence[Run]) -> None:
     """Find out in time what every run would fail of.
 
     Raises:
-        RunError: a run's folder exists.
+        RunError: the folder of a run that is to be trained exists.
         ConfigError: the configuration cannot be run here.
     """
     from innerattn.envs import BatchEnv
@@ -64,7 +66,8 @@ def refuse_what_cannot_run(runs: Sequence[Run]) -> None:
     from innerattn.train.checkpoint import refuse_existing
 
     for run in runs:
-        refuse_existing(run.folder)
+        if not run.trained:
+            refuse_existing(run.folder)
     config = runs[0].config
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         build_learner(config, env)
@@ -122,7 +125,7 @@ def _start(
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # handed down to the process
     try:
         pipe, its_end = _SPAWN.Pipe()
-        arguments = (run.config, run.folder, its_end, debug, keep)
+        arguments = (run.config, run.folder, its_end, debug, keep, run.trained)
         process = _SPAWN.Process(target=work, args=arguments, daemon=True)
         process.start()
         its_end.close()
@@ -164,7 +167,12 @@ def _stop(running: dict[Connection, tuple[Run, BaseProcess]]) -> None:
 
 
 def work(
-    config: RunConfig, folder: Path, pipe: Connection, debug: bool, keep: object = None
+    config: RunConfig,
+    folder: Path,
+    pipe: Connection,
+    debug: bool,
+    keep: object = None,
+    trained: bool = False,
 ) -> None:
     """What the process of a run does: the same as `innerattn train` for one seed.
 
@@ -174,6 +182,7 @@ def work(
         pipe: takes shares, and at last a summary or the reason of a failure; its end ends the run.
         debug: let an error that is told through the pipe be seen too.
         keep: what comes with the process and lasts as long by itself, such as a lock.
+        trained: measure it only.
     """
     del keep  # it lasts without this name
     report = _Report(pipe)
@@ -182,7 +191,8 @@ def work(
         from innerattn.train import train
 
         report.show(0.0)  # ends here if all was stopped while torch was loaded
-        train(config, folder, progress=lambda p: report(_TRAINING * trained_share(config, p)))
+        if not trained:
+            train(config, folder, progress=lambda p: report(_TRAINING * trained_share(config, p)))
         evaluation = evaluate_run(
             folder, progress=lambda done, total: report(_TRAINING + done / total * (1 - _TRAINING))
         )

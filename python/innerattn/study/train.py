@@ -1,4 +1,4 @@
-"""Trains those runs of a study that are not there yet, as many at a time as there are cores."""
+"""Trains and measures what a study lacks, as many runs at a time as there are cores."""
 
 from __future__ import annotations
 
@@ -15,8 +15,13 @@ from innerattn.study.several import Run, refuse_what_cannot_run, train_side_by_s
 
 
 def to_train(found: Sequence[Found]) -> list[PlannedRun]:
-    """The runs that are to be trained, in their order."""
+    """The runs that are to be trained and measured, in their order."""
     return [one.planned for one in found if one.state in TO_TRAIN]
+
+
+def to_measure(found: Sequence[Found]) -> list[PlannedRun]:
+    """The runs that are trained and only to be measured, in their order."""
+    return [one.planned for one in found if one.state == "unmeasured"]
 
 
 def places(runs: int) -> int:
@@ -33,7 +38,7 @@ def train_missing(
     failed: Callable[[PlannedRun, str], None],
     debug: bool = False,
 ) -> None:
-    """Train and measure what is missing; what was left unfinished is removed and begun again.
+    """Train and measure what is missing; what was left in training is removed and begun again.
 
     A run that fails is written down and leaves the others alone; runs of other configurations and
     what cannot be read stay as they are.
@@ -51,12 +56,13 @@ def train_missing(
         OSError: a file or folder cannot be written or removed.
         KeyboardInterrupt: after every process has ended; finished runs stay.
     """
-    planned = to_train(found)
-    if not planned:
+    measure, train = to_measure(found), to_train(found)
+    if not measure and not train:
         return
-    _remove([one.folder for one in planned])
-    by_folder = {one.folder: one for one in planned}
-    runs = [Run(one.config, one.folder) for one in planned]
+    _remove([one.folder for one in train])
+    by_folder = {one.folder: one for one in (*measure, *train)}
+    runs = [Run(one.config, one.folder, trained=True) for one in measure]
+    runs += [Run(one.config, one.folder) for one in train]
     refuse_what_cannot_run(runs)
 
     def note(run: Run) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from innerattn.config import load_run_config
-from innerattn.study.plan import Case, PlannedRun
+from innerattn.study.plan import Case, PlannedRun, of_seed
 
 Credit = Literal["helpers", "team"]
 
@@ -85,12 +85,7 @@ def plan_crossed(
                 situation,
                 arm.method,
                 budget,
-                overrides={
-                    **(overrides or {}),
-                    **arm.overrides(),
-                    "train.seed": seed,
-                    "train.threads": 1,
-                },
+                overrides={**(overrides or {}), **arm.overrides(), **of_seed(seed)},
             ),
             out / "runs" / f"{situation}-{arm.method}-{arm.variant}-{budget}-s{seed}",
         )
