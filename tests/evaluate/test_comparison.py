@@ -211,3 +211,26 @@ def test_verdicts_are_false_as_rarely_as_they_say() -> None:
     }
     for name, rate in rates.items():
         assert rate == pytest.approx(0.05, abs=3 * np.sqrt(0.05 * 0.95 / draws)), name
+
+
+def test_what_differs_by_rounding_alone_does_not_differ() -> None:
+    assert contrast([[0.1, 0.2], [0.2, 0.3], [0.3, 0.4]], [1.0, -1.0], 0.05) is None
+    assert compare([0.1 + 0.2, 0.3], [0.5, 0.5], 0.5, 0) is None
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_large_effect_has_an_interval_that_grows_with_it(sign: float) -> None:
+    below, above, far = (
+        contrast([[sign * x, 0.0] for x in (size - 1.0, size, size + 1.0)], [1.0, -1.0], 0.5)
+        for size in (570.0, 580.0, 1e9)  # t is 1e3 between the first two
+    )
+    assert below is not None
+    assert above is not None
+    assert far is not None
+    for one, size in ((below, 570.0), (far, 1e9)):
+        g, known = one.hedges_g, above.hedges_g
+        scale = size / 580.0
+        assert (g.mean, g.low, g.high) == pytest.approx(
+            (scale * known.mean, scale * known.low, scale * known.high), rel=1e-3
+        )
+    assert above.hedges_g.low < above.hedges_g.mean < above.hedges_g.high
