@@ -1,5 +1,7 @@
 """The rules that decide claims, on figures made for them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,9 @@ from innerattn.evaluate.sharing.evenness import evenness, evenness_of_runs
 from innerattn.study.claims import Holds, entropy_claims, handover_is_own, handover_moves
 from innerattn.study.competence import COMPETENCE, Competence
 from innerattn.study.fig4 import EntropyCourse
+from innerattn.study.fig5 import Evidence, evidence
 from innerattn.study.over_runs import OverRuns, over_runs
+from innerattn.study.run import StudyRun, read_measured
 from innerattn.study.sharing_claims import judged, sharing_claims
 from innerattn.study.table2 import Row, Sharing, Table2
 
@@ -69,6 +73,8 @@ def test_claims_about_sharing() -> None:
     [
         ((1.0, 1.01, 0.99), (0.5, 0.51, 0.49), "yes", "yes"),
         ((0.5, 0.51, 0.49), (0.8, 0.81, 0.79), "yes", "no"),
+        ((1.095, 1.096, 1.094), (1.09, 1.0901, 1.0899), "no", "no"),  # less than even, hardly
+        ((1.0, 1.01, 0.99), (0.97, 1.0, 0.93), "yes", "undecided"),
         ((0.8, 1.0, 0.9), (0.7, 1.05, 0.95), "undecided", "undecided"),
         ((1.0,), (0.5,), "undecided", "undecided"),
     ],
@@ -92,6 +98,13 @@ def test_claims_about_entropy(
     assert [claim.holds for claim in entropy_claims([course])] == [below, falls]
 
 
+@pytest.fixture(scope="module")
+def found(runs: list[StudyRun]) -> Evidence:
+    found = evidence([read_measured(runs[0])])
+    assert found is not None
+    return found
+
+
 @pytest.mark.parametrize(
     ("change", "moves"),
     [
@@ -108,14 +121,19 @@ def test_whether_attention_moves(change: OverRuns | None, moves: Holds) -> None:
 
 
 @pytest.mark.parametrize(
-    ("own", "holds"),
+    ("change", "own", "holds"),
     [
-        (OverRuns(0.15, 0.1, 0.2, 3), "yes"),
-        (OverRuns(0.0, -0.05, 0.05, 3), "no"),
-        (OverRuns(0.05, 0.02, 0.08, 3), "no"),
-        (OverRuns(0.09, 0.01, 0.17, 3), "undecided"),
-        (OverRuns(0.15, None, None, 1), "undecided"),
+        ((0.2, 0.22, 0.18), (0.15, 0.14, 0.16), "yes"),
+        ((0.2, 0.22, 0.18), (0.0, 0.01, -0.01), "no"),
+        ((0.2, 0.22, 0.18), (0.05, 0.06, 0.04), "no"),
+        ((0.2, 0.22, 0.18), (0.09, 0.02, 0.16), "undecided"),
+        ((0.1, 0.2, 0.3), (0.06, 0.07, 0.08), "undecided"),  # half the change is not known either
+        ((0.2,), (0.15,), "undecided"),
     ],
 )
-def test_whether_the_move_is_that_of_who_hands_over(own: OverRuns, holds: Holds) -> None:
-    assert handover_is_own(OverRuns(0.2, 0.1, 0.3, 3), own) == holds
+def test_whether_the_move_is_that_of_who_hands_over(
+    found: Evidence, change: tuple[float, ...], own: tuple[float, ...], holds: Holds
+) -> None:
+    beyond_half = over_runs(np.subtract(own, np.divide(change, 2.0)).tolist())
+    made = replace(found, own_part=over_runs(own), own_part_beyond_half=beyond_half)
+    assert handover_is_own(made) == holds

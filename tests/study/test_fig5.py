@@ -57,7 +57,11 @@ def test_changes_of_robot_and_control_against_plain_loops(
     own = np.subtract(found.robot["to_be"].change_by_run, found.control["to_be"].change_by_run)
     assert found.own_part_by_run == pytest.approx(own)
     assert found.handovers == tuple(len(all_handovers(m.recorded)) for m in inner)
-    assert all(p is not None and p > 0.0 for p in found.robot["to_be"].p_by_run)
+    beyond = own - np.divide(found.robot["to_be"].change_by_run, 2.0)
+    assert found.own_part_beyond_half is not None
+    assert found.own_part_beyond_half.mean == pytest.approx(beyond.mean())
+    for name in ("p_by_run", "control_p_by_run"):
+        assert all(p is not None and 0.0 < p <= 1.0 for p in getattr(found, name))
 
 
 def test_the_control_takes_no_part(inner: list[Measured]) -> None:

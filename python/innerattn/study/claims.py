@@ -20,8 +20,17 @@ from innerattn.study.table2_text import NONE, shown
 
 Holds = Literal["yes", "no", "undecided"]
 
+LEAST_PAIRS = 3
+"""Two methods are compared over so many seeds that have a run of each, or not at all."""
+
 LEAST_MOVE = 0.05
 """The smallest change of a weight that counts as a move."""
+
+ENTROPY_MARGIN = 0.02
+"""The largest difference of an entropy's share of ln(N - 1) that counts as none."""
+
+EVEN_ENTROPY = 1.0 - ENTROPY_MARGIN
+"""Attention whose entropy is a larger share of ln(N - 1) than this counts as even."""
 
 RULES = f"""\
 A claim is undecided for a method with less than two runs. Intervals are Student's 95 % over runs.
@@ -32,21 +41,23 @@ A claim is undecided for a method with less than two runs. Intervals are Student
   undecided. Sharing is judged over all episodes.
 - **Even with inner attention**: yes where all tasks are shared evenly, no where one is shared
   unevenly. **Uneven without**: yes where all tasks are shared unevenly, no where one is evenly.
-- **More even with than without**: by the share's distance from 0.5, averaged over tasks. Yes
-  where Welch's 95 % interval of the difference (without minus with) lies above 0; no where it lies
+- **More even with than without**: by the share's distance from 0.5, averaged over tasks, without
+  minus with. Runs of one seed begin alike and are measured in the same worlds, so each seed gives
+  one difference; {LEAST_PAIRS} at least. Yes where the interval lies above 0; no where it lies
   below 0, or where two one-sided tests show the difference to be within ±{0.5 - MARGIN[0]:.1f}.
-- **Entropy ends below that of even attention**: yes where the interval of the mean over robots,
-  heads and the last tenth of training lies below ln(N − 1); any attention that is not even does.
-- **Entropy falls throughout training**: by the last minus the first tenth of the logged times. Yes
-  where its interval lies below 0, no where it lies above. What happens before the first logged time
-  is not in it.
+- **Entropy ends below that of even attention**: by the mean over robots, heads and the last tenth
+  of training, as a share of ln(N − 1). Yes where its interval lies below {EVEN_ENTROPY:g}, no where
+  it lies above.
+- **Entropy falls in training**: by the last minus the first tenth of the logged times. Yes where
+  its interval lies below 0 and its mean is a fall by {ENTROPY_MARGIN:g} ln(N − 1) or more; no where
+  the interval lies above such a fall. What happens before the first logged time is not in it.
 - **Attention moves to the next partner**: by the mean weight on the partner-to-be after the first
   rescue minus that before. Yes where its interval lies above 0 and its mean is {LEAST_MOVE} or
   more; no where its interval lies below {LEAST_MOVE}.
 - **…and does so for the robot that hands over**: by that change minus the change of the food robot
   that takes no part. Yes where its interval lies above 0 and its mean is at least half the change;
-  no where its interval lies below half the change, so that most of the change is shared by the
-  robot that takes no part; only asked where attention moves.
+  no where the interval of what it lacks of half the change lies below 0, so that most of the change
+  is shared by the robot that takes no part; only asked where attention moves.
 """
 """How `Claim.holds` is found, in Markdown."""
 
@@ -81,20 +92,21 @@ def entropy_claims(courses: Sequence[EntropyCourse]) -> list[Claim]:
         if not course.chooses:
             continue
         begin, end, change, even = course.begin, course.end, course.change, course.even_nats
+        least_fall = ENTROPY_MARGIN * even
         claims += [
             _claim(
                 course,
                 "entropy ends below that of even attention",
                 f"about {PRINTED_NATS} of {math.log(3):.2f} nats",
                 f"{shown(end)} of {even:.2f} nats",
-                _decided(end, yes_below=even),
+                _decided(end, EVEN_ENTROPY * even),
             ),
             _claim(
                 course,
-                "entropy falls throughout training",
+                "entropy falls in training",
                 f"falls continually to about {PRINTED_NATS} nats",
                 f"from {begin.mean:.2f} to {end.mean:.2f} nats: {shown(change)}",
-                _decided(change, yes_below=0.0, no_above=0.0),
+                _falls(change, least_fall),
             ),
         ]
     return claims
@@ -121,7 +133,7 @@ def handover_claims(found: Sequence[Evidence]) -> list[Claim]:
                 "…and does so for the robot that hands over",
                 "taken for granted",
                 f"{shown(own)} more than the robot that takes no part ({shown(control)})",
-                handover_is_own(change, own) if moves == "yes" else "undecided",
+                handover_is_own(part) if moves == "yes" else "undecided",
             ),
         ]
     return claims
@@ -136,13 +148,14 @@ def handover_moves(change: OverRuns | None) -> Holds:
     return "no" if change.high < LEAST_MOVE else "undecided"
 
 
-def handover_is_own(change: OverRuns | None, own: OverRuns | None) -> Holds:
+def handover_is_own(found: Evidence) -> Holds:
     """Whether most of the rise is of the robot that hands over, by `RULES`."""
-    if change is None or own is None or own.low is None or own.high is None:
+    own, beyond_half = found.own_part, found.own_part_beyond_half
+    if own is None or own.low is None or beyond_half is None or beyond_half.high is None:
         return "undecided"
-    if own.low > 0.0 and own.mean >= change.mean / 2.0:
+    if own.low > 0.0 and beyond_half.mean >= 0.0:
         return "yes"
-    return "no" if own.high < change.mean / 2.0 else "undecided"
+    return "no" if beyond_half.high < 0.0 else "undecided"
 
 
 def _claim(
@@ -160,9 +173,18 @@ def _claim(
     )
 
 
-def _decided(value: OverRuns, yes_below: float, no_above: float | None = None) -> Holds:
+def _decided(value: OverRuns, yes_below: float) -> Holds:
+    """Yes below, no above."""
     if value.low is None or value.high is None:
         return "undecided"
     if value.high < yes_below:
         return "yes"
-    return "no" if no_above is not None and value.low > no_above else "undecided"
+    return "no" if value.low > yes_below else "undecided"
+
+
+def _falls(change: OverRuns, least: float) -> Holds:
+    if change.low is None or change.high is None:
+        return "undecided"
+    if change.high < 0.0 and change.mean <= -least:
+        return "yes"
+    return "no" if change.low > -least else "undecided"

@@ -25,10 +25,10 @@ from innerattn.evaluate.sharing.handover_attention import (
     handover_attention,
 )
 from innerattn.report.aligned_figure import AlignedLines
-from innerattn.study.over_runs import BAND_NAMES, Array, Band, OverRuns, band, numbers, over_runs
+from innerattn.study.over_runs import BAND_NAMES, Array, Band, OverRuns, band, over_runs
 from innerattn.study.run import Measured
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 ROLES = ("to_be", "before")
 """The partner of the second rescue, and that of the first."""
@@ -45,13 +45,11 @@ class RoleEvidence:
         weight: over runs, by offset (W,); each run is a mean over its own hand-overs.
         change: over runs, mean weight after the first rescue minus that up to it.
         change_by_run: (N,) None for a run without hand-overs.
-        p_by_run: (N,) of the permutation test, see `handover_attention`.
     """
 
     weight: Band
     change: OverRuns | None
     change_by_run: tuple[float | None, ...]
-    p_by_run: tuple[float | None, ...]
 
     def to_json(self) -> dict[str, Any]:
         """As a JSON object."""
@@ -59,7 +57,6 @@ class RoleEvidence:
             "weight": self.weight.to_json(),
             "change": asdict(self.change) if self.change else None,
             "change_by_run": list(self.change_by_run),
-            "p_by_run": list(self.p_by_run),
         }
 
 
@@ -80,6 +77,9 @@ class Evidence:
         control: by role, of the robot that takes no part, with the same partners.
         own_part: over runs, the change on the partner-to-be of the robot minus the control's.
         own_part_by_run: (N,) None for a run without hand-overs.
+        own_part_beyond_half: over runs, that part minus half the robot's change.
+        p_by_run: (N,) of the permutation test, see `handover_attention`.
+        control_p_by_run: (N,) the same of the robot that takes no part.
     """
 
     situation: str
@@ -94,6 +94,9 @@ class Evidence:
     control: dict[str, RoleEvidence]
     own_part: OverRuns | None
     own_part_by_run: tuple[float | None, ...]
+    own_part_beyond_half: OverRuns | None
+    p_by_run: tuple[float | None, ...]
+    control_p_by_run: tuple[float | None, ...]
 
     def to_json(self) -> dict[str, Any]:
         """As a JSON object."""
@@ -105,6 +108,8 @@ class Evidence:
             "control": {role: found.to_json() for role, found in self.control.items()},
             "own_part": asdict(self.own_part) if self.own_part else None,
             "own_part_by_run": list(self.own_part_by_run),
+            "p_by_run": list(self.p_by_run),
+            "control_p_by_run": list(self.control_p_by_run),
         }
 
 
@@ -160,11 +165,14 @@ def evidence(group: Sequence[Measured]) -> Evidence | None:
     width = len(known[0].offsets)
     robot = {role: _role(seen, role, width) for role in ROLES}
     control_ = {role: _role(controls, role, width) for role in ROLES}
-    own = tuple(
-        None if ours is None or theirs is None else ours - theirs
-        for ours, theirs in zip(
-            robot["to_be"].change_by_run, control_["to_be"].change_by_run, strict=True
+    changes = (robot["to_be"].change_by_run, control_["to_be"].change_by_run)
+    pairs = list(zip(*changes, strict=True))
+    own, beyond_half = (
+        tuple(
+            None if ours is None or theirs is None else part * ours - theirs
+            for ours, theirs in pairs
         )
+        for part in (1.0, 0.5)
     )
     return Evidence(
         situation=group[0].run.situation,
@@ -179,6 +187,9 @@ def evidence(group: Sequence[Measured]) -> Evidence | None:
         control=control_,
         own_part=over_runs(own),
         own_part_by_run=own,
+        own_part_beyond_half=over_runs(beyond_half),
+        p_by_run=tuple(float(run.p[0]) if run else None for run in seen),
+        control_p_by_run=tuple(float(run.p[0]) if run else None for run in controls),
     )
 
 
@@ -224,6 +235,5 @@ def _role(runs: Sequence[HandoverAttention | None], role: str, width: int) -> Ro
     parts: list[Attended | None] = [getattr(run, role) if run else None for run in runs]
     weights = [part.weight[0, :, 0] if part else np.full(width, np.nan) for part in parts]
     changes = tuple(float(part.change[0, 0]) if part else None for part in parts)
-    p = np.array([part.p[0] if part else np.nan for part in parts])
     courses: Array = np.stack(weights)
-    return RoleEvidence(band(courses), over_runs(changes), changes, tuple(numbers(p)))
+    return RoleEvidence(band(courses), over_runs(changes), changes)

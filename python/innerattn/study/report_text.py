@@ -145,16 +145,17 @@ def _fig5(findings: Findings) -> str:
     if not findings.evidence:
         return text + "\nNo run has hand-overs and attention that chooses.\n"
     head = ["situation", "method", "seed", "hand-overs (episodes)", "change on the partner to be"]
-    head += ["p", "of the robot that takes no part", "p", "difference"]
+    head += ["of the robot that takes no part", "difference"]
     head += ["change on the partner before", "of the robot that takes no part"]
+    head += ["p", "p of the robot that takes no part"]
     rows = [row for part in findings.evidence for row in _evidence_rows(part)]
     return text + (
         "\n![All hand-overs](fig5_evidence.png)\n\nAll hand-overs of both food robots in both "
         "orders of the tasks. Weights are means over heads; a change is the mean after the first "
-        "rescue minus that up to it; p is of a permutation test that deals teammates' names "
-        "anew within each episode. The control is the other food robot at the same moments: what "
-        "it shows too follows from which victims are there, not from who hands over.\n\n"
-        + markdown_table(head, rows)
+        "rescue minus that up to it; p is of a permutation test of the change on the partner to "
+        "be minus that on the one before, which exchanges the two in some episodes. The control "
+        "is the other food robot at the same moments: what it shows too follows from which "
+        "victims are there, not from who hands over.\n\n" + markdown_table(head, rows)
     )
 
 
@@ -163,22 +164,23 @@ def _evidence_rows(part: Evidence) -> list[list[str]]:
     before, before_control = part.robot["before"], part.control["before"]
     rows = []
     for n, seed in enumerate(part.seeds):
-        p, control_p = (p_shown(role.p_by_run[n]) for role in (to_be, control))
+        p_values = (part.p_by_run[n], part.control_p_by_run[n])
         rows.append(
             [
                 *(part.situation, part.method, str(seed)),
                 f"{part.handovers[n]} ({part.episodes[n]})",
-                *(_signed(to_be.change_by_run[n]), p, _signed(control.change_by_run[n]), control_p),
+                *(_signed(role.change_by_run[n]) for role in (to_be, control)),
                 _signed(part.own_part_by_run[n]),
                 *(_signed(role.change_by_run[n]) for role in (before, before_control)),
+                *map(p_shown, p_values),
             ]
         )
     if len(part.seeds) > 1:
         rows.append(
             [
                 *(part.situation, part.method, "mean [95 %]", f"{sum(part.handovers):,}"),
-                *(shown(to_be.change), NONE, shown(control.change), NONE, shown(part.own_part)),
-                *(shown(before.change), shown(before_control.change)),
+                *(shown(to_be.change), shown(control.change), shown(part.own_part)),
+                *(shown(before.change), shown(before_control.change), NONE, NONE),
             ]
         )
     return rows

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from innerattn.evaluate.comparison import compare
+from innerattn.evaluate.comparison import contrast
 from innerattn.evaluate.sharing.evenness import MARGIN, Verdict
 from innerattn.evaluate.sharing.printed import TEXT, PrintedRow
-from innerattn.study.claims import Claim, Holds
+from innerattn.study.claims import LEAST_PAIRS, Claim, Holds
 from innerattn.study.table2 import Row, Table2
 from innerattn.study.table2_text import NONE, share_shown, shown, verdicts_shown
 
@@ -73,18 +73,23 @@ def _measured_share(row: Row) -> str:
     return f"{row.task}: {share_shown(row.scored)}, runs {verdicts_shown(row.scored)}"
 
 
-def _unevenness(rows: Sequence[Row]) -> list[float]:
-    """|share - 0.5| averaged over tasks, one value per run that has rescues of every task."""
+def unevenness(rows: Sequence[Row]) -> dict[int, float]:
+    """|share - 0.5| averaged over tasks, by the seed of each run that has rescues of every task."""
     by_run = zip(*(row.scored.each for row in rows), strict=True)
     shares = [[task.share.mean for task in run if task.share] for run in by_run]
-    full = [run for run in shares if len(run) == len(rows)]
-    return [float(np.mean(np.abs(np.array(run) - 0.5))) for run in full]
+    return {
+        seed: float(np.mean(np.abs(np.array(run) - 0.5)))
+        for seed, run in zip(rows[0].seeds, shares, strict=True)
+        if len(run) == len(rows)
+    }
 
 
 def _contrast(inner: Sequence[Row], uniform: Sequence[Row]) -> Claim:
-    with_, without = _unevenness(inner), _unevenness(uniform)
-    enough = len(with_) > 1 and len(without) > 1
-    found = compare(without, with_, 0.5 - MARGIN[0], 0) if enough else None
+    ours, theirs = unevenness(inner), unevenness(uniform)
+    seeds = sorted(ours.keys() & theirs.keys())
+    with_, without = [ours[seed] for seed in seeds], [theirs[seed] for seed in seeds]
+    pairs = np.stack([without, with_], 1)
+    found = contrast(pairs, (1.0, -1.0), 0.5 - MARGIN[0]) if len(seeds) >= LEAST_PAIRS else None
     holds: Holds = "undecided"
     measured = f"distance from 0.5: {_mean(with_)} with, {_mean(without)} without"
     if found is not None:
@@ -104,7 +109,7 @@ def _contrast(inner: Sequence[Row], uniform: Sequence[Row]) -> Claim:
         method=f"{inner[0].method}, {uniform[0].method}",
         printed=printed or NONE,
         measured=measured,
-        runs=min(len(with_), len(without)),
+        runs=len(seeds),
         holds=holds,
     )
 
