@@ -67,7 +67,7 @@ def test_contrasts_compare_whole_means() -> None:
     for name, _, weights in contrasts():
         plus = sum(weight for weight in weights.values() if weight > 0)
         minus = sum(weight for weight in weights.values() if weight < 0)
-        whole = 2.0 if " with " in name else 1.0
+        whole = 2.0 if name.startswith("(") else 1.0
         assert (plus, minus) == pytest.approx((whole, -whole)), name
 
 
@@ -88,6 +88,7 @@ def test_effects_against_plain_means(figure: str) -> None:
         "inner - uniform, over credits and penalties": np.mean(
             [inner["helpers"] - uniform["helpers"], inner["team"] - uniform["team"]]
         ),
+        "inner - uniform with the team's credit, over penalties": inner["team"] - uniform["team"],
         "team - helpers, over attentions and penalties": np.mean(
             [inner["team"] - inner["helpers"], uniform["team"] - uniform["helpers"]]
         ),
@@ -151,6 +152,7 @@ def scattered(like: Outcome, seed: int, runs: int = 10) -> dict[int, Outcome]:
     }
 
 
+MAKES_EVEN = "attention makes sharing even under the team's credit"
 TEAM_IDLE = "the team's credit leaves a food robot idle with either attention"
 HELPERS_EVEN = "with the helpers' credit sharing is even with either attention"
 SHARED_EVEN = "robots of a kind with the same parameters share evenly under the team's credit, too"
@@ -171,7 +173,7 @@ def test_what_was_expected_can_be_confirmed() -> None:
     assert found["the team's credit makes sharing uneven"].holds == "yes"
     assert found[SHARED_EVEN].holds == "no"
     # Both attentions do the same, so neither is to be credited with it.
-    assert found["attention makes sharing even"].holds == "no"
+    assert found[MAKES_EVEN].holds == "no"
     assert found["attention rescues more"].holds == "no"
 
 
@@ -181,7 +183,7 @@ def test_what_was_expected_can_be_refuted() -> None:
         arm: scattered(worse if arm.penalty is None else EVEN, i) for i, arm in enumerate(ARMS)
     }
     found = said(outcomes)
-    assert found["attention makes sharing even"].holds == "yes"
+    assert found[MAKES_EVEN].holds == "yes"
     assert found["attention rescues more"].holds == "yes"
     assert found[TEAM_IDLE].holds == "no"  # with learnt attention none is idle
     assert found[HELPERS_EVEN].holds == "no"  # with uniform weights one is
@@ -212,10 +214,42 @@ def student(values: list[float]) -> tuple[float, float]:
     return float(ends.low), float(ends.high)
 
 
-def test_few_runs_decide_nothing() -> None:
-    few = {arm: {0: EVEN} for arm in ARMS if arm.credit == "team"}
+@pytest.mark.parametrize("seeds", [0, 1, 2])
+def test_few_runs_decide_nothing(seeds: int) -> None:
+    few = {arm: scattered(EVEN, i, seeds) for i, arm in enumerate(ARMS)}
     assert {one.holds for one in said(few).values()} == {"undecided"}
-    assert {one.holds for one in said({}).values()} == {"undecided"}
+
+
+def test_a_few_seeds_do_not_say_that_no_robot_is_ever_idle() -> None:
+    for seeds, holds in ((9, "undecided"), (10, "yes")):
+        outcomes = {arm: scattered(EVEN, i, seeds) for i, arm in enumerate(ARMS)}
+        found = said(outcomes)
+        assert (found[HELPERS_EVEN].holds, found[SHARED_EVEN].holds) == (holds, holds)
+    outcomes[Arm("helpers", 0.0)][4] = IDLE  # one is enough to say that some is
+    assert said(outcomes)[HELPERS_EVEN].holds == "no"
+
+
+@pytest.mark.parametrize(
+    ("with_", "without", "holds"),
+    [(0.02, 0.10, "yes"), (0.08, 0.10, "yes"), (0.10, 0.10, "no"), (0.14, 0.10, "no")],
+)
+def test_attention_makes_even_what_it_takes_unevenness_from(
+    with_: float, without: float, holds: str
+) -> None:
+    outcomes = {
+        arm: scattered(replace(EVEN, unevenness=without if arm.penalty is None else with_), i)
+        for i, arm in enumerate(ARMS)
+    }
+    assert said(outcomes)[MAKES_EVEN].holds == holds
+
+
+def test_where_half_the_unevenness_may_be_gone_nothing_is_said() -> None:
+    outcomes = {arm: scattered(EVEN, i) for i, arm in enumerate(ARMS)}
+    for seed, uneven in enumerate([0.0, 0.3] * 5):  # a few seeds are uneven without, none with
+        outcomes[Arm("team", None)][seed] = replace(EVEN, unevenness=uneven)
+        for penalty in (0.0, 1e-4, 1e-3):
+            outcomes[Arm("team", penalty)][seed] = replace(EVEN, unevenness=0.1)
+    assert said(outcomes)[MAKES_EVEN].holds == "undecided"
 
 
 def test_outcome_against_a_plain_loop(runs: list[StudyRun]) -> None:

@@ -2,45 +2,50 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from scipy.stats import binomtest
 
-from innerattn.study.claims import Holds
+from innerattn.study.claims import EVEN_ENTROPY, Holds
 from innerattn.study.crossed.arms import CREDITS, CROSSED, PENALTIES, SHARED, Arm, Credit
-from innerattn.study.crossed.effects import MARGINS, Effect
+from innerattn.study.crossed.effects import LEAST_SEEDS, MARGINS, Effect
 from innerattn.study.crossed.outcome import IDLE, Outcomes, by_seed
 from innerattn.study.over_runs import OverRuns, over_runs
 from innerattn.study.table2_text import NONE, shown
 
-LEAST_SEEDS = 10
+LEAST_WITHOUT_IDLE = 10
 """So many seeds without an idle robot say that there is none; fewer say nothing."""
 
-EVEN_ENTROPY = 1.0 - MARGINS["entropy_share"]
-"""Attention whose entropy is a larger share of ln(N - 1) than this counts as even."""
+_WITH_TEAM = "inner - uniform with the team's credit"
 
 RULES = f"""\
-The seed is the unit: runs of one seed begin with the same weights in the same worlds, so that they
-may be alike in all arms. Where several arms are put together, or compared, every seed that has a
-run of each gives one number. Intervals are 95 %: Student's over seeds, Wilson's of numbers of
-seeds; an effect needs three seeds. Two means count as alike where two one-sided tests show them to
-be within the margin ({MARGINS["unevenness"]:g} of unevenness, {MARGINS["score"]:g} of the
-score, {MARGINS["entropy_share"]:g} of the entropy's share). The rules go by intervals of single
-effects; beside each p-value of an effect stands Holm's, adjusted for all main effects of the
-situation on all figures, or for all its other effects.
+The seed is the unit: runs of one seed begin with the same weights in the same worlds and are
+measured in the same ones, so that they may be alike in all arms. Where several arms are put
+together, or compared, every seed that has a run of each gives one number. Intervals are 95 %:
+Student's over seeds, Wilson's of numbers of seeds; an effect, or a mean that decides, needs
+{LEAST_SEEDS} seeds. Two means count as alike where two one-sided tests show them to be within the
+margin ({MARGINS["unevenness"]:g} of unevenness, {MARGINS["score"]:g} of the score,
+{MARGINS["entropy_share"]:g} of the entropy's share). The rules go by intervals of single effects;
+beside each p-value of an effect stands Holm's, adjusted for all main effects of the situation on
+all figures, or for all its other effects.
 
-- **Attention makes sharing even; attention rescues more**: yes where the interval of inner minus
-  uniform, over credits and penalties, lies on that side of 0; no where it lies on the other, or
-  where the two are alike.
+- **Attention makes sharing even under the team's credit**, over penalties; where sharing is even
+  without attention, as it was expected to be with the helpers' credit, nothing could be seen. Yes
+  where the interval of inner minus uniform lies below 0; no where it lies above, or where that of
+  inner minus half of uniform does, so that attention takes away less than half of the unevenness.
+- **Attention rescues more**: yes where the interval of inner minus uniform, over credits and
+  penalties, lies above 0; no where it lies below, or where the two are alike.
 - **The team's credit makes sharing uneven**: yes where the interval of team minus helpers, over
   attentions and penalties, lies above 0; no where it lies below, or where they are alike.
 - **The team's credit leaves a food robot idle with either attention**: yes where both attentions
   have seeds with such a run (a share of the rescues below {IDLE:g}); no where one of them has none
-  in at least {LEAST_SEEDS} seeds.
-- **With the helpers' credit sharing is even with either attention**: yes where no robot is idle and
-  both intervals of the unevenness lie below {MARGINS["unevenness"]:g}; no where a robot is idle or
-  one interval lies above.
+  in at least {LEAST_WITHOUT_IDLE} seeds. A seed has one run with uniform weights and {len(PENALTIES)} with
+  learnt attention, so that the two numbers of seeds are not to be compared with each other.
+- **With the helpers' credit sharing is even with either attention**: yes where no robot is idle in
+  at least {LEAST_WITHOUT_IDLE} seeds and both intervals of the unevenness lie below
+  {MARGINS["unevenness"]:g}; no where a robot is idle or one interval lies above.
 - **Robots of a kind with the same parameters share evenly under the team's credit, too**: decided
   as the claim before, for the arm in which they have the same (learnt attention, no penalty).
 - **The largest penalty holds attention even**: yes where the interval of the entropy's share lies
@@ -70,7 +75,6 @@ def answers(situation: str, outcomes: Outcomes, effects: Sequence[Effect]) -> li
     """All expectations in one situation, from its runs and their `effects`."""
     main = {(one.figure, one.name.split(",")[0]): one for one in effects if one.main}
     asked = [
-        ("attention makes sharing even", "unevenness", "inner - uniform", -1.0),
         ("attention rescues more", "score", "inner - uniform", 1.0),
         ("the team's credit makes sharing uneven", "unevenness", "team - helpers", 1.0),
     ]
@@ -79,6 +83,7 @@ def answers(situation: str, outcomes: Outcomes, effects: Sequence[Effect]) -> li
         for claim, figure, name, sign in asked
     ]
     return [
+        _makes_even(situation, outcomes, main["unevenness", _WITH_TEAM]),
         *found,
         _idle_with_team(situation, outcomes),
         _even_with_helpers(situation, outcomes),
@@ -107,6 +112,13 @@ def _mean(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> OverRuns | No
     return over_runs(by_seed(outcomes, arms, figure).mean(axis=1).tolist())
 
 
+def _ends(mean: OverRuns | None) -> tuple[float, float]:
+    """The interval of a mean over enough seeds; else all numbers."""
+    if mean is None or mean.low is None or mean.high is None or mean.runs < LEAST_SEEDS:
+        return -math.inf, math.inf
+    return mean.low, mean.high
+
+
 def _of_effect(effect: Effect, sign: float) -> tuple[str, Holds]:
     """Whether an effect is on the expected side of 0."""
     found = effect.found
@@ -117,6 +129,21 @@ def _of_effect(effect: Effect, sign: float) -> tuple[str, Holds]:
     if low > 0.0:
         return measured, "yes"
     return measured, "no" if high < 0.0 or found.equivalent else "undecided"
+
+
+def _makes_even(situation: str, outcomes: Outcomes, effect: Effect) -> Answer:
+    groups = _by_attention("team")
+    rows = by_seed(outcomes, [arm for arms in groups.values() for arm in arms], "unevenness")
+    inner, uniform = rows[:, : len(groups["inner"])].mean(axis=1), rows[:, -1]
+    left = over_runs((inner - uniform / 2.0).tolist())
+    measured, holds = _of_effect(effect, -1.0)
+    if effect.found is not None:
+        measured += f"; uniform {shown(over_runs(uniform.tolist()))}"
+        if holds != "yes":
+            above = effect.found.difference.low > 0.0
+            holds = "no" if above or _ends(left)[0] > 0.0 else "undecided"
+    claim = "attention makes sharing even under the team's credit"
+    return Answer(claim, situation, measured, holds)
 
 
 def _by_attention(credit: Credit) -> dict[str, list[Arm]]:
@@ -135,7 +162,7 @@ def _idle_with_team(situation: str, outcomes: Outcomes) -> Answer:
     holds: Holds = "undecided"
     if all(idle for idle, _ in counts):
         holds = "yes"
-    elif any(not idle and known >= LEAST_SEEDS for idle, known in counts):
+    elif any(not idle and known >= LEAST_WITHOUT_IDLE for idle, known in counts):
         holds = "no"
     claim = "the team's credit leaves a food robot idle with either attention"
     return Answer(claim, situation, measured, holds)
@@ -160,23 +187,21 @@ def _even_in_all(outcomes: Outcomes, groups: Mapping[str, Sequence[Arm]]) -> tup
     )
     idle = any(idle_seeds(outcomes, arms)[0] for arms in groups.values())
     margin = MARGINS["unevenness"]
-    found = [mean for mean in means.values() if mean is not None]
-    if idle or any(mean.low is not None and mean.low > margin for mean in found):
+    ends = [_ends(mean) for mean in means.values()]
+    if idle or any(low > margin for low, _ in ends):
         return measured, "no"
-    if len(found) == len(means) and all(
-        mean.high is not None and mean.high < margin for mean in found
-    ):
-        return measured, "yes"
-    return measured, "undecided"
+    enough = all(idle_seeds(outcomes, arms)[1] >= LEAST_WITHOUT_IDLE for arms in groups.values())
+    return measured, "yes" if enough and all(high < margin for _, high in ends) else "undecided"
 
 
 def _held_even(situation: str, outcomes: Outcomes) -> Answer:
     arms = [Arm(credit, PENALTIES[-1]) for credit in CREDITS]
     mean = _mean(outcomes, arms, "entropy_share")
+    low, high = _ends(mean)
     holds: Holds = "undecided"
-    if mean is not None and mean.low is not None and mean.low > EVEN_ENTROPY:
+    if low > EVEN_ENTROPY:
         holds = "yes"
-    elif mean is not None and mean.high is not None and mean.high < EVEN_ENTROPY:
+    elif high < EVEN_ENTROPY:
         holds = "no"
     claim = f"a penalty of {PENALTIES[-1]:g} holds attention even"
     return Answer(claim, situation, f"share of ln(N - 1): {shown(mean, 3)}", holds)

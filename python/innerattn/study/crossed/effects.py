@@ -10,10 +10,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from innerattn.evaluate.comparison import Contrast, contrast, holm
+from innerattn.study.claims import ENTROPY_MARGIN
 from innerattn.study.crossed.arms import CREDITS, CROSSED, PENALTIES, SHARED, Arm, Credit
 from innerattn.study.crossed.outcome import Outcomes, by_seed
 
-MARGINS = {"unevenness": 0.1, "score": 0.05, "entropy_share": 0.02}
+MARGINS = {"unevenness": 0.1, "score": 0.05, "entropy_share": ENTROPY_MARGIN}
 """The figures that effects are asked of, and the largest difference that counts as none."""
 
 LEAST_SEEDS = 3
@@ -53,6 +54,7 @@ def contrasts() -> list[tuple[str, bool, Weights]]:
     helpers, team = (attention[credit] for credit in ("helpers", "team"))
     asked: list[tuple[str, bool, Weights]] = [
         ("inner - uniform, over credits and penalties", True, _mean([helpers, team])),
+        ("inner - uniform with the team's credit, over penalties", True, team),
         ("team - helpers, over attentions and penalties", True, _credit(CROSSED)),
         (
             f"penalty {most:g} - {least:g}, over credits",
