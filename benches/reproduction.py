@@ -39,10 +39,13 @@ def main() -> None:
         account = json.loads((study / "runs.json").read_text())
     except FileNotFoundError:
         sys.exit(f"{study}: no study; `innerattn reproduce` makes one")
-    name = "crossed.md" if account["target"] == "crossed" else "report.md"
+    name = {"all": "report.md", "crossed": "crossed.md"}.get(account["target"], "")
     place = PLACES.get((name, account["budget"]))
-    if place is None or not (study / name).exists():
-        sys.exit(f"{study}: no {name} of budget {account['budget']!r} that a page has a place for")
+    if place is None or name not in account["outputs"]:
+        sys.exit(
+            f"{study}: last made {account['target']} of budget {account['budget']!r}, for which no "
+            "page has a place, or was interrupted; make all or crossed"
+        )
     page, pictures = place
     publish("report", _with_pictures(study / name, pictures), page)
     _keep_runs(account["runs"], study, DOCS / "records" / page.stem)

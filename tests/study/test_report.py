@@ -35,7 +35,8 @@ def test_all_files_are_written_and_the_same_twice(
     for name in FILES:
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes(), name
     for path in folder.glob("*.json"):
-        assert json.loads(path.read_text())["schema_version"] == 1
+        version = 2 if path.name == "fig5_evidence.json" else 1
+        assert json.loads(path.read_text())["schema_version"] == version
 
 
 def test_the_report_opens_with_claims_and_ends_with_the_runs(
@@ -82,6 +83,23 @@ def test_parts_can_be_asked_for_alone(runs: list[StudyRun], tmp_path: Path) -> N
     assert findings.evidence is None
     with pytest.raises(ValueError, match=r"parts = \['fig6'\]: known are table2, fig4, fig5"):
         write_report(runs, tmp_path, "short", ("fig6",))
+
+
+def test_a_figure_that_is_not_drawn_leaves_none_of_other_runs(
+    runs: list[StudyRun], folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("innerattn.study.report.choose_scene", lambda _: None)
+    shutil.copytree(folder, tmp_path / "study")
+    write_report(runs[3:5], tmp_path / "study", "short")  # attention that is even
+    gone = {f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")} | {"fig5.json"}
+    assert {path.name for path in (tmp_path / "study").iterdir()} == FILES - gone
+
+
+def test_both_attentions_are_compared_where_both_are_there(folder: Path) -> None:
+    text = (folder / "report.md").read_text()
+    compared = text.split("## Learnt attention beside uniform weights")[1].split("## Fig. 4")[0]
+    assert compared.count("| mixed | td | score | 0, 1 |") == 1
+    assert "| single |" not in compared  # has learnt attention only
 
 
 def test_runs_with_and_without_a_warm_start_are_not_one_method(

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from innerattn.evaluate.records import read_records
 from innerattn.evaluate.sharing.dispatch_quality import dispatch_quality
 from innerattn.evaluate.sharing.waiting import waiting
 from innerattn.evaluate.statistics import student_interval
+from innerattn.study.kept import keep
 from innerattn.study.run import Measured, StudyRun, by_method, read_configs, read_measured
 from innerattn.study.table2 import Table2, table2
 from innerattn.study.table2_text import fixed, markdown_table, table2_csv, table2_markdown
@@ -89,6 +91,51 @@ def test_competence_is_that_of_the_same_runs(groups: list[list[Measured]], table
     scores = [run["score"] for run in part.each]
     assert mean.mean == pytest.approx(np.mean([score for score in scores if score is not None]))
     assert table.competence[2].mean["sooner"].low is None  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("name", ["random", "greedy", "hungarian"])
+def test_scripted_policies_are_played_in_the_worlds_of_the_runs(
+    name: str, groups: list[list[Measured]], table: Table2
+) -> None:
+    (part,) = [c for c in table.competence if (c.situation, c.method) == ("mixed", name)]
+    assert part.seeds == (0, 1, 2)
+    for measured, figures, counts in zip(groups[0], part.each, part.counts, strict=True):
+        of_all = read_records(measured.run.folder / "evaluation")
+        recorded = next(record for record in of_all if record.policy == name)
+        assert figures["rescues_per_episode"] == pytest.approx(len(recorded.rescues) / 60)
+        helped = [0 in (event["helper_0"], event["helper_1"]) for event in recorded.rescues]
+        of_task = [np.array(helped)[recorded.rescues["task"] == task] for task in (0, 1)]
+        if all(map(len, of_task)):
+            uneven = np.mean([abs(each.mean() - 0.5) for each in of_task])
+            assert figures["unevenness"] == pytest.approx(uneven)
+        else:
+            assert figures["unevenness"] is None
+        assert (counts["rescued"], counts["score_episodes"]) == (len(recorded.rescues), 60)
+        assert (figures["sooner"] is None) == (counts["choices"] == 0)
+        ends = {"random": 0.0, "hungarian": 1.0}
+        assert figures["score"] == pytest.approx(ends.get(name, figures["score"]))
+    text = table2_markdown(table)
+    assert text.count(f"| {name} | mean [95 %] |") == 1
+    assert text.count(f"| {name} | 0 |") == 1  # of the single run in single
+
+
+def test_small_copies_of_runs_are_enough_for_sharing_and_scores(
+    runs: list[StudyRun], table: Table2, tmp_path: Path
+) -> None:
+    small = []
+    for run in runs[:3]:
+        keep(run, tmp_path / run.folder.name)
+        small.append(replace(run, folder=tmp_path / run.folder.name))
+    ordered = [
+        read_measured(run, step_by_step=False) for run in by_method(small)["mixed", "td-inner"]
+    ]
+    of_copies = table2([ordered])
+    assert [row.to_json() for row in of_copies.rows] == [row.to_json() for row in table.rows[:2]]
+    for whole, copy in zip(table.competence[0].each, of_copies.competence[0].each, strict=True):
+        for name in ("rescues_per_episode", "score", "unevenness"):
+            assert copy[name] == whole[name]
+        assert copy["sooner"] is copy["regret_s"] is copy["time_to_rescue_s"] is None
+    assert of_copies.competence[1:] == table.competence[3:6]  # scripted policies are played again
 
 
 def test_text_and_csv_hold_every_seed_and_real_counts(table: Table2) -> None:

@@ -34,7 +34,7 @@ def make_outputs(
         return []
     if target == "crossed":
         write_crossed(runs, out, budget, left_out)
-        return sorted(out.glob("crossed.*"))
+        return [out / f"crossed.{kind}" for kind in ("csv", "json", "md", "pdf", "png")]
     parts = PARTS if target == "all" else (target,)
     listed = [StudyRun(*_label(run), run.folder) for run in runs]
     write_report(listed, out, budget, parts, left_out)

@@ -45,7 +45,8 @@ def write_report(
 
     The same runs give the same bytes. The files are table2.json, .md and .csv; fig4.json, .csv,
     .pdf and .png; fig5.json, .pdf and .png, which show one hand-over; and fig5_evidence.json, .pdf
-    and .png. A figure that has nothing to show is not drawn.
+    and .png. A figure that has nothing to show is not drawn, and removed where it was drawn before.
+    Small copies of runs (`kept.keep`) are enough for the table; what needs their steps is left out.
 
     Args:
         runs: finished runs with evaluations; they are read only.
@@ -73,7 +74,10 @@ def write_report(
     named = [digests(run.folder) for run in ordered]
     measured: list[list[Measured]] = []
     if {"table2", "fig5"} & set(parts):
-        measured = [[read_measured(run) for run in group] for group in groups.values()]
+        steps = "fig5" in parts
+        measured = [
+            [read_measured(run, step_by_step=steps) for run in group] for group in groups.values()
+        ]
     findings = Findings(
         budget=budget,
         folder=folder,
@@ -111,21 +115,28 @@ def _write_parts(findings: Findings, folder: Path) -> None:
     if findings.courses is not None:
         _write_json(folder / "fig4.json", fig4_json(findings.courses))
         write_whole(folder / "fig4.csv", fig4_csv(findings.courses).encode())
-        if lines := fig4_lines(findings.courses):
-            _draw(folder, "fig4", draw_entropy(lines, PRINTED_NATS))
-    if findings.scene is not None:
-        _write_json(folder / "fig5.json", scene_json(findings.scene))
-        _draw(folder, "fig5", draw_handover(findings.scene))
+        lines = fig4_lines(findings.courses)
+        _draw(folder, "fig4", draw_entropy(lines, PRINTED_NATS) if lines else None)
     if findings.evidence is not None:
         _write_json(folder / "fig5_evidence.json", evidence_json(findings.evidence))
-        if findings.evidence:
-            _draw(folder, "fig5_evidence", draw_aligned(evidence_lines(findings.evidence)))
+        drawn = draw_aligned(evidence_lines(findings.evidence)) if findings.evidence else None
+        _draw(folder, "fig5_evidence", drawn)
+        if findings.scene is not None:
+            _write_json(folder / "fig5.json", scene_json(findings.scene))
+        else:
+            (folder / "fig5.json").unlink(missing_ok=True)
+        _draw(folder, "fig5", draw_handover(findings.scene) if findings.scene else None)
 
 
 def _write_json(path: Path, document: dict[str, Any]) -> None:
     write_whole(path, f"{json.dumps(document, allow_nan=False)}\n".encode())
 
 
-def _draw(folder: Path, name: str, figure: Figure) -> None:
+def _draw(folder: Path, name: str, figure: Figure | None) -> None:
+    """Write a figure, or remove that of other runs where there is none."""
     for suffix in (".pdf", ".png"):
-        write_figure(folder / f"{name}{suffix}", figure)
+        path = folder / f"{name}{suffix}"
+        if figure is None:
+            path.unlink(missing_ok=True)
+        else:
+            write_figure(path, figure)

@@ -12,6 +12,7 @@ from innerattn.report.handover_figure import HandoverScene
 from innerattn.study.claims import RULES, Claim, entropy_claims, handover_claims
 from innerattn.study.fig4 import EntropyCourse
 from innerattn.study.fig5 import Evidence
+from innerattn.study.pairs import pairs, together
 from innerattn.study.run import Digests, StudyRun, named_from
 from innerattn.study.scene import SCENE_RULE
 from innerattn.study.sharing_claims import sharing_claims
@@ -64,6 +65,8 @@ def report_markdown(findings: Findings) -> str:
     parts.append(_claims(findings))
     if findings.table is not None:
         parts += ["## Table II\n", table2_markdown(findings.table)]
+        compared = _compared(findings.table)
+        parts += ["## Learnt attention beside uniform weights\n", compared] if compared else []
     if findings.courses is not None:
         parts += ["## Fig. 4: entropy of attention during training\n", _fig4(findings.courses)]
     if findings.evidence is not None:
@@ -108,6 +111,45 @@ def _claim_table(claims: Sequence[Claim]) -> str:
         for c in sorted(claims, key=lambda claim: order.index(claim.claim))
     ]
     return markdown_table(head, rows)
+
+
+def _compared(table: Table2) -> str:
+    """Both attentions side by side; nothing where no method has both."""
+    head = ["situation", "algorithm", "figure", "seeds", "inner", "uniform"]
+    head += ["inner − uniform [95 %]", "p", "alike within"]
+    rows = []
+    for pair in pairs(table.competence):
+        found = pair.found
+        cells = [pair.situation, pair.algorithm, pair.figure, _seeds(pair.seeds) or NONE]
+        cells += [shown(pair.inner), shown(pair.uniform)]
+        if found is None:
+            rows.append([*cells, NONE, NONE, NONE])
+            continue
+        alike = f"{found.margin:g}: {'yes' if found.equivalent else 'not shown'}"
+        rows.append([*cells, shown(found.difference, 3), p_shown(found.p), alike])
+    if not rows:
+        return ""
+    head_of_all = ["algorithm", "situations", "inner", "uniform", "a run of inner scores higher"]
+    rows_of_all = [
+        [
+            *(one.algorithm, ", ".join(one.situations)),
+            *(shown(one.inner), shown(one.uniform), shown(one.better)),
+        ]
+        for one in together(table.competence)
+    ]
+    text = (
+        "Every seed gives one difference; p is of the paired t-test, and two means are alike where "
+        "two one-sided tests at 5 % show them to be within the margin.\n\n"
+        + markdown_table(head, rows)
+    )
+    if not rows_of_all:
+        return text
+    return text + (
+        "\nOver situations: interquartile means of the score, and how probably a run with learnt "
+        "attention scores higher than one without (Agarwal et al. 2021), by a bootstrap of runs "
+        "within situations, whose intervals are too short where these are few.\n\n"
+        + markdown_table(head_of_all, rows_of_all)
+    )
 
 
 def _fig4(courses: Sequence[EntropyCourse]) -> str:

@@ -122,7 +122,7 @@ def read_measured(run: StudyRun, *, step_by_step: bool = True) -> Measured:
 
     Args:
         run: which.
-        step_by_step: whether every step of ``recorded`` is needed, which `kept.keep` leaves out.
+        step_by_step: whether every step of ``recorded`` is needed; `kept.keep` leaves them out.
 
     Raises:
         RunError: there is no finished evaluation of the run's method in its folder.

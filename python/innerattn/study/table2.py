@@ -27,7 +27,7 @@ from innerattn.evaluate.sharing.evenness import (
     evenness_of_runs,
 )
 from innerattn.evaluate.sharing.printed import CheckedRow, checked_table
-from innerattn.study.competence import Competence, competence
+from innerattn.study.competence import Competence, competence, scripted_competence
 from innerattn.study.run import Measured
 
 SCHEMA_VERSION = 1
@@ -105,7 +105,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Table2:
-    """All rows, and beside evenness the competence of the same runs."""
+    """All rows, and beside evenness the competence of the same runs and of scripted policies."""
 
     rows: tuple[Row, ...]
     competence: tuple[Competence, ...]
@@ -157,7 +157,11 @@ def table2(groups: Sequence[Sequence[Measured]]) -> Table2:
                     printed=known if run.situation == PRINTED_SITUATION else None,
                 )
             )
-    return Table2(tuple(rows), tuple(competence(group) for group in groups))
+    beside = [competence(group) for group in groups]
+    for situation in dict.fromkeys(row.situation for row in rows):
+        own = [group for group in groups if group[0].run.situation == situation]
+        beside += scripted_competence(max(own, key=len))
+    return Table2(tuple(rows), tuple(beside))
 
 
 def _counts(records: Sequence[Record]) -> dict[str, NDArray[np.int64]]:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from innerattn.evaluate.sharing.evenness import MARGIN, ChiSquared, Evenness, EvennessOfRuns
 from innerattn.evaluate.statistics import Interval
+from innerattn.scripted import SCRIPTED
 from innerattn.study.competence import COMPETENCE, Competence
 from innerattn.study.over_runs import OverRuns
 from innerattn.study.table2 import Row, Sharing, Table2
@@ -29,9 +30,11 @@ def table2_markdown(table: Table2) -> str:
         "interval is Student's 95 % with the run as the unit, of a single run it is over its "
         f"episodes. Verdict: even where the 90 % interval lies within {low} to {high} (two "
         "one-sided tests at 5 %), uneven where the 95 % interval lies outside, else undecided. "
-        "χ² is that of the rescues of all runs added up, as if they were independent; it and a "
-        "mean near 0.5 can hide runs that are uneven in opposite ways, so runs are counted by "
-        "their own verdict, too.\n"
+        "χ² is that of the rescues of all runs added up, as if they were independent, and rejects "
+        "at 5 %; it and a mean near 0.5 can hide runs that are uneven in opposite ways, so runs "
+        "are counted by their own verdict, too. The share of all rescues has the interval of a "
+        "bootstrap of runs and of episodes within, which is too short for few runs; p (TOST) is "
+        "the larger of the two one-sided p-values.\n"
     ]
     for situation in dict.fromkeys(row.situation for row in table.rows):
         rows = [row for row in table.rows if row.situation == situation]
@@ -45,6 +48,7 @@ def table2_markdown(table: Table2) -> str:
         parts.append("Every run:\n")
         parts.append(_runs_table(rows))
         parts.append(f"### Competence, {situation}\n")
+        parts.append("Last stand scripted policies, played in the same worlds.\n")
         parts.append(_competence_table([c for c in table.competence if c.situation == situation]))
     return "\n".join(parts)
 
@@ -128,7 +132,8 @@ def verdicts_shown(sharing: Sharing) -> str:
 
 def _sharing_table(rows: Sequence[Row], name: str, scores: dict[str, OverRuns | None]) -> str:
     head = ["method", "task", "seeds", "rescues (first + second)", "share of the first [95 %]"]
-    head += ["χ² (p)", "verdict", "runs even / uneven / undecided", "score [95 %]"]
+    head += ["p (TOST)", "verdict on the mean", "runs even / uneven / undecided"]
+    head += ["share of all rescues [bootstrap]", "χ² (p)", "score [95 %]"]
     printed = any(row.printed for row in rows) and name == "recorded"
     head += ["printed shares, χ²", "printed χ² at n = 100"] if printed else []
     lines = []
@@ -137,8 +142,10 @@ def _sharing_table(rows: Sequence[Row], name: str, scores: dict[str, OverRuns | 
         first, second = sharing.all.rescues
         cells = [row.method, row.task, str(len(row.seeds))]
         cells += [f"{first + second} ({first} + {second})", share_shown(sharing)]
-        cells += [_chi_squared(sharing.all.chi_squared), sharing.all.verdict]
-        cells += [verdicts_shown(sharing), shown(scores[row.method])]
+        cells += [p_shown(sharing.all.equivalence_p), sharing.all.verdict]
+        cells += [verdicts_shown(sharing)]
+        cells += [shown(sharing.together.pooled_share) if sharing.together else NONE]
+        cells += [_chi_squared(sharing.all.chi_squared), shown(scores[row.method])]
         if printed and row.printed:
             shares, was = row.printed.row.shares, row.printed.row
             cells += [f"{shares[0]:.2f} / {shares[1]:.2f}, {was.chi_squared:.{was.decimals}f}"]
@@ -173,7 +180,10 @@ def _competence_table(parts: Sequence[Competence]) -> str:
         head.append(f"{words} ({unit})" if unit else words)
     lines = []
     for part in parts:
+        played = part.method in SCRIPTED
         for seed, figures in zip(part.seeds, part.each, strict=True):
+            if played and len(part.seeds) > 1:
+                continue  # a policy that learns nothing differs by its worlds alone
             values = [figures[name] for name in COMPETENCE]
             shown_ = [NONE if value is None else fixed(value) for value in values]
             lines.append([part.method, str(seed), *shown_])
@@ -184,7 +194,10 @@ def _competence_table(parts: Sequence[Competence]) -> str:
 
 
 def _chi_squared(found: ChiSquared | None) -> str:
-    return NONE if found is None else f"{found.statistic:.2f} ({p_shown(found.p)})"
+    if found is None:
+        return NONE
+    verdict = ", rejected" if found.rejected else ""
+    return f"{found.statistic:.2f} ({p_shown(found.p)}){verdict}"
 
 
 def _listed(values: Sequence[int]) -> str:

@@ -41,8 +41,8 @@ all figures, or for all its other effects.
   attentions and penalties, lies above 0; no where it lies below, or where they are alike.
 - **The team's credit leaves a food robot idle with either attention**: yes where both attentions
   have seeds with such a run (a share of the rescues below {IDLE:g}); no where one of them has none
-  in at least {LEAST_WITHOUT_IDLE} seeds. A seed has one run with uniform weights and {len(PENALTIES)} with
-  learnt attention, so that the two numbers of seeds are not to be compared with each other.
+  in at least {LEAST_WITHOUT_IDLE} seeds. A seed has one run with uniform weights and
+  {len(PENALTIES)} with learnt attention, so the two numbers are not to be compared with each other.
 - **With the helpers' credit sharing is even with either attention**: yes where no robot is idle in
   at least {LEAST_WITHOUT_IDLE} seeds and both intervals of the unevenness lie below
   {MARGINS["unevenness"]:g}; no where a robot is idle or one interval lies above.

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.errors import RunError
-from innerattn.evaluate.sharing.evenness import counts_by_episode
 from innerattn.study.crossed.arms import Arm
 from innerattn.study.run import Measured
+from innerattn.study.unevenness import rescues_by_task, unevenness
 
 IDLE = 0.2
 """A food robot with a smaller share of the rescues than this counts as idle."""
@@ -47,18 +46,10 @@ def outcome_of(measured: Measured) -> Outcome:
     Raises:
         RunError: a task is not one that two robots share.
     """
-    counts = _counts(measured)
-    for task, by_robot in counts.items():
-        if len(by_robot) != 2:
-            raise RunError(
-                f"{measured.run.folder}: {task} is shared by {len(by_robot)} robots; must be two"
-            )
-    total = np.sum(list(counts.values()), axis=0)
-    shares = [by_robot[0] / by_robot.sum() for by_robot in counts.values() if by_robot.sum()]
-    every = len(shares) == len(counts)
+    total = np.sum(list(rescues_by_task(measured).values()), axis=0)
     summary = measured.summary
     return Outcome(
-        unevenness=float(np.mean(np.abs(np.array(shares) - 0.5))) if every else None,
+        unevenness=unevenness(measured),
         least_share=float(total.min() / total.sum()) if total.sum() else None,
         rescues_per_episode=float(summary["rescues_per_episode"]["mean"]),
         score=None if summary["score"] is None else float(summary["score"]["mean"]),
@@ -72,12 +63,6 @@ def by_seed(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> NDArray[np.
     seeds = sorted(set.intersection(*(set(of_arm) for of_arm in runs)))
     rows = [[getattr(of_arm[seed], figure) for of_arm in runs] for seed in seeds]
     return np.array([row for row in rows if None not in row], np.float64).reshape(-1, len(arms))
-
-
-def _counts(measured: Measured) -> dict[str, np.ndarray[tuple[int], np.dtype[np.int64]]]:
-    """Rescues of each task by food robot, of all episodes."""
-    parts = [counts_by_episode(record) for record in measured.scored]
-    return {task: sum(part[task].sum(0) for part in parts) for task in parts[0]}
 
 
 def _mean(rows: dict[str, Sequence[float | None]]) -> float | None:
