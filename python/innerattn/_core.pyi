@@ -20,8 +20,8 @@ def check_scenario(json: str) -> str:
 class Batch:
     """Many rescue worlds of one scenario. E envs, R robots, D columns, V victim slots, O obstacles.
 
-    Arrays returned by `reset`, `step`, `observe` and `reward_components` are read-only and valid
-    until the step after next. Not to be used from two threads at once (RuntimeError), nor, with
+    Arrays returned by `step` and `reward_components` are read-only and valid until the step after
+    next; all others are fresh. Not to be used from two threads at once (RuntimeError), nor, with
     several threads, in a child process after a fork (RuntimeError).
     """
 

@@ -161,8 +161,8 @@ impl Batch {
     }
 
     /// Starts new episodes in the worlds of `mask` (all if absent), under `seed` from episode 0 if
-    /// given, else in the episode after the present one (the first reset keeps episode 0), and
-    /// writes everyone's observations into `obs` (E × R × D).
+    /// given, else in the episode after the present one (a reset before the first step keeps
+    /// episode 0), and writes everyone's observations into `obs` (E × R × D).
     pub fn reset(&mut self, seed: Option<u64>, mask: Option<&[bool]>, obs: &mut [f32]) {
         let rules = &self.rules;
         let envs = self.shards.iter_mut().flat_map(|shard| &mut shard.worlds).enumerate();
@@ -255,7 +255,14 @@ impl Batch {
     /// # Errors
     /// [`Error::Snapshot`] that says what is wrong.
     pub fn restore(&mut self, image: &[u8]) -> Result<()> {
-        let mut worlds = snapshot::load(&self.rules, self.options.num_envs, image)?.into_iter();
+        let worlds = snapshot::load(&self.rules, self.options.num_envs, image)?;
+        if self.options.autoreset == Autoreset::SameStep
+            && let Some(env) = worlds.iter().position(|world| world.over)
+        {
+            let rule = "of a batch without autoreset; this one has it and could not step";
+            return Err(Error::Snapshot(format!("the episode of env {env} is over in it: it is {rule}")));
+        }
+        let mut worlds = worlds.into_iter();
         for shard in &mut self.shards {
             shard.worlds = worlds.by_ref().take(shard.worlds.len()).collect();
         }

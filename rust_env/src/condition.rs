@@ -174,19 +174,17 @@ impl Condition {
     /// Whether some robot's sensors are frozen now or in some steps.
     #[must_use]
     pub fn freezes(&self) -> bool {
-        self.levels.iter().any(|levels| levels[Kind::FrozenSensor as usize] > 0.0)
+        self.levels.iter().any(freezing)
     }
 
     /// Takes the present rows (R × D) of frozen robots, but for those that go on seeing an older one.
     pub fn hold(&mut self, rows: &[f32]) {
         let Self { levels, held, struck, .. } = self;
-        let frozen = |robot: usize| levels[robot][Kind::FrozenSensor as usize] > 0.0;
-        held.retain(|(robot, _)| frozen(usize::from(*robot)));
         for (robot, row) in rows.chunks_exact(rows.len() / levels.len()).enumerate() {
             let known = held.iter().position(|(other, _)| usize::from(*other) == robot);
             match known {
                 Some(index) if struck.frozen >> robot & 1 == 0 => held[index].1.copy_from_slice(row),
-                None if frozen(robot) => held.push((robot as u8, row.to_vec())),
+                None if freezing(&levels[robot]) => held.push((robot as u8, row.to_vec())),
                 _ => {}
             }
         }
@@ -262,6 +260,7 @@ impl Condition {
         }
         let shares = levels.iter().flat_map(|levels| STRIKING.map(|kind| levels[kind as usize]));
         self.intermittent = shares.into_iter().any(|share| 0.0 < share && share < 1.0);
+        self.held.retain(|(robot, _)| freezing(&levels[usize::from(*robot)]));
         self.levels = levels;
         self.strike(now);
     }
@@ -284,6 +283,11 @@ impl Condition {
             }
         }
     }
+}
+
+/// Whether sensors at these levels are frozen in all or some steps.
+fn freezing(levels: &Levels) -> bool {
+    levels[Kind::FrozenSensor as usize] > 0.0
 }
 
 /// Two independent standard normal numbers (Box & Muller 1958); always two words.

@@ -234,6 +234,7 @@ impl World {
         let earlier = rescues.len();
         self.settle(rules, env, rescues);
         self.step += 1;
+        self.fresh = false;
         self.fill_slots(rules);
         let now = self.now();
         self.condition.update(rules, now);

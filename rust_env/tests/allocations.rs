@@ -62,7 +62,6 @@ fn worlds_are_small_and_steps_allocate_next_to_nothing() {
     let [rapier, discs] = [Engine::Rapier, Engine::Discs].map(per_env_step);
     println!("allocations of an env-step: {rapier:.2} with rapier, {discs:.2} with discs");
     assert!(discs < 0.5, "{discs}");
-    assert!(rapier > discs, "rapier's worlds are made anew: {rapier}");
     let [rapier, discs] = [Engine::Rapier, Engine::Discs].map(bytes_a_world);
     println!("bytes of a world: {rapier} with rapier, {discs} with discs");
     assert!(rapier < 1024 && discs < 1024);

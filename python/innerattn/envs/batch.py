@@ -53,9 +53,9 @@ class BatchEnv:
     """E rescue worlds of one scenario, stepped together by compiled code on several threads.
 
     Autoreset is Gymnasium's SAME_STEP: on an episode's last step `obs` is the next episode's
-    first already and `final_obs` holds the last of the old one. Arrays are C-contiguous
+    first already and `final_obs` holds the last of the old one. What a step gives are C-contiguous
     read-only views of buffers owned by the environment, valid until the step after next;
-    `copy=True` gives fresh ones.
+    `copy=True` gives fresh arrays, as `reset` and `observe` always do.
     World i depends on scenario, seed, `first_env + i` and its actions alone, whatever the number of
     threads or worlds.
 
@@ -65,7 +65,7 @@ class BatchEnv:
         seed: seed of all random streams, 0 to 2**64 - 1.
         num_threads: 1 to 256; as many cores as are worth it if None.
         autoreset: "same_step", or "disabled" to leave ended worlds until `reset(mask=...)`.
-        copy: return fresh arrays instead of views.
+        copy: let steps return fresh arrays instead of views.
         first_env: number of the first world's random streams, for batches split over processes.
 
     Raises:
@@ -111,7 +111,7 @@ class BatchEnv:
 
         Args:
             seed: restart from episode 0 under this seed; None goes on to each world's next episode
-                (the first reset keeps episode 0).
+                (a reset before the first step keeps episode 0).
             mask: (E,) bool, the worlds to reset; all if None.
 
         Returns:
@@ -122,7 +122,7 @@ class BatchEnv:
         """
         if seed is not None:
             seed = _whole("seed", seed, 0, 2**64 - 1)
-        return self._lend(self._core.reset(seed, self._mask(mask)))
+        return self._core.reset(seed, self._mask(mask))
 
     def step(self, actions: ArrayLike) -> Step:
         """Do one control step in every world.
@@ -146,7 +146,7 @@ class BatchEnv:
 
     def observe(self) -> NDArray[np.float32]:
         """Present observations, (E, R, D) float32 (after `restore`, say)."""
-        return self._lend(self._core.observe())
+        return self._core.observe()
 
     def reward_components(self) -> NDArray[np.float32]:
         """Rewards of the last step, (E, R, 4) float32, columns `reward_component_names`."""
@@ -226,9 +226,13 @@ class BatchEnv:
         Raises:
             ValueError: wrong shape, or numbers that are not finite.
         """
-        self._core.set_motion(
-            np.asarray(positions, dtype=np.float32), np.asarray(velocities, dtype=np.float32)
-        )
+        given = {"positions": positions, "velocities": velocities}
+        arrays = {name: np.require(values, np.float32, "CA") for name, values in given.items()}
+        for name, array in arrays.items():
+            if array.ndim != 3:
+                wanted = (self.num_envs, self.num_robots, 2)
+                raise ValueError(f"{name} has shape {array.shape}: must be {wanted}")
+        self._core.set_motion(**arrays)
 
     def snapshot(self) -> bytes:
         """Image of all worlds, with a checksum; `restore` continues from it bit for bit."""

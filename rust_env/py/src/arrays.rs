@@ -1,19 +1,21 @@
 //! The arrays that a batch lends to Python: allocated once as numpy arrays, written by Rust between
-//! calls, and handed out read-only.
+//! calls, and handed out as read-only views.
 
 use innerattn_env::batch::StepBuffers;
 use innerattn_env::reward::NUM_COMPONENTS;
 use numpy::{Element, Ix1, Ix2, Ix3, PyArray, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 /// An array that only this module writes.
 pub struct Lent<T, D> {
-    array: Py<PyArray<T, D>>,
+    /// Of an array of its own, which is this view's base: numpy resizes no view.
+    view: Py<PyArray<T, D>>,
     start: *mut T,
     length: usize,
 }
 
-// SAFETY: the pointer leads into the array that is kept alive beside it; it is followed only through
+// SAFETY: the pointer leads into the array that the view keeps alive; it is followed only through
 // `&mut self`, so never from two threads at once.
 unsafe impl<T: Send, D> Send for Lent<T, D> {}
 // SAFETY: `&self` gives out nothing but the array object, which Python guards itself.
@@ -21,22 +23,29 @@ unsafe impl<T: Sync, D> Sync for Lent<T, D> {}
 
 impl<T: Element, D: numpy::ndarray::Dimension> Lent<T, D> {
     /// An array of zeros of this shape.
+    ///
+    /// # Errors
+    /// Python's `MemoryError` where there is not that much.
     pub fn zeros<S: numpy::ndarray::IntoDimension<Dim = D>>(py: Python, shape: S) -> PyResult<Self> {
-        let array = PyArray::<T, D>::zeros(py, shape, false);
+        let shape = PyTuple::new(py, shape.into_dimension().slice())?;
+        let array = py.import("numpy")?.call_method1("zeros", (shape, T::get_dtype(py)))?;
+        let array = array.cast_into::<PyArray<T, D>>().map_err(PyErr::from)?;
         let (start, length) = (array.data(), array.len());
         array.getattr("flags")?.setattr("writeable", false)?;
-        Ok(Self { array: array.unbind(), start, length })
+        let view = array.call_method0("view")?.cast_into::<PyArray<T, D>>().map_err(PyErr::from)?;
+        Ok(Self { view: view.unbind(), start, length })
     }
 
     /// The array, for Python.
     pub fn lend(&self, py: Python) -> Py<PyArray<T, D>> {
-        self.array.clone_ref(py)
+        self.view.clone_ref(py)
     }
 
     /// The array's memory, C order.
     pub fn memory(&mut self) -> &mut [T] {
-        // SAFETY: `start` and `length` are those of the contiguous array kept alive by `self`, whose
-        // memory is never resized; Python sees it read-only, and only while no call is under way.
+        // SAFETY: `start` and `length` are those of the contiguous array kept alive by `self`. Python is
+        // given read-only views of it, which numpy neither resizes nor makes writeable, and looks at
+        // them only while no call is under way.
         unsafe { std::slice::from_raw_parts_mut(self.start, self.length) }
     }
 }

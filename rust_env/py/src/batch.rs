@@ -7,6 +7,7 @@ use innerattn_env::robot::Commands;
 use innerattn_env::scenario::{Actions, Scenario};
 use innerattn_env::task::Rescue;
 use innerattn_env::world::World;
+use numpy::npyffi::flags::NPY_ARRAY_ALIGNED;
 use numpy::{
     IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2,
     PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
@@ -15,7 +16,7 @@ use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::arrays::{Arrays, Lent};
+use crate::arrays::Arrays;
 use crate::value_error;
 
 type Stepped = (
@@ -37,9 +38,6 @@ pub struct Batch {
     /// What steps write, in turn.
     sets: [Arrays; 2],
     latest: usize,
-    /// What looks without a step (reset, observe) write, in turn: no view of a step is touched.
-    looks: [Lent<f32, Ix3>; 2],
-    latest_look: usize,
     /// The type of a rescue, and the array of none.
     rescue_dtype: Py<PyAny>,
     no_rescues: Py<PyAny>,
@@ -66,16 +64,13 @@ impl Batch {
             .map_err(|error| value_error(&error))?;
         let (robots, width) = (worlds.rules().team.len(), worlds.rules().layout.width());
         let set = || Arrays::new(py, num_envs, robots, width);
-        let look = || Lent::zeros(py, [num_envs, robots, width]);
         let rescue_dtype = rescue_dtype(py, worlds.rules().scenario.max_needs())?;
         Ok(Self {
             no_rescues: py.import("numpy")?.call_method1("empty", (0, &rescue_dtype))?.unbind(),
             rescue_dtype: rescue_dtype.unbind(),
             sets: [set()?, set()?],
-            looks: [look()?, look()?],
             worlds,
             latest: 0,
-            latest_look: 0,
             process: std::process::id(),
         })
     }
@@ -100,19 +95,19 @@ impl Batch {
     }
 
     #[pyo3(signature = (seed, mask))]
-    fn reset(
+    fn reset<'py>(
         &mut self,
-        py: Python,
+        py: Python<'py>,
         seed: Option<u64>,
         mask: Option<Bound<PyArray1<bool>>>,
-    ) -> PyResult<Py<PyArray3<f32>>> {
+    ) -> PyResult<Bound<'py, PyArray3<f32>>> {
         self.check_process()?;
         let mask = self.mask(mask)?;
-        self.latest_look = 1 - self.latest_look;
-        let look = &mut self.looks[self.latest_look];
-        let (worlds, obs) = (&mut self.worlds, look.memory());
-        py.detach(|| worlds.reset(seed, mask.as_deref(), obs));
-        Ok(look.lend(py))
+        let shape = self.obs_shape();
+        let mut obs = vec![0.0; shape.iter().product()];
+        let worlds = &mut self.worlds;
+        py.detach(|| worlds.reset(seed, mask.as_deref(), &mut obs));
+        shaped(py, obs, shape)
     }
 
     fn step(&mut self, py: Python, actions: &Bound<PyUntypedArray>) -> PyResult<Stepped> {
@@ -144,12 +139,12 @@ impl Batch {
         self.sets[self.latest].components.lend(py)
     }
 
-    fn observe(&mut self, py: Python) -> PyResult<Py<PyArray3<f32>>> {
+    fn observe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         self.check_process()?;
-        self.latest_look = 1 - self.latest_look;
-        let look = &mut self.looks[self.latest_look];
-        self.worlds.observe(look.memory());
-        Ok(look.lend(py))
+        let shape = self.obs_shape();
+        let mut obs = vec![0.0; shape.iter().product()];
+        self.worlds.observe(&mut obs);
+        shaped(py, obs, shape)
     }
 
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
@@ -270,6 +265,12 @@ impl Batch {
         ))
     }
 
+    /// Envs, robots and columns.
+    fn obs_shape(&self) -> [usize; 3] {
+        let rules = self.worlds.rules();
+        [self.worlds.num_envs(), rules.team.len(), rules.layout.width()]
+    }
+
     /// A mask with one flag for each env.
     fn mask(&self, mask: Option<Bound<PyArray1<bool>>>) -> PyResult<Option<Vec<bool>>> {
         let mask = mask.map(|mask| mask.to_vec()).transpose()?;
@@ -296,6 +297,7 @@ impl Batch {
         let (envs, robots) = (self.worlds.num_envs(), self.worlds.rules().team.len());
         if let Ok(actions) = actions.extract::<PyReadonlyArray2<i64>>()
             && actions.shape() == [envs, robots]
+            && aligned(&actions)
         {
             return Ok(actions);
         }
@@ -371,6 +373,12 @@ fn contiguous<'a, T: Clone, D: numpy::ndarray::Dimension>(
         Some(values) => std::borrow::Cow::Borrowed(values),
         None => std::borrow::Cow::Owned(array.iter().cloned().collect()),
     }
+}
+
+/// Whether the array's numbers lie where numbers of their type must, so that Rust may look at them.
+fn aligned<T: numpy::Element, D: numpy::ndarray::Dimension>(array: &Bound<PyArray<T, D>>) -> bool {
+    // SAFETY: the pointer is that of a live array object; its flags are plain data.
+    unsafe { (*array.as_array_ptr()).flags & NPY_ARRAY_ALIGNED != 0 }
 }
 
 fn shaped<T: numpy::Element, const N: usize>(

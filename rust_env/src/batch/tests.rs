@@ -118,3 +118,18 @@ fn sizes_out_of_range_are_refused() {
     let error = Batch::new(crowded, options(1, 1)).err().map(|error| error.to_string());
     assert!(error.is_some_and(|error| error.starts_with("scenario.spawn_clearance_m = 3: no place")));
 }
+
+#[test]
+fn only_a_reset_before_the_first_step_keeps_episode_0() {
+    let mut batch = batch(Scenario::default(), Autoreset::SameStep);
+    let mut obs = vec![0.0; ENVS * batch.rules().team.len() * batch.rules().layout.width()];
+    let episodes = |batch: &Batch| batch.worlds().map(|world| world.episode).collect::<Vec<_>>();
+    batch.reset(None, None, &mut obs);
+    assert_eq!(episodes(&batch), [0; ENVS]);
+    batch.reset(None, None, &mut obs);
+    assert_eq!(episodes(&batch), [1; ENVS]);
+    let mut stepped = self::batch(Scenario::default(), Autoreset::SameStep);
+    step(&mut stepped, Commands::Discrete(&[0; ENVS * 4])).expect("good actions");
+    stepped.reset(None, None, &mut obs);
+    assert_eq!(episodes(&stepped), [1; ENVS]);
+}

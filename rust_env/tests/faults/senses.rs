@@ -30,6 +30,30 @@ fn frozen_sensors_repeat_what_they_saw_to_the_bit() {
     }
 }
 
+/// `food_1` frozen in steps 3 to 6 and again in 9 to 11, while `medical_0` is never well.
+#[test]
+fn what_thaws_sees_again_whatever_else_is_wrong() {
+    let frozen = |onset_step, duration_steps| Fault {
+        onset_step,
+        duration_steps: Some(duration_steps),
+        ..fault("food_1", Kind::FrozenSensor, 1.0)
+    };
+    let faults = vec![fault("medical_0", Kind::MotorGain, 0.5), frozen(3, 4), frozen(9, 3)];
+    let mut table = Table::new(team(faults.clone()), options(1, 4));
+    let mut seeing = Table::new(team(faults[..1].to_vec()), options(1, 4));
+    let (mut chance, mut held) = (chance(1), vec![]);
+    for step in 1..=20 {
+        let drives: Vec<[f32; 2]> = (0..4).map(|_| random_drive(&mut chance)).collect();
+        table.step(&drives);
+        seeing.step(&drives);
+        if step == 3 || step == 9 {
+            held = row(&seeing, 1);
+        }
+        let frozen = (3..7).contains(&step) || (9..12).contains(&step);
+        assert_eq!(row(&table, 1), if frozen { held.clone() } else { row(&seeing, 1) }, "step {step}");
+    }
+}
+
 #[test]
 fn sensors_that_freeze_now_and_then_lag_behind() {
     let mut table = Table::new(team(vec![fault("food_1", Kind::FrozenSensor, 0.5)]), options(1, 4));
