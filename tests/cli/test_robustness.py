@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
+import tomli_w
 
 from innerattn.cli.main import main
 
@@ -50,6 +51,7 @@ def test_tables_a_file_and_a_picture(
         (["--episode-steps", "1"], 2, "--episode-steps = 1: must be at least 2"),
         (["--plot", "map.jpeg"], 1, "must end in .pdf, .png, .svg"),
         (["--json", "nowhere/a.json"], 1, "nowhere: no such folder"),
+        (["--json", "/tmp"], 1, "/tmp: is a folder; must be a file"),
     ],
 )
 def test_refusals_are_one_line(
@@ -69,3 +71,32 @@ def test_refusals_are_one_line(
 def test_a_run_that_is_not_there_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["robustness", "no-such-run", *FEW]) == 1
     assert "no-such-run" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("robots", "left_out"), [(1, "its bounds included"), (2, "where attention")]
+)
+def test_small_teams_have_no_attention_to_look_at(
+    robots: int,
+    left_out: str,
+    tiny: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    names = ("food_0", "food_1")[:robots]
+    team = [{"name": name, "kind": "food", "abilities": ["food"]} for name in names]
+    driven = [{**robot, "max_speed_mps": 1.0, "mass_kg": 1.0} for robot in team]
+    world = {"robots": driven, "tasks": [{"name": "task_1", "needs": ["food"]}]}
+    (tmp_path / "few.toml").write_text(tomli_w.dumps({"scenario": world}))
+    run = tmp_path / "run"
+    assert (
+        main(["train", "--config", str(tmp_path / "few.toml"), "--run-dir", str(run), *tiny]) == 0
+    )
+    capsys.readouterr()
+    assert main(["robustness", str(run), *FEW, "--json", "-"]) == 0
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert len(found["bounds"]) == robots - 1
+    assert found["attention"] == {}
+    assert err.startswith("innerattn: left out: ")
+    assert left_out in err

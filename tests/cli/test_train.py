@@ -186,6 +186,16 @@ def test_divergence_is_one_line(
     assert json.loads((path / "run.json").read_text())["state"] == "interrupted"
 
 
+def test_what_memory_cannot_hold_is_one_line(
+    tiny: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--run-dir", str(tmp_path / "run"), *tiny, "--td.replay-capacity", str(10**15)]
+    assert main(["train", *options]) == 1
+    err = capsys.readouterr().err
+    assert err.startswith("innerattn: error: out of memory: Unable to allocate ")
+    assert err.count("\n") == 1
+
+
 def test_existing_folder_is_refused(
     run_dir: Path, tiny: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

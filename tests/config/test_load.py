@@ -121,6 +121,19 @@ def test_later_sources_win(tmp_path: Path) -> None:
     assert config.scenario.situation == "single"
 
 
+def test_what_is_wrong_in_a_file_names_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "wrong.toml"
+    path.write_text("[td]\ngama = 0.9\n")
+    for overrides in (None, {"td.batch_size": 64}):
+        with pytest.raises(ConfigError) as error:
+            load_run_config(config_file=path, overrides=overrides)
+        assert str(error.value) == f"{path}: td.gama: unknown key"
+    path.write_text("[td]\ngamma = 0.9\n")
+    with pytest.raises(ConfigError) as error:
+        load_run_config(config_file=path, overrides={"td.gama": 0.9})
+    assert str(error.value) == "td.gama: unknown key"
+
+
 def test_tables_in_a_file_replace_lists(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("[[scenario.tasks]]\nname = 'only'\nneeds = ['food', 'food']\n")
@@ -159,7 +172,7 @@ def test_unknown_sources_are_named() -> None:
 def test_a_section_must_be_a_table(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("td = 3\n")
-    with pytest.raises(ConfigError, match=r"^td = 3: "):
+    with pytest.raises(ConfigError, match=r"mine\.toml: td = 3: "):
         load_run_config(config_file=file)
 
 

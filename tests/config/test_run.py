@@ -7,8 +7,9 @@ import re
 import pytest
 from pydantic import ValidationError
 
-from innerattn.config import NetworkConfig, RunConfig, TDConfig, TrainConfig
+from innerattn.config import NetworkConfig, RunConfig, TDConfig, TrainConfig, load_run_config
 from innerattn.config.run import PPOConfig
+from innerattn.errors import ConfigError
 
 
 @pytest.mark.parametrize(
@@ -108,6 +109,33 @@ def test_out_of_range_is_refused(section: str, key: str, value: object) -> None:
     with pytest.raises(ValidationError) as caught:
         RunConfig.model_validate({section: {key: value}})
     assert [error["loc"] for error in caught.value.errors()] == [(section, key)]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "rule"),
+    [
+        ("scenario.substeps", True, "must be a valid number"),
+        ("scenario.dt_s", "0.1", "must be a valid number"),
+        ("scenario.observe_faults", "yes", "must be true or false"),
+        ("scenario.observe_faults", 1, "must be true or false"),
+        ("train.threads", "2", "must be a valid number"),
+        ("td.gamma", False, "must be a valid number"),
+    ],
+)
+def test_values_of_another_type_are_refused(key: str, value: object, rule: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        load_run_config(overrides={key: value})
+    assert str(error.value) == f"{key} = {value!r}: {rule}"
+
+
+@pytest.mark.parametrize("method", ["td-inner", "ppo-inner"])
+def test_potential_shaping_goes_with_the_learners_discount(method: str) -> None:
+    shaped: dict[str, object] = {"scenario.shaping": "potential", "scenario.shaping_discount": 0.9}
+    section = method.partition("-")[0]
+    with pytest.raises(ConfigError, match=rf"shaping_discount = 0\.9: .*{section}\.gamma = 0\.9"):
+        load_run_config(method=method, overrides=shaped)
+    load_run_config(method=method, overrides={**shaped, f"{section}.gamma": 0.9})
+    load_run_config(method=method, overrides={"scenario.shaping_discount": 0.9})
 
 
 def test_heads_must_divide_width() -> None:

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import threading
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -67,6 +68,10 @@ def test_views_are_read_only_and_last_until_the_step_after_next() -> None:
     for array in (*first[:5], env.reward_components()):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0
+        with pytest.raises(ValueError, match="cannot set WRITEABLE"):
+            array.flags.writeable = True
+        with pytest.raises(ValueError, match="does not own its data"):
+            array.resize((1,) * array.ndim, refcheck=False)
     kept = [array.copy() for array in first]
     second = env.step(actions[1])
     for held, view in zip(kept, first, strict=True):
@@ -95,6 +100,24 @@ def test_copies_stay_as_they_are() -> None:
         assert all((a == b).all() for a, b in zip(views.step(action), copied, strict=True))
     steps[0].obs[...] = 0  # it is the caller's own
     assert env.observe().any()
+
+
+def test_what_reset_and_observe_give_is_the_callers_own() -> None:
+    env = batch(8)
+    seen = [env.reset(seed=seed) for seed in range(4)] + [env.observe() for _ in range(3)]
+    for seed, obs in enumerate(seen[:4]):
+        assert (obs == batch(8, seed=seed).observe()).all()
+    assert not any(np.shares_memory(a, b) for a, b in combinations(seen, 2))
+    seen[-1][...] = 0.0
+    assert (env.observe() == seen[3]).all()
+
+
+def test_actions_that_are_not_aligned_are_actions() -> None:
+    env, plain = batch(2), batch(2)
+    actions = plan(1, 2)[0].astype(np.int64)
+    shifted = np.frombuffer(b"." + actions.tobytes(), np.int64, offset=1).reshape(actions.shape)
+    assert not shifted.flags.aligned
+    assert (env.step(shifted).obs == plain.step(actions).obs).all()
 
 
 def test_looking_changes_nothing() -> None:

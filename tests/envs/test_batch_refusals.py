@@ -150,6 +150,7 @@ def test_unknown_keys_are_named() -> None:
         ({"num_envs": 2**20 + 1}, ValueError, "num_envs = 1048577: must be in 1..=1048576"),
         ({"num_envs": 1.0}, TypeError, "num_envs = 1.0: must be an integer in 1..=1048576"),
         ({"num_envs": True}, TypeError, "num_envs = True: must be an integer"),
+        ({"scenario": {}}, TypeError, "scenario = {}: must be a Scenario or the name of a preset"),
         ({"seed": -1}, ValueError, f"seed = -1: must be in 0..={2**64 - 1}"),
         ({"seed": 2**64}, ValueError, f"seed = {2**64}: must be in 0..="),
         ({"num_threads": 0}, ValueError, "num_threads = 0: must be in 1..=256"),
@@ -178,6 +179,7 @@ def test_bad_resets_and_motions_change_nothing() -> None:
         (ValueError, "positions", lambda: env.set_motion(spoilt, places)),
         (ValueError, "velocities", lambda: env.set_motion(places, spoilt)),
         (ValueError, r"positions has shape .*must be", lambda: env.set_motion(places[:2], places)),
+        (ValueError, r"positions has shape \(4, 2\)", lambda: env.set_motion(places[0], places)),
     ]:
         with pytest.raises(error, match=message):
             attempt()

@@ -17,7 +17,7 @@ from innerattn.scripted import View, scripted_policy
 from innerattn.train import Progress, load_policy, read_info, train
 from innerattn.train.build import build_learner
 from innerattn.train.collect import Collector
-from innerattn.train.imitate import Imitation
+from innerattn.train.imitate import Imitation, _Memory
 
 Configure = Callable[..., RunConfig]
 
@@ -189,3 +189,13 @@ def test_agreement_with_the_script_grows(small_config: Configure) -> None:
         agreement = [imitation.step(step / 500)[1]["agreement"] for step in range(500)]
     assert sum(agreement[:5]) / 5 < 0.3
     assert sum(agreement[-50:]) / 50 > 0.5
+
+
+def test_of_more_states_than_it_holds_a_memory_keeps_the_last() -> None:
+    memory = _Memory(capacity=5, seed=0)
+    for start, count in ((0, 3), (3, 12), (15, 1)):
+        labels = torch.arange(start, start + count)
+        memory.add(labels.float()[:, None, None].expand(-1, 2, 3), labels[:, None].expand(-1, 2))
+    obs, actions = memory.sample(200)
+    assert set(actions.unique().tolist()) == {11, 12, 13, 14, 15}
+    assert (obs[..., 0].long() == actions).all()

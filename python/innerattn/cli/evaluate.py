@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 from rich.console import Console
 
-from innerattn.cli.options import Command
+from innerattn.cli.options import Command, check_target
 from innerattn.cli.progress import Evaluating
 from innerattn.cli.tables import print_summary
 from innerattn.config import EvaluateConfig, Scenario, read_toml
@@ -53,8 +53,8 @@ class Evaluate(Command):
             InnerattnError: no such run or policy, or wrong options.
             OSError: the figures cannot be written.
         """
-        if self.json is not None and not self.json.parent.is_dir():
-            raise RunError(f"{self.json.parent}: no such folder")
+        if self.json is not None:
+            check_target(self.json)
         evaluation = self._measure()
         document = json.dumps(evaluation.summary.to_json(), indent=1, allow_nan=False)
         if self.json == Path("-"):

@@ -44,10 +44,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has left, e.g. `innerattn info | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (InnerattnError, OSError) as error:
+    except (InnerattnError, OSError, MemoryError) as error:
         if "--debug" in argv:
             raise
-        print(f"innerattn: error: {' '.join(str(error).split())}", file=sys.stderr)
+        what = "out of memory: " if isinstance(error, MemoryError) else ""
+        print(f"innerattn: error: {what}{' '.join(str(error).split())}", file=sys.stderr)
         return 2 if isinstance(error, UsageError) else 1
 
 

@@ -6,13 +6,14 @@ It checks no value: the models do, when the options are put back into a configur
 from __future__ import annotations
 
 from dataclasses import dataclass, field, make_dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
 from pydantic import BaseModel
 
 from innerattn.config import RunConfig
-from innerattn.errors import InnerattnError
+from innerattn.errors import InnerattnError, RunError
 
 _SHORT = ("method", "warm_start", "seed", "device", "compile")
 """Keys of the section `train` that are options by their last word too."""
@@ -36,6 +37,18 @@ class Command:
 
     debug: tyro.conf.FlagCreatePairsOff[bool] = False
     """Show where in the program an error arose."""
+
+
+def check_target(path: Path) -> None:
+    """Refuse in time what no file can be written to.
+
+    Raises:
+        RunError: it is a folder, or lies in none.
+    """
+    if not path.parent.is_dir():
+        raise RunError(f"{path.parent}: no such folder")
+    if path.is_dir():
+        raise RunError(f"{path}: is a folder; must be a file")
 
 
 def short_option(name: str, default: object) -> OptionField:

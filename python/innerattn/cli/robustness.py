@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 from rich.console import Console
 
-from innerattn.cli.options import Command, UsageError
+from innerattn.cli.options import Command, UsageError, check_target
 from innerattn.cli.progress import CheckingBounds, Evaluating, WatchingAttention
 from innerattn.cli.robustness_tables import print_robustness
 from innerattn.config.files import write_whole
 from innerattn.envs.batch import FAULT_KINDS
-from innerattn.errors import RunError
 
 if TYPE_CHECKING:
     from innerattn.evaluate.bounds.figures import Bounds
@@ -62,8 +62,13 @@ class Robustness(Command):
 
             check_format(self.plot)
         grid, found, methods = self._retention(kinds)
-        bounds = self._bounds()
-        attention = self._attention(kinds, bounds)
+        robots = grid.scenario.num_robots
+        bounds = self._bounds() if robots > 1 else {}
+        attention = self._attention(kinds, bounds) if robots > 2 else {}
+        if robots < 3:
+            left_out = "where attention goes" if robots > 1 else "attention, its bounds included"
+            why = f"left out: {left_out}, which has no choice in a team of {robots}"
+            print(f"innerattn: {why}", file=sys.stderr)
         if self.json is not None:
             parts = _document(grid, found, methods, bounds, attention)
             document = json.dumps(parts, indent=1, allow_nan=False)
@@ -91,8 +96,8 @@ class Robustness(Command):
                 flag = name.replace("_", "-")
                 raise UsageError(f"--{flag} = {value}: must be at least {least}")
         for path in (self.json, self.plot):
-            if path is not None and not path.parent.is_dir():
-                raise RunError(f"{path.parent}: no such folder")
+            if path is not None:
+                check_target(path)
         if self.faults == "all":
             return FAULT_KINDS
         kinds = tuple(dict.fromkeys(kind.strip() for kind in self.faults.split(",")))

@@ -60,7 +60,14 @@ def load_run_config(
         if not dot or not isinstance(table.setdefault(section, {}), dict):
             raise ConfigError(f"{key}: unknown key; keys are written SECTION.KEY")
         table[section][name] = value
-    return _validated(table)
+    if config_file is None:
+        return _validated(table)
+    try:
+        return _validated(table, "" if overrides else str(config_file))
+    except ConfigError:
+        if overrides:  # where the file is wrong by itself, the message names it
+            load_run_config(preset, method, budget, config_file)
+        raise
 
 
 def write_toml(config: RunConfig, path: str | Path) -> None:

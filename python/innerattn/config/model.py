@@ -6,20 +6,33 @@ It knows no field of any model.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import ClassVar, Self
+from typing import ClassVar, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from innerattn.errors import ConfigError
 
 
 class Model(BaseModel):
-    """A frozen model that refuses unknown keys, infinities and NaN."""
+    """A frozen model that refuses unknown keys, infinities, NaN and values of another type."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     place: ClassVar[str] = ""
     """What errors call an object of this class."""
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _of_its_own_type(cls, value: object, info: ValidationInfo) -> object:
+        """Refuse what pydantic would take for a number or a truth: true for 1, "25" for 25."""
+        annotation = cls.model_fields[str(info.field_name)].annotation
+        kinds = {annotation, *get_args(annotation)}
+        if bool in kinds and not isinstance(value, bool):
+            raise PydanticCustomError("type", "Input should be true or false")
+        if kinds & {int, float} and str not in kinds and isinstance(value, (bool, str)):
+            raise PydanticCustomError("type", "Input should be a valid number")
+        return value
 
     def replace(self, **fields: object) -> Self:
         """A checked copy with some fields changed (`model_copy` does not check).

@@ -324,6 +324,13 @@ class RunConfig(Model):
                     raise ValueError(
                         f"{section}.{key} = {value!r}: train.method = {method!r} needs {wanted!r}"
                     )
+        section = "ppo" if on_policy(method) else "td"
+        gamma, world = getattr(self, section).gamma, self.scenario
+        if world.shaping == "potential" and world.shaping_discount != gamma:
+            raise ValueError(
+                f"scenario.shaping_discount = {world.shaping_discount!r}: potential shaping leaves "
+                f"the best policy as it is only with the learner's {section}.gamma = {gamma!r}"
+            )
         return self
 
 

@@ -70,7 +70,9 @@ class BatchEnv:
 
     Raises:
         ConfigError: unknown preset.
+        TypeError: a value of another type.
         ValueError: a value that is not allowed, named with its range.
+        MemoryError: the arrays do not fit.
     """
 
     reward_component_names: tuple[str, ...] = tuple(_core.Batch.reward_component_names())
@@ -86,6 +88,11 @@ class BatchEnv:
         copy: bool = False,
         first_env: int = 0,
     ) -> None:
+        if not isinstance(scenario, (Scenario, str)):
+            raise TypeError(
+                f"scenario = {scenario!r}: must be a Scenario or the name of a preset; "
+                "Scenario.from_toml reads a file"
+            )
         self.scenario = Scenario.preset(scenario) if isinstance(scenario, str) else scenario
         if autoreset not in ("same_step", "disabled"):
             raise ValueError(f"autoreset = {autoreset!r}: must be 'same_step' or 'disabled'")
@@ -227,7 +234,9 @@ class BatchEnv:
             ValueError: wrong shape, or numbers that are not finite.
         """
         given = {"positions": positions, "velocities": velocities}
-        arrays = {name: np.require(values, np.float32, "CA") for name, values in given.items()}
+        arrays = {
+            name: np.require(values, np.float32, ("C", "A")) for name, values in given.items()
+        }
         for name, array in arrays.items():
             if array.ndim != 3:
                 wanted = (self.num_envs, self.num_robots, 2)

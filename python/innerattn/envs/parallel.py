@@ -5,6 +5,7 @@ It steps a single world through `BatchEnv`; for training at speed use `BatchEnv`
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -74,6 +75,10 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         """See `parallel_env`."""
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ConfigError(f"render_mode = {render_mode!r}: must be None or 'rgb_array'")
+        if render_mode is not None and find_spec("matplotlib") is None:
+            raise ConfigError(
+                f"render_mode = {render_mode!r}: needs matplotlib; install innerattn[figures]"
+            )
         if seed is None:
             seed = int(np.random.default_rng().integers(2**63))
         self.scenario = scenario

@@ -45,12 +45,13 @@ def write_records(records: Sequence[Record], folder: Path) -> None:
     )
 
 
-def read_records(folder: Path) -> list[Record]:
+def read_records(folder: str | Path) -> list[Record]:
     """The records that `write_records` wrote, in their order.
 
     Raises:
         RunError: a file is missing, not Parquet, or not of this format and version.
     """
+    folder = Path(folder)
     episodes, heads = _read(folder / _EPISODES)
     rescues, _ = _read(folder / _RESCUES)
     try:
@@ -147,6 +148,8 @@ def _write(tables: list[pa.Table], records: Sequence[Record], path: Path) -> Non
 
 
 def _read(path: Path) -> tuple[pa.Table, list[dict[str, Any]]]:
+    if not path.exists():
+        raise RunError(f"{path}: no such file")
     try:
         table = pq.read_table(path)
         head = json.loads((table.schema.metadata or {})[FORMAT.encode()])

@@ -204,16 +204,26 @@ def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learne
     return config, learner
 
 
+def _is_copy(run: Path) -> bool:
+    """Whether a run was kept in small, with the digest of its weights instead of these."""
+    try:
+        return read_info(run).weights_sha256 is not None
+    except RunError:
+        return False
+
+
 def newest_weights(run: Path) -> Path:
     """The weights file that ``checkpoints/latest`` names; a name is a plain number.
 
     Raises:
-        RunError: there is none yet, or what is there was not made by training.
+        RunError: there is none (yet, or in a small copy of a run), or what is there was not made by
+            training.
     """
     checkpoints = run / "checkpoints"
     latest = checkpoints / "latest"
     if checkpoints.is_symlink() or not checkpoints.is_dir() or not os.path.lexists(latest):
-        raise RunError(f"{run}: holds no checkpoint yet")
+        without = "was kept without its weights" if _is_copy(run) else "holds no checkpoint yet"
+        raise RunError(f"{run}: {without}")
     try:
         name = plain_file(latest).read_text("ascii").strip()
     except ValueError:

@@ -91,9 +91,10 @@ class _Memory:
         if not self._seen:
             self._obs = torch.empty(self._capacity, *obs.shape[1:])
             self._actions = torch.empty(self._capacity, *actions.shape[1:], dtype=torch.uint8)
-        place = (self._seen + torch.arange(len(obs))) % self._capacity
-        self._obs[place] = obs.cpu()
-        self._actions[place] = actions.to(torch.uint8)
+        rows = torch.arange(len(obs))[-self._capacity :]  # of more than it holds, the last
+        place = (self._seen + rows) % self._capacity
+        self._obs[place] = obs.cpu()[rows]
+        self._actions[place] = actions.to(torch.uint8)[rows]
         self._seen += len(obs)
 
     def sample(self, count: int) -> tuple[Tensor, Tensor]:

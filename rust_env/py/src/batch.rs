@@ -7,7 +7,6 @@ use innerattn_env::robot::Commands;
 use innerattn_env::scenario::{Actions, Scenario};
 use innerattn_env::task::Rescue;
 use innerattn_env::world::World;
-use numpy::npyffi::flags::NPY_ARRAY_ALIGNED;
 use numpy::{
     IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2,
     PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
@@ -297,7 +296,7 @@ impl Batch {
         let (envs, robots) = (self.worlds.num_envs(), self.worlds.rules().team.len());
         if let Ok(actions) = actions.extract::<PyReadonlyArray2<i64>>()
             && actions.shape() == [envs, robots]
-            && aligned(&actions)
+            && actions.is_aligned()
         {
             return Ok(actions);
         }
@@ -373,12 +372,6 @@ fn contiguous<'a, T: Clone, D: numpy::ndarray::Dimension>(
         Some(values) => std::borrow::Cow::Borrowed(values),
         None => std::borrow::Cow::Owned(array.iter().cloned().collect()),
     }
-}
-
-/// Whether the array's numbers lie where numbers of their type must, so that Rust may look at them.
-fn aligned<T: numpy::Element, D: numpy::ndarray::Dimension>(array: &Bound<PyArray<T, D>>) -> bool {
-    // SAFETY: the pointer is that of a live array object; its flags are plain data.
-    unsafe { (*array.as_array_ptr()).flags & NPY_ARRAY_ALIGNED != 0 }
 }
 
 fn shaped<T: numpy::Element, const N: usize>(
