@@ -9,6 +9,8 @@ from innerattn.evaluate.sharing.evenness import counts_by_episode
 from innerattn.study.crossed.outcome import outcome_of
 from innerattn.study.run import Measured, StudyRun, digests, read_measured
 from innerattn.study.scores import read_scores
+from innerattn.study.table2 import table2
+from innerattn.study.table2_text import table2_markdown
 
 DOCS = Path(__file__).parents[1] / "docs"
 KEPT = sorted((DOCS / "records").glob("*/runs/*"))
@@ -60,3 +62,17 @@ def test_counts_of_the_paper_protocol(folder: Path) -> None:
         first, second = sum(counts_by_episode(part)[task.name].sum(0) for part in found.scored)
         cells = [found.run.method, task.name, str(found.run.seed), f"{first} + {second}"]
         assert cells in [line[:4] for line in page(folder)]
+
+
+def test_table_2_of_the_paper_protocol() -> None:
+    found = sorted(map(measured, of_page("paper_protocol")), key=lambda one: one.run.seed)
+    methods = ("td-inner", "td-uniform")
+    groups = [[one for one in found if one.run.method == method] for method in methods]
+    text = table2_markdown(table2(groups))
+    sharing = [
+        cells.strip("| ").split(" | ") for cells in text.split("### Competence")[0].splitlines()
+    ]
+    rows = [cells for cells in sharing if cells[0] in methods]
+    assert len(rows) == 2 * 2 * (1 + 1 + 3)  # over all and over 80 episodes, and every run
+    shown = page(of_page("paper_protocol")[0])
+    assert [cells for cells in rows if cells not in shown] == []
