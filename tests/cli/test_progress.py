@@ -137,3 +137,19 @@ def test_runs_one_after_the_other_leave_a_place_free_between_them() -> None:
         show(runs)
     (line,) = out.getvalue().splitlines()
     assert line == "training  33% | 1:30 left | 1 of 3 runs done, 0 running"
+
+
+def test_measuring_alone_is_a_small_part_of_a_run() -> None:
+    out = io.StringIO()
+    now = [0.0]
+    runs = [Run(RunConfig(), Path(f"run-s{seed}"), trained=seed < 2) for seed in range(3)]
+    with SeveralRuns(Console(file=out, width=120), clock=lambda: now[0]) as show:
+        for share in (0.5, 1.0):
+            runs[0].state, runs[0].share = "running", share
+            show(runs)
+            now[0] += 10.1
+        # 20.2 s for a twentieth: as long for the other, then 404 s for the run that is to be trained.
+        runs[0].state = "done"
+        show(runs)
+    (line,) = out.getvalue().splitlines()[-1:]
+    assert line == "training   5% | 7:04 left | 1 of 3 runs done, 0 running"

@@ -166,22 +166,23 @@ class SeveralRuns(Work):
         self._training = sum(run.state == "running" and run.share > 0.0 for run in runs)
         count = {state: sum(run.state == state for run in runs) for state in _STATES}
         self._at_once = max(self._at_once, count["running"])
-        done = sum(1.0 if run.state == "failed" else run.share for run in runs)
+        done = sum(run.size * (1.0 if run.state == "failed" else run.share) for run in runs)
         note = f"{count['done']} of {len(runs)} runs done, {count['running']} running"
         if count["failed"]:
             note += f", {count['failed']} failed"
-        self._put(now, done / len(runs), note, self._left(runs))
+        self._put(now, done / sum(run.size for run in runs), note, self._left(runs))
 
     def _left(self, runs: Sequence[Run]) -> float | None:
         """Time until the last run is done [s]; each waiting one takes the first free place."""
-        progress = sum(run.share for run in runs)
+        progress = sum(run.size * run.share for run in runs)
         if progress < _TELLING or not self._spent:
             return None
         a_run = self._spent / progress
-        places = [(1.0 - run.share) * a_run for run in runs if run.state == "running"]
+        running = [run for run in runs if run.state == "running"]
+        places = [(1.0 - run.share) * run.size * a_run for run in running]
         places += [0.0] * (self._at_once - len(places))  # free until the next run is started
         heapq.heapify(places)
         for run in runs:
             if run.state == "waiting":
-                heapq.heapreplace(places, places[0] + a_run)
+                heapq.heapreplace(places, places[0] + run.size * a_run)
         return max(places, default=0.0)

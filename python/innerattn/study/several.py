@@ -53,6 +53,11 @@ class Run:
     summary: Summary | None = None
     failure: str | None = None
 
+    @property
+    def size(self) -> float:
+        """How much there is to do, in whole runs."""
+        return 1.0 - _TRAINING if self.trained else 1.0
+
 
 def refuse_what_cannot_run(runs: Sequence[Run]) -> None:
     """Find out in time what every run would fail of.
@@ -191,10 +196,11 @@ def work(
         from innerattn.train import train
 
         report.show(0.0)  # ends here if all was stopped while torch was loaded
+        before = 0.0 if trained else _TRAINING
         if not trained:
-            train(config, folder, progress=lambda p: report(_TRAINING * trained_share(config, p)))
+            train(config, folder, progress=lambda p: report(before * trained_share(config, p)))
         evaluation = evaluate_run(
-            folder, progress=lambda done, total: report(_TRAINING + done / total * (1 - _TRAINING))
+            folder, progress=lambda done, total: report(before + done / total * (1.0 - before))
         )
         evaluation.write(folder / "evaluation")
         pipe.send(evaluation.summary)
