@@ -1,8 +1,9 @@
 """The documentation names everything that it should."""
 
+import re
 from pathlib import Path
 
-from innerattn.config import Scenario
+from innerattn.config import Scenario, load_run_config
 
 ROOT = Path(__file__).parents[1]
 
@@ -18,3 +19,28 @@ def test_the_scenario_reference_names_every_key() -> None:
 def _fields_of(part: str) -> list[str]:
     (model, *_) = Scenario.model_fields[part].annotation.__args__
     return list(model.model_fields)
+
+
+def test_the_examples_about_runs_work(run_dir: Path) -> None:
+    text = (ROOT / "docs" / "runs.md").read_text("utf-8")
+    examples = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    assert len(examples) == 2
+    for example in examples:
+        exec(compile(example, "docs/runs.md", "exec"), {"run": str(run_dir)})
+
+
+def test_what_is_said_of_a_runs_files_is_there(run_dir: Path) -> None:
+    text = (ROOT / "docs" / "runs.md").read_text("utf-8")
+    named = {name for line in text.splitlines() for name in re.findall(r"^\| `([^`]+)`", line)}
+    found = {str(path.relative_to(run_dir)) for path in run_dir.rglob("*") if path.is_file()}
+    known = {re.sub(r"/\d+/", "/N/", name) for name in found} - {"checkpoints/latest"}
+    assert named == known
+
+
+def test_the_configuration_in_the_scenario_reference_is_one(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "scenario.md").read_text("utf-8")
+    (example,) = re.findall(r"```toml\n(\[scenario\].*?)```", text, flags=re.DOTALL)
+    (tmp_path / "mine.toml").write_text(example)
+    config = load_run_config(config_file=tmp_path / "mine.toml")
+    assert (config.scenario.rescue_credit, config.td.gamma) == ("team", 0.9)
+    assert [task.name for task in config.scenario.tasks] == ["injured"]

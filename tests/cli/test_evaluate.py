@@ -66,6 +66,16 @@ def test_options_win_over_the_run(run_dir: Path, capsys: pytest.CaptureFixture[s
     assert found["long"]["episodes"] == 2
 
 
+def test_a_script_in_a_world_of_ones_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('situation = "single"\nepisode_steps = 7\nrescue_radius_m = 0.5\n')
+    found = document(capsys, "greedy", *FEW, "--scenario", str(path))
+    assert (found["situation"], found["episode_steps"]) == ("single", 7)
+    assert document(capsys, "greedy", *FEW)["situation"] == "mixed"
+
+
 def test_tables_and_file(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "out.json"
     assert main(["evaluate", str(run_dir), "--json", str(file)]) == 0

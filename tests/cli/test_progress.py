@@ -148,7 +148,7 @@ def test_measuring_alone_is_a_small_part_of_a_run() -> None:
             runs[0].state, runs[0].share = "running", share
             show(runs)
             now[0] += 10.1
-        # 20.2 s for a twentieth: as long for the other, then 404 s for the run that is to be trained.
+        # 20.2 s for a twentieth: as long for the other, then 404 s for the one to be trained.
         runs[0].state = "done"
         show(runs)
     (line,) = out.getvalue().splitlines()[-1:]

@@ -134,6 +134,18 @@ def test_what_is_wrong_in_a_file_names_the_file(tmp_path: Path) -> None:
     assert str(error.value) == "td.gama: unknown key"
 
 
+def test_a_scenarios_file_is_not_a_runs_and_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('situation = "double"')
+    with pytest.raises(ConfigError) as error:
+        load_run_config(config_file=path)
+    told = "situation: unknown key; a scenario's stand in [scenario]"
+    assert str(error.value) == f"{path}: {told}"
+    write_toml(load_run_config(), path)
+    with pytest.raises(ConfigError, match=r"configures a run; a scenario's file has the keys of"):
+        Scenario.from_toml(path)
+
+
 def test_tables_in_a_file_replace_lists(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("[[scenario.tasks]]\nname = 'only'\nneeds = ['food', 'food']\n")

@@ -27,6 +27,8 @@ class Evaluate(Command):
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
     """A run's folder, or one of random, greedy, hungarian."""
+    scenario: Path | None = None
+    """TOML file with the scenario to measure in; None: that of the run, or mixed."""
     situation: Literal["single", "double", "mixed"] | None = None
     """Situation to measure in; None: that of the run, or mixed."""
     episode_steps: int | None = None
@@ -92,7 +94,8 @@ class Evaluate(Command):
             )
 
     def _worlds(self, scenario: Scenario) -> Scenario:
-        return scenario.replace(**self._given("situation", "episode_steps"))
+        worlds = scenario if self.scenario is None else Scenario.from_toml(self.scenario)
+        return worlds.replace(**self._given("situation", "episode_steps"))
 
     def _settings(self, settings: EvaluateConfig) -> EvaluateConfig:
         names = ("episodes", "score_episodes", "long_episodes", "seed")

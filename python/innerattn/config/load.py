@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from innerattn.config.files import preset_table, toml_table, write_whole
 from innerattn.config.model import config_error
 from innerattn.config.run import RunConfig, on_policy
+from innerattn.config.scenario import Scenario
 from innerattn.errors import ConfigError
 
 _CHOOSING = ("method", "warm_start")
@@ -44,7 +45,12 @@ def load_run_config(
     """
     given: dict[str, Any] = {"train": {"method": method}}
     if config_file is not None:
-        _merge(given, toml_table(config_file))
+        from_file = toml_table(config_file)
+        for key in [key for key in from_file if key in Scenario.model_fields]:
+            raise ConfigError(
+                f"{config_file}: {key}: unknown key; a scenario's stand in [scenario]"
+            )
+        _merge(given, from_file)
     train = given["train"] if isinstance(given["train"], dict) else {}
     single = overrides or {}
     chosen = {name: single.get(f"train.{name}", train.get(name)) for name in _CHOOSING}

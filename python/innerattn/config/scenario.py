@@ -14,6 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 from innerattn import _core
 from innerattn.config.files import preset_names, preset_table, toml_table
 from innerattn.config.model import Model, config_error
+from innerattn.errors import ConfigError
 
 SCENARIOS = preset_names("scenarios")
 """Names of the built-in scenarios."""
@@ -186,6 +187,10 @@ class Scenario(Model):
             ConfigError: the file cannot be read, is not TOML, or describes no valid scenario.
         """
         table = toml_table(path)
+        if isinstance(table.get("scenario"), dict):
+            raise ConfigError(
+                f"{path}: configures a run; a scenario's file has the keys of [scenario]"
+            )
         try:
             return cls.model_validate(table)
         except ValidationError as error:
