@@ -161,8 +161,8 @@ impl Batch {
     }
 
     /// Starts new episodes in the worlds of `mask` (all if absent), under `seed` from episode 0 if
-    /// given, else in the episode after the present one (a reset before the first step keeps
-    /// episode 0), and writes everyone's observations into `obs` (E × R × D).
+    /// given, else in the episode after the present one (the first reset keeps episode 0, if no step
+    /// was done before), and writes everyone's observations into `obs` (E × R × D).
     pub fn reset(&mut self, seed: Option<u64>, mask: Option<&[bool]>, obs: &mut [f32]) {
         let rules = &self.rules;
         let envs = self.shards.iter_mut().flat_map(|shard| &mut shard.worlds).enumerate();

@@ -120,12 +120,15 @@ def test_out_of_range_is_refused(section: str, key: str, value: object) -> None:
         ("scenario.observe_faults", 1, "must be true or false"),
         ("train.threads", "2", "must be a valid number"),
         ("td.gamma", False, "must be a valid number"),
+        ("scenario.obstacles", [{"shape": "disc", "radius_m": "1"}], "must be a valid number"),
+        ("scenario.obstacles", [{"shape": "box", "half_extents_m": [1, "1"]}], "must be valid"),
     ],
 )
 def test_values_of_another_type_are_refused(key: str, value: object, rule: str) -> None:
     with pytest.raises(ConfigError) as error:
         load_run_config(overrides={key: value})
-    assert str(error.value) == f"{key} = {value!r}: {rule}"
+    assert str(error.value).startswith(key)
+    assert f": {rule}" in str(error.value)
 
 
 @pytest.mark.parametrize("method", ["td-inner", "ppo-inner"])

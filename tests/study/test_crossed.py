@@ -231,9 +231,16 @@ def test_a_few_seeds_do_not_say_that_no_robot_is_ever_idle() -> None:
 
 @pytest.mark.parametrize(
     ("with_", "without", "holds"),
-    [(0.02, 0.10, "yes"), (0.08, 0.10, "yes"), (0.10, 0.10, "no"), (0.14, 0.10, "no")],
+    [
+        (0.02, 0.10, "yes"),
+        (0.05, 0.10, "undecided"),
+        (0.08, 0.10, "no"),  # more even, and not even
+        (0.14, 0.10, "no"),
+        (0.01, 0.01, "undecided"),  # nothing was there to be made even
+        (0.00, 0.045, "undecided"),
+    ],
 )
-def test_attention_makes_even_what_it_takes_unevenness_from(
+def test_attention_makes_even_what_it_takes_most_unevenness_from(
     with_: float, without: float, holds: str
 ) -> None:
     outcomes = {

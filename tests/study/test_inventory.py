@@ -57,6 +57,10 @@ def test_a_run_without_its_whole_evaluation_is_unmeasured(
     file = planned[0].folder / "evaluation" / name
     file.write_bytes(file.read_bytes()[:-20])
     assert find(planned, study).state == "unmeasured"
+    if file.suffix == ".parquet":
+        whole = file.read_bytes()
+        file.write_bytes(whole[:-40] + bytes(32) + whole[-8:])  # its end, spoilt
+        assert find(planned, study).state == "unmeasured"
     file.unlink()
     assert find(planned, study).state == "unmeasured"
     note_failure(study, planned[0], "its disk was full")

@@ -95,6 +95,26 @@ def test_a_figure_that_is_not_drawn_leaves_none_of_other_runs(
     assert {path.name for path in (tmp_path / "study").iterdir()} == FILES - gone
 
 
+def test_it_is_said_where_all_seeds_were_measured_in_the_same_worlds(
+    runs: list[StudyRun], folder: Path, tmp_path: Path
+) -> None:
+    said = "**Runs of different seeds were measured in the same worlds.**"
+    assert said in (folder / "report.md").read_text()
+    moved = []
+    for run in runs[:2]:  # of different seeds
+        own = tmp_path / run.folder.name
+        shutil.copytree(run.folder, own)
+        text = (own / "config.toml").read_text()
+        assert text.count("seed = 12345") == 1
+        (own / "config.toml").write_text(text.replace("seed = 12345", f"seed = {run.seed}"))
+        moved.append(replace(run, folder=own))
+    write_report(moved, tmp_path / "report", "short", ("table2",))
+    assert said not in (tmp_path / "report" / "report.md").read_text()
+    (other,) = [run for run in runs if (run.method, run.seed) == ("td-uniform", moved[1].seed)]
+    with pytest.raises(RunError, match=r"of one seed, and evaluate\.seed is .*: must be the same"):
+        read_configs([moved[1], other])
+
+
 def test_both_attentions_are_compared_where_both_are_there(folder: Path) -> None:
     text = (folder / "report.md").read_text()
     compared = text.split("## Learnt attention beside uniform weights")[1].split("## Fig. 4")[0]

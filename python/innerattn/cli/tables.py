@@ -22,7 +22,7 @@ _KEY = """\
 """
 _KEY_OF_SEEDS = """\
   score: 0 plays like random, 1 like hungarian
-  mean: ± is half the 95 % interval over seeds (Student's t)
+  mean: ± is half the 95 % interval over seeds (Student's t), in the same worlds
 """
 
 

@@ -5,8 +5,8 @@ It knows no field of any model.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import ClassVar, Self, get_args
+from collections.abc import Iterable, Iterator
+from typing import Any, ClassVar, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
@@ -26,12 +26,14 @@ class Model(BaseModel):
     @classmethod
     def _of_its_own_type(cls, value: object, info: ValidationInfo) -> object:
         """Refuse what pydantic would take for a number or a truth: true for 1, "25" for 25."""
-        annotation = cls.model_fields[str(info.field_name)].annotation
-        kinds = {annotation, *get_args(annotation)}
+        kinds = set(_types(cls.model_fields[str(info.field_name)].annotation))
         if bool in kinds and not isinstance(value, bool):
             raise PydanticCustomError("type", "Input should be true or false")
-        if kinds & {int, float} and str not in kinds and isinstance(value, (bool, str)):
-            raise PydanticCustomError("type", "Input should be a valid number")
+        parts = value if isinstance(value, (list, tuple)) else [value]
+        others = any(isinstance(part, (bool, str)) for part in parts)
+        if kinds & {int, float} and str not in kinds and others:
+            what = "valid numbers" if parts is value else "a valid number"
+            raise PydanticCustomError("type", f"Input should be {what}")
         return value
 
     def replace(self, **fields: object) -> Self:
@@ -44,6 +46,13 @@ class Model(BaseModel):
             return self.model_validate(self.model_dump() | fields)
         except ValidationError as error:
             raise config_error(error, self.place) from error
+
+
+def _types(annotation: Any) -> Iterator[Any]:
+    """The types that an annotation is made of."""
+    yield annotation
+    for part in get_args(annotation):
+        yield from _types(part)
 
 
 def config_error(error: ValidationError, root: str = "", source: str = "") -> ConfigError:

@@ -118,7 +118,7 @@ class BatchEnv:
 
         Args:
             seed: restart from episode 0 under this seed; None goes on to each world's next episode
-                (a reset before the first step keeps episode 0).
+                (the first reset keeps episode 0, if no step was done before).
             mask: (E,) bool, the worlds to reset; all if None.
 
         Returns:

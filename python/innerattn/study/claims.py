@@ -44,7 +44,8 @@ A claim is undecided for a method with less than two runs. Intervals are Student
 - **More even with than without**: by the share's distance from 0.5, averaged over tasks, without
   minus with. Runs of one seed begin alike and are measured in the same worlds, so each seed gives
   one difference; {LEAST_PAIRS} at least. Yes where the interval lies above 0; no where it lies
-  below 0, or where two one-sided tests show the difference to be within ±{0.5 - MARGIN[0]:.1f}.
+  below 0, or where two one-sided tests show the difference to be within ±{0.5 - MARGIN[0]:.1f};
+  smaller differences are not ruled out by that.
 - **Entropy ends below that of even attention**: by the mean over robots, heads and the last tenth
   of training, as a share of ln(N − 1). Yes where its interval lies below {EVEN_ENTROPY:g}, no where
   it lies above.
@@ -56,7 +57,7 @@ A claim is undecided for a method with less than two runs. Intervals are Student
   more; no where its interval lies below {LEAST_MOVE}.
 - **…and does so for the robot that hands over**: by that change minus the change of the food robot
   that takes no part. Yes where its interval lies above 0 and its mean is at least half the change;
-  no where the interval of what it lacks of half the change lies below 0, so that most of the change
+  no where the interval of that part minus half the change lies below 0, so that most of the change
   is shared by the robot that takes no part; only asked where attention moves.
 """
 """How `Claim.holds` is found, in Markdown."""

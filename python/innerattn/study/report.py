@@ -84,6 +84,7 @@ def write_report(
         runs=tuple(ordered),
         digests=tuple(named),
         env_steps=tuple(config.train.env_steps for config in configs),
+        worlds=tuple(config.evaluate.seed for config in configs),
         table=table2(measured) if "table2" in parts else None,
         courses=tuple(fig4(ordered)) if "fig4" in parts else None,
         scene=_scene(measured) if "fig5" in parts else None,

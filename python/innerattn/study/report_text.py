@@ -30,6 +30,7 @@ class Findings:
         runs: all runs, by situation and method, then seed.
         digests: of each run.
         env_steps: how long each run was trained.
+        worlds: seed of the worlds that each run was measured in.
         table: Table II.
         courses: Fig. 4.
         scene: the hand-over that is shown as Fig. 5; None, too, where there is none to show.
@@ -42,6 +43,7 @@ class Findings:
     runs: tuple[StudyRun, ...]
     digests: tuple[Digests, ...]
     env_steps: tuple[int, ...]
+    worlds: tuple[int, ...]
     table: Table2 | None
     courses: tuple[EntropyCourse, ...] | None
     scene: HandoverScene | None
@@ -88,6 +90,16 @@ def _opening(findings: Findings) -> str:
         "at the end with their folders and digests. The paper does not say which situation its "
         f"Table II, Fig. 4 and Fig. 5 are about; {PRINTED_SITUATION} is assumed, since its text "
         "speaks of a variety of tasks.\n"
+        f"{_of_worlds(findings, len(seeds))}"
+    )
+
+
+def _of_worlds(findings: Findings, seeds: int) -> str:
+    if len(set(findings.worlds)) >= seeds:
+        return ""
+    return (
+        "\n**Runs of different seeds were measured in the same worlds.** Chance of these worlds "
+        "moves all runs alike, and intervals over runs do not see it: they are too short.\n"
     )
 
 

@@ -91,12 +91,14 @@ def read_configs(runs: Sequence[StudyRun]) -> list[RunConfig]:
     """The runs' configurations, in their order.
 
     Raises:
-        RunError: a run's label is not what its configuration says, or runs of one situation and
-            method were trained or measured differently, other than by their seed.
+        RunError: a run's label is not what its configuration says; runs of one situation and
+            method were trained or measured differently, other than by their seed; or runs of one
+            situation and seed were measured in different worlds, so that they are no pairs.
         ConfigError: a configuration cannot be read.
     """
     configs = [read_toml(run.folder / "config.toml") for run in runs]
     seen: dict[tuple[str, str], tuple[Path, dict[str, Any]]] = {}
+    measured: dict[tuple[str, int], tuple[Path, int]] = {}
     for run, config in zip(runs, configs, strict=True):
         for name, label in (("method", run.method), ("seed", run.seed)):
             if getattr(config.train, name) != label:
@@ -107,7 +109,13 @@ def read_configs(runs: Sequence[StudyRun]) -> list[RunConfig]:
         what = config.in_use()
         for free in ("seed", "threads", "device", "compile", "log_every_env_steps"):
             what["train"].pop(free)
-        what["evaluate"].pop("seed")
+        worlds = what["evaluate"].pop("seed")
+        first = measured.setdefault((run.situation, run.seed), (run.folder, worlds))
+        if worlds != first[1]:
+            raise RunError(
+                f"{run.folder} and {first[0]}: are of one seed, and evaluate.seed is {worlds} and "
+                f"{first[1]}: must be the same worlds"
+            )
         other, known = seen.setdefault((run.situation, run.method), (run.folder, what))
         if differing := [name for name in what if what[name] != known.get(name)]:
             raise RunError(

@@ -49,9 +49,9 @@ def read_scores(folder: Path, config: RunConfig) -> tuple[Scores, Scores]:
     for file in (path, *records):
         if not os.path.lexists(file):
             raise NotMeasuredError(f"{file}: missing")
+    for file in records:
+        _refuse_damaged(plain_file(file))
     try:
-        for file in records:
-            pq.read_metadata(plain_file(file))
         found = json.loads(plain_file(path).read_text("utf-8"))
         _refuse_other_schema(path, found["schema_version"])
         parts = (found, found["long"])
@@ -67,6 +67,14 @@ def read_scores(folder: Path, config: RunConfig) -> tuple[Scores, Scores]:
     except (ValueError, KeyError, TypeError, pa.ArrowException) as error:
         raise NotMeasuredError(f"{path}: not a whole evaluation") from error
     return measured[0], measured[1]
+
+
+def _refuse_damaged(file: Path) -> None:
+    file.open("rb").close()  # what cannot be read is an OSError, as is what arrow cannot decode
+    try:
+        pq.read_metadata(file)
+    except (OSError, pa.ArrowException) as error:
+        raise NotMeasuredError(f"{file}: not a whole Parquet file") from error
 
 
 def _refuse_other_schema(path: Path, version: object) -> None:

@@ -48,7 +48,10 @@ def table2_markdown(table: Table2) -> str:
         parts.append("Every run:\n")
         parts.append(_runs_table(rows))
         parts.append(f"### Competence, {situation}\n")
-        parts.append("Last stand scripted policies, played in the same worlds.\n")
+        parts.append(
+            "Choices and times of runs are those of the episodes recorded step by step. Last stand "
+            "scripted policies in the same worlds, with choices and times of all episodes.\n"
+        )
         parts.append(_competence_table([c for c in table.competence if c.situation == situation]))
     return "\n".join(parts)
 

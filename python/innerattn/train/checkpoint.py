@@ -207,7 +207,8 @@ def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learne
 def _is_copy(run: Path) -> bool:
     """Whether a run was kept in small, with the digest of its weights instead of these."""
     try:
-        return read_info(run).weights_sha256 is not None
+        known = read_info(run).weights_sha256 is not None
+        return known and not os.path.lexists(run / "checkpoints")
     except RunError:
         return False
 

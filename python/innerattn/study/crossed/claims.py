@@ -18,7 +18,8 @@ from innerattn.study.table2_text import NONE, shown
 LEAST_WITHOUT_IDLE = 10
 """So many seeds without an idle robot say that there is none; fewer say nothing."""
 
-_WITH_TEAM = "inner - uniform with the team's credit"
+LEAST_UNEVEN = MARGINS["unevenness"] / 2.0
+"""Less unevenness than this is too little to ask what takes it away."""
 
 RULES = f"""\
 The seed is the unit: runs of one seed begin with the same weights in the same worlds and are
@@ -31,10 +32,10 @@ margin ({MARGINS["unevenness"]:g} of unevenness, {MARGINS["score"]:g} of the sco
 beside each p-value of an effect stands Holm's, adjusted for all main effects of the situation on
 all figures, or for all its other effects.
 
-- **Attention makes sharing even under the team's credit**, over penalties; where sharing is even
-  without attention, as it was expected to be with the helpers' credit, nothing could be seen. Yes
-  where the interval of inner minus uniform lies below 0; no where it lies above, or where that of
-  inner minus half of uniform does, so that attention takes away less than half of the unevenness.
+- **Attention makes sharing even under the team's credit**, over penalties: by inner minus half of
+  uniform. Yes where its interval lies below 0, so that attention takes away more than half of the
+  unevenness; no where it lies above. Only asked where there is something to take away: where
+  uniform's interval lies above {LEAST_UNEVEN:g}.
 - **Attention rescues more**: yes where the interval of inner minus uniform, over credits and
   penalties, lies above 0; no where it lies below, or where the two are alike.
 - **The team's credit makes sharing uneven**: yes where the interval of team minus helpers, over
@@ -83,7 +84,7 @@ def answers(situation: str, outcomes: Outcomes, effects: Sequence[Effect]) -> li
         for claim, figure, name, sign in asked
     ]
     return [
-        _makes_even(situation, outcomes, main["unevenness", _WITH_TEAM]),
+        _makes_even(situation, outcomes),
         *found,
         _idle_with_team(situation, outcomes),
         _even_with_helpers(situation, outcomes),
@@ -131,19 +132,19 @@ def _of_effect(effect: Effect, sign: float) -> tuple[str, Holds]:
     return measured, "no" if high < 0.0 or found.equivalent else "undecided"
 
 
-def _makes_even(situation: str, outcomes: Outcomes, effect: Effect) -> Answer:
+def _makes_even(situation: str, outcomes: Outcomes) -> Answer:
     groups = _by_attention("team")
     rows = by_seed(outcomes, [arm for arms in groups.values() for arm in arms], "unevenness")
     inner, uniform = rows[:, : len(groups["inner"])].mean(axis=1), rows[:, -1]
-    left = over_runs((inner - uniform / 2.0).tolist())
-    measured, holds = _of_effect(effect, -1.0)
-    if effect.found is not None:
-        measured += f"; uniform {shown(over_runs(uniform.tolist()))}"
-        if holds != "yes":
-            above = effect.found.difference.low > 0.0
-            holds = "no" if above or _ends(left)[0] > 0.0 else "undecided"
+    means = [over_runs(values.tolist()) for values in (inner, uniform, inner - uniform / 2.0)]
+    with_, without, left = (shown(mean) for mean in means)
+    holds: Holds = "undecided"
+    if _ends(means[1])[0] > LEAST_UNEVEN:
+        low, high = _ends(means[2])
+        holds = "yes" if high < 0.0 else "no" if low > 0.0 else "undecided"
     claim = "attention makes sharing even under the team's credit"
-    return Answer(claim, situation, measured, holds)
+    measured = f"inner: {with_}; uniform: {without}; inner - uniform / 2: {left}"
+    return Answer(claim, situation, measured if len(rows) else NONE, holds)
 
 
 def _by_attention(credit: Credit) -> dict[str, list[Arm]]:

@@ -31,7 +31,7 @@ class Effect:
         situation: of the worlds.
         figure: one of `MARGINS`.
         name: what is compared with what.
-        main: it is an average over the other factors, or an interaction; else within one level.
+        main: it is an average over penalties, or more, or an interaction; else of single arms.
         seeds: how many have the figure in each of the compared arms.
         found: None where these are less than `LEAST_SEEDS`, or do not differ.
         holm_p: its p-value, adjusted for all that is asked at once in its situation: the main
