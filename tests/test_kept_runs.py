@@ -1,9 +1,12 @@
 """The runs kept in the documentation are those that its pages show, and show what they say."""
 
+import re
+import shutil
 from pathlib import Path
 
 import pytest
 
+from innerattn.cli.main import main
 from innerattn.config import read_toml
 from innerattn.evaluate.sharing.evenness import counts_by_episode
 from innerattn.study.crossed.outcome import outcome_of
@@ -76,3 +79,17 @@ def test_table_2_of_the_paper_protocol() -> None:
     assert len(rows) == 2 * 2 * (1 + 1 + 3)  # over all and over 80 episodes, and every run
     shown = page(of_page("paper_protocol")[0])
     assert [cells for cells in rows if cells not in shown] == []
+
+
+def test_the_crossed_page_is_what_its_command_makes_of_the_records(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(DOCS / "records" / "crossed", tmp_path / "study")
+    text = (DOCS / "crossed.md").read_text("utf-8")
+    (options,) = re.findall(r"^innerattn (reproduce crossed .*)$", text, flags=re.MULTILINE)
+    main([*options.split(), "--out", str(tmp_path / "study")])
+    assert capsys.readouterr().err == ""
+    made = (tmp_path / "study" / "crossed.md").read_text("utf-8")
+    made = made.replace("(crossed.png)", "(images/reproduction-crossed.png)")
+    shown = text.split("<!-- report: begin -->")[1].split("<!-- report: end -->")[0]
+    assert shown.strip() == re.sub("^#", "##", made, flags=re.MULTILINE).strip()
