@@ -7,6 +7,7 @@
 pub mod error;
 
 pub mod check;
+pub mod matching;
 
 pub mod fault;
 pub mod scenario;

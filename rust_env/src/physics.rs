@@ -5,7 +5,7 @@
 mod discs;
 mod rapier;
 
-use crate::geometry::{Solid, Vec2};
+use crate::geometry::{Solid, Touch, Vec2};
 use crate::robot::Body;
 use crate::scenario::{Engine as Choice, Scenario};
 
@@ -61,6 +61,43 @@ impl Physics {
     #[must_use]
     pub fn envs_worth_a_thread(&self) -> usize {
         self.0.envs_worth_a_thread()
+    }
+}
+
+/// The robots, walls and obstacles that can touch each other.
+struct Shapes {
+    /// Of the robots, m.
+    radii: Vec<f32>,
+    solids: Vec<Solid>,
+    /// Half the side of the arena, m.
+    arena: f32,
+}
+
+impl Shapes {
+    fn new(scenario: &Scenario, team: &[Body], solids: &[Solid]) -> Self {
+        Self {
+            radii: team.iter().map(|body| body.radius).collect(),
+            solids: solids.to_vec(),
+            arena: scenario.arena_half_width_m as f32,
+        }
+    }
+
+    /// Time until anything would touch if all moved straight on, s; infinite if nothing ever would.
+    fn first_touch(&self, touch: Touch, positions: &[Vec2], velocities: &[Vec2], obstacles: &[Vec2]) -> f32 {
+        let mut first = f32::INFINITY;
+        for (index, (at, velocity)) in positions.iter().zip(velocities).enumerate() {
+            let radius = self.radii[index];
+            first = first.min(touch.walls(at.x, velocity.x, self.arena - radius));
+            first = first.min(touch.walls(at.y, velocity.y, self.arena - radius));
+            for other in 0..index {
+                let reach = radius + self.radii[other];
+                first = first.min(touch.discs(positions[other] - at, velocities[other] - velocity, reach));
+            }
+            for (solid, centre) in self.solids.iter().zip(obstacles) {
+                first = first.min(touch.solid(solid, at - centre, *velocity, radius));
+            }
+        }
+        first
     }
 }
 

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Vec2;
+use crate::matching::{bits, fillable};
 use crate::robot::Body;
 use crate::scenario::{MAX_NEEDS, Scenario};
 
@@ -108,34 +109,10 @@ impl Needs {
     }
 }
 
-/// Whether distinct robots can be taken from the masks, one from each (Kuhn's augmenting paths).
-fn fillable(candidates: &[u64]) -> bool {
-    fn fill(need: usize, candidates: &[u64], tried: &mut u64, by: &mut [u8; 64]) -> bool {
-        for robot in bits(candidates[need]) {
-            if *tried >> robot & 1 == 1 {
-                continue;
-            }
-            *tried |= 1 << robot;
-            if by[robot] == u8::MAX || fill(usize::from(by[robot]), candidates, tried, by) {
-                by[robot] = need as u8;
-                return true;
-            }
-        }
-        false
-    }
-    let mut by = [u8::MAX; 64];
-    (0..candidates.len()).all(|need| fill(need, candidates, &mut 0, &mut by))
-}
-
 /// The robot of `mask` nearest to the victim, ties by index.
 fn nearest(mask: u64, victim: Vec2, positions: &[Vec2]) -> usize {
     let distance = |robot: usize| (positions[robot] - victim).norm_squared();
     bits(mask).min_by(|a, b| distance(*a).total_cmp(&distance(*b))).unwrap_or_default()
-}
-
-/// The robots of a mask, lowest index first.
-fn bits(mask: u64) -> impl Iterator<Item = usize> {
-    (0..64).filter(move |robot| mask >> robot & 1 == 1)
 }
 
 /// Distance of the able robot with `rank` nearer ones, m; 0 if there is none.

@@ -5,7 +5,7 @@
 //! once, by the least impulses that do it: the inelastic law of Moreau, solved by Gauss-Seidel sweeps.
 //! What rapier tends to as its substeps grow short is computed here without any.
 
-use super::{Engine, Workspace, fly};
+use super::{Engine, Shapes, Workspace, fly};
 use crate::geometry::{Solid, Touch, Vec2};
 use crate::robot::Body;
 use crate::scenario::Scenario;
@@ -36,11 +36,9 @@ struct Contact {
 pub(super) struct Scratch(Vec<Contact>);
 
 pub(super) struct Discs {
-    radii: Vec<f32>,
+    shapes: Shapes,
     /// 1 / mass, 1/kg.
     lightness: Vec<f32>,
-    solids: Vec<Solid>,
-    arena: f32,
     dt: f32,
     touch: Touch,
     /// Instants of contact in a period after which whoever still meets something waits for the next.
@@ -49,46 +47,24 @@ pub(super) struct Discs {
 
 impl Discs {
     pub(super) fn new(scenario: &Scenario, team: &[Body], solids: &[Solid]) -> Self {
-        let arena = scenario.arena_half_width_m as f32;
         Self {
-            radii: team.iter().map(|body| body.radius).collect(),
+            shapes: Shapes::new(scenario, team, solids),
             lightness: team.iter().map(|body| 1.0 / body.mass).collect(),
-            solids: solids.to_vec(),
-            arena,
             dt: scenario.dt_s as f32,
             touch: Touch { slop: 0.0, parting: -STILL_MPS },
             most_instants: 8 + 4 * team.len(),
         }
     }
 
-    /// Time until anything would touch if all moved straight on, s; infinite if nothing ever would.
-    fn first_touch(&self, positions: &[Vec2], velocities: &[Vec2], obstacles: &[Vec2]) -> f32 {
-        let mut first = f32::INFINITY;
-        for (index, (at, velocity)) in positions.iter().zip(velocities).enumerate() {
-            let radius = self.radii[index];
-            first = first.min(self.touch.walls(at.x, velocity.x, self.arena - radius));
-            first = first.min(self.touch.walls(at.y, velocity.y, self.arena - radius));
-            for other in 0..index {
-                let reach = radius + self.radii[other];
-                first =
-                    first.min(self.touch.discs(positions[other] - at, velocities[other] - velocity, reach));
-            }
-            for (solid, centre) in self.solids.iter().zip(obstacles) {
-                first = first.min(self.touch.solid(solid, at - centre, *velocity, radius));
-            }
-        }
-        first
-    }
-
     /// All that touch now, whether they approach or not: what is pushed may be pushed into a third.
     fn find(&self, positions: &[Vec2], obstacles: &[Vec2], contacts: &mut Vec<Contact>) {
-        let near = TOUCHING * self.arena.max(1.0);
+        let near = TOUCHING * self.shapes.arena.max(1.0);
         contacts.clear();
         let mut add = |robot, other, normal| contacts.push(Contact { robot, other, normal, impulse: 0.0 });
         for (index, at) in positions.iter().enumerate() {
-            let radius = self.radii[index];
+            let radius = self.shapes.radii[index];
             for axis in 0..2 {
-                if at[axis].abs() + radius >= self.arena - near {
+                if at[axis].abs() + radius >= self.shapes.arena - near {
                     let mut normal = Vec2::zeros();
                     normal[axis] = at[axis].signum();
                     add(index, None, normal);
@@ -96,12 +72,12 @@ impl Discs {
             }
             for (other, place) in positions[..index].iter().enumerate() {
                 let apart = place - at;
-                let reach = radius + self.radii[other] + near;
+                let reach = radius + self.shapes.radii[other] + near;
                 if apart.norm_squared() <= reach * reach {
                     add(index, Some(other), apart.try_normalize(0.0).unwrap_or_else(Vec2::x));
                 }
             }
-            for (solid, centre) in self.solids.iter().zip(obstacles) {
+            for (solid, centre) in self.shapes.solids.iter().zip(obstacles) {
                 let (depth, outward) = solid.nearest(at - centre);
                 if depth <= radius + near {
                     add(index, None, -outward);
@@ -144,7 +120,7 @@ impl Discs {
             for index in 0..positions.len() {
                 for other in 0..index {
                     let apart = positions[other] - positions[index];
-                    let reach = self.radii[index] + self.radii[other];
+                    let reach = self.shapes.radii[index] + self.shapes.radii[other];
                     if apart.norm_squared() >= reach * reach {
                         continue;
                     }
@@ -157,15 +133,15 @@ impl Discs {
                     positions[other] += normal * (share * others);
                 }
             }
-            for (at, radius) in positions.iter_mut().zip(&self.radii) {
-                for (solid, centre) in self.solids.iter().zip(obstacles) {
+            for (at, radius) in positions.iter_mut().zip(&self.shapes.radii) {
+                for (solid, centre) in self.shapes.solids.iter().zip(obstacles) {
                     let (distance, outward) = solid.nearest(*at - centre);
                     if distance < *radius {
                         overlapped = true;
                         *at += outward * (radius - distance);
                     }
                 }
-                let limit = self.arena - radius;
+                let limit = self.shapes.arena - radius;
                 *at = at.map(|place| place.clamp(-limit, limit));
             }
             if !overlapped {
@@ -187,7 +163,7 @@ impl Engine for Discs {
         let mut left = self.dt;
         let mut touched = 0;
         for instant in 0.. {
-            let first = self.first_touch(positions, velocities, obstacles);
+            let first = self.shapes.first_touch(self.touch, positions, velocities, obstacles);
             if first >= left {
                 break;
             }

@@ -10,7 +10,7 @@ use rapier2d::prelude::{
     RigidBodyHandle, RigidBodySet, SoftBodySet, Vector,
 };
 
-use super::{Engine, Workspace, fly};
+use super::{Engine, Shapes, Workspace, fly};
 use crate::geometry::{Solid, Touch, Vec2};
 use crate::robot::Body;
 use crate::scenario::Scenario;
@@ -68,9 +68,7 @@ pub(super) struct Rapier {
     robots: Vec<RigidBodyHandle>,
     obstacles: Vec<ColliderHandle>,
     parameters: IntegrationParameters,
-    radii: Vec<f32>,
-    solids: Vec<Solid>,
-    arena: f32,
+    shapes: Shapes,
     dt: f32,
     substeps: u32,
 }
@@ -115,9 +113,7 @@ impl Rapier {
             robots,
             obstacles,
             parameters,
-            radii: team.iter().map(|body| body.radius).collect(),
-            solids: solids.to_vec(),
-            arena,
+            shapes: Shapes::new(scenario, team, solids),
             dt: scenario.dt_s as f32,
             substeps: scenario.substeps,
         }
@@ -126,7 +122,7 @@ impl Rapier {
     /// Puts whoever was squeezed too deep into a wall back to its edge: walls give way to no weight.
     fn keep_inside(&self, positions: &mut [Vec2], velocities: &mut [Vec2]) {
         for (index, (at, velocity)) in positions.iter_mut().zip(velocities).enumerate() {
-            let limit = self.arena - (1.0 - MOST_IN_WALL) * self.radii[index];
+            let limit = self.shapes.arena - (1.0 - MOST_IN_WALL) * self.shapes.radii[index];
             for axis in 0..2 {
                 if at[axis].abs() > limit {
                     at[axis] = at[axis].clamp(-limit, limit);
@@ -134,24 +130,6 @@ impl Rapier {
                 }
             }
         }
-    }
-
-    /// Time until anything would touch if all moved straight on, s; infinite if nothing ever would.
-    fn first_touch(&self, positions: &[Vec2], velocities: &[Vec2], obstacles: &[Vec2]) -> f32 {
-        let mut first = f32::INFINITY;
-        for (index, (at, velocity)) in positions.iter().zip(velocities).enumerate() {
-            let radius = self.radii[index];
-            first = first.min(TOUCH.walls(at.x, velocity.x, self.arena - radius));
-            first = first.min(TOUCH.walls(at.y, velocity.y, self.arena - radius));
-            for other in 0..index {
-                let reach = radius + self.radii[other];
-                first = first.min(TOUCH.discs(positions[other] - at, velocities[other] - velocity, reach));
-            }
-            for (solid, centre) in self.solids.iter().zip(obstacles) {
-                first = first.min(TOUCH.solid(solid, at - centre, *velocity, radius));
-            }
-        }
-        first
     }
 
     /// A fresh copy of the prepared world with the obstacles in their places.
@@ -209,7 +187,7 @@ impl Engine for Rapier {
         while done < self.substeps {
             let left = self.substeps - done;
             let horizon = if done == 0 { self.dt } else { left as f32 * substep };
-            let first = self.first_touch(positions, velocities, obstacles);
+            let first = self.shapes.first_touch(TOUCH, positions, velocities, obstacles);
             if first >= horizon {
                 fly(positions, velocities, horizon);
                 break;

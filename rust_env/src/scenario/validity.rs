@@ -7,6 +7,7 @@ use super::{
 use crate::check::{broken, counts, named, within};
 use crate::error::Result;
 use crate::fault::Fault;
+use crate::matching::fillable;
 
 impl Scenario {
     /// Checks every value and every rule between values.
@@ -88,30 +89,13 @@ impl Scenario {
         Ok(())
     }
 
-    /// Whether distinct robots can fill all needs at once: a matching, found by augmenting paths.
+    /// Whether distinct robots can fill all needs at once.
     fn can_serve(&self, needs: &[String]) -> bool {
-        fn fill(
-            team: &[Robot],
-            needs: &[String],
-            need: usize,
-            tried: &mut [bool],
-            by: &mut [Option<usize>],
-        ) -> bool {
-            for robot in 0..team.len() {
-                if tried[robot] || !team[robot].abilities.contains(&needs[need]) {
-                    continue;
-                }
-                tried[robot] = true;
-                if by[robot].is_none_or(|other| fill(team, needs, other, tried, by)) {
-                    by[robot] = Some(need);
-                    return true;
-                }
-            }
-            false
-        }
-        let mut by = vec![None; self.robots.len()];
-        (0..needs.len())
-            .all(|need| fill(&self.robots, needs, need, &mut vec![false; self.robots.len()], &mut by))
+        let able = |need: &String| {
+            let has = |(_, robot): &(usize, &Robot)| robot.abilities.contains(need);
+            self.robots.iter().enumerate().filter(has).fold(0_u64, |mask, (index, _)| mask | 1 << index)
+        };
+        fillable(&needs.iter().map(able).collect::<Vec<u64>>())
     }
 
     fn validate_faults(&self) -> Result<()> {
