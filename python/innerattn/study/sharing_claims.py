@@ -73,7 +73,7 @@ def _measured_share(row: Row) -> str:
     return f"{row.task}: {share_shown(row.scored)}, runs {verdicts_shown(row.scored)}"
 
 
-def unevenness(rows: Sequence[Row]) -> dict[int, float]:
+def _unevenness(rows: Sequence[Row]) -> dict[int, float]:
     """|share - 0.5| averaged over tasks, by the seed of each run that has rescues of every task."""
     by_run = zip(*(row.scored.each for row in rows), strict=True)
     shares = [[task.share.mean for task in run if task.share] for run in by_run]
@@ -85,7 +85,7 @@ def unevenness(rows: Sequence[Row]) -> dict[int, float]:
 
 
 def _contrast(inner: Sequence[Row], uniform: Sequence[Row]) -> Claim:
-    ours, theirs = unevenness(inner), unevenness(uniform)
+    ours, theirs = _unevenness(inner), _unevenness(uniform)
     seeds = sorted(ours.keys() & theirs.keys())
     with_, without = [ours[seed] for seed in seeds], [theirs[seed] for seed in seeds]
     pairs = np.stack([without, with_], 1)

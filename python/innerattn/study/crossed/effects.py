@@ -10,11 +10,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from innerattn.evaluate.comparison import Contrast, contrast, holm
+from innerattn.study import pairs
 from innerattn.study.claims import ENTROPY_MARGIN
 from innerattn.study.crossed.arms import CREDITS, CROSSED, PENALTIES, SHARED, Arm, Credit
 from innerattn.study.crossed.outcome import Outcomes, by_seed
 
-MARGINS = {"unevenness": 0.1, "score": 0.05, "entropy_share": ENTROPY_MARGIN}
+MARGINS = {
+    "unevenness": pairs.MARGINS["unevenness"],
+    "score": pairs.MARGINS["score"],
+    "entropy_share": ENTROPY_MARGIN,
+}
 """The figures that effects are asked of, and the largest difference that counts as none."""
 
 LEAST_SEEDS = 3
