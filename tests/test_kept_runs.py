@@ -9,6 +9,7 @@ import pytest
 from innerattn.cli.main import main
 from innerattn.config import read_toml
 from innerattn.evaluate.sharing.evenness import counts_by_episode
+from innerattn.study.claims import RULES
 from innerattn.study.crossed.outcome import outcome_of
 from innerattn.study.run import Measured, StudyRun, digests, read_measured
 from innerattn.study.scores import read_scores
@@ -65,6 +66,10 @@ def test_counts_of_the_paper_protocol(folder: Path) -> None:
         first, second = sum(counts_by_episode(part)[task.name].sum(0) for part in found.scored)
         cells = [found.run.method, task.name, str(found.run.seed), f"{first} + {second}"]
         assert cells in [line[:4] for line in page(folder)]
+
+
+def test_the_paper_protocol_is_judged_by_the_rules_of_today() -> None:
+    assert RULES in (DOCS / "paper_protocol.md").read_text("utf-8")
 
 
 def test_table_2_of_the_paper_protocol() -> None:
