@@ -46,9 +46,9 @@ def load_run_config(
     given: dict[str, Any] = {"train": {"method": method}}
     if config_file is not None:
         from_file = toml_table(config_file)
-        for key in [key for key in from_file if key in Scenario.model_fields]:
+        if misplaced := [key for key in from_file if key in Scenario.model_fields]:
             raise ConfigError(
-                f"{config_file}: {key}: unknown key; a scenario's stand in [scenario]"
+                f"{config_file}: {misplaced[0]}: unknown key; a scenario's stand in [scenario]"
             )
         _merge(given, from_file)
     train = given["train"] if isinstance(given["train"], dict) else {}
