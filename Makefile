@@ -40,6 +40,7 @@ bench: setup ## speed of worlds and learner on this machine, beside their peers;
 	cargo bench --quiet
 	python benches/compare_envs.py
 	python benches/env_cost.py
+	python benches/fault_cost.py
 	python benches/compare_learner.py
 
 setup: $(VENV)/.built ## environment and compiled module
