@@ -30,15 +30,20 @@ def made_row(method: str, task: str, shares: tuple[float, ...]) -> Row:
     return Row("mixed", method, task, ("food_0", "food_1"), seeds, sharing, sharing, None)
 
 
-def claims_of(**shares: list[tuple[float, ...]]) -> dict[tuple[str, str], Holds]:
-    rows = [
-        made_row(method.replace("_", "-"), f"task_{index + 1}", of_task)
-        for method, tasks in shares.items()
-        for index, of_task in enumerate(tasks)
-    ]
+def made_competence(method: str, unevenness: list[float]) -> Competence:
+    each = tuple(dict.fromkeys(COMPETENCE, 0.5) | {"unevenness": value} for value in unevenness)
     nothing: dict[str, OverRuns | None] = dict.fromkeys(COMPETENCE)
-    beside = Competence("mixed", "td-inner", (), (), (), nothing)
-    found = sharing_claims(Table2(tuple(rows), (beside,)))
+    seeds = tuple(range(len(each)))
+    return Competence("mixed", method, seeds, ({},) * len(each), each, nothing)
+
+
+def claims_of(**shares: list[tuple[float, ...]]) -> dict[tuple[str, str], Holds]:
+    rows, beside = [], []
+    for name, tasks in shares.items():
+        method = name.replace("_", "-")
+        rows += [made_row(method, f"task_{index}", task) for index, task in enumerate(tasks, 1)]
+        beside.append(made_competence(method, np.abs(np.array(tasks) - 0.5).mean(0).tolist()))
+    found = sharing_claims(Table2(tuple(rows), tuple(beside)))
     return {(claim.claim.split()[0], claim.method): claim.holds for claim in found}
 
 

@@ -41,11 +41,11 @@ A claim is undecided for a method with less than two runs. Intervals are Student
   undecided. Sharing is judged over all episodes.
 - **Even with inner attention**: yes where all tasks are shared evenly, no where one is shared
   unevenly. **Uneven without**: yes where all tasks are shared unevenly, no where one is evenly.
-- **More even with than without**: by the share's distance from 0.5, averaged over tasks, without
-  minus with. Runs of one seed begin alike and are measured in the same worlds, so each seed gives
-  one difference; {LEAST_PAIRS} at least. Yes where the interval lies above 0; no where it lies
-  below 0, or where two one-sided tests show the difference to be within ±{0.5 - MARGIN[0]:.1f};
-  smaller differences are not ruled out by that.
+- **More even with than without**: by the share's distance from 0.5, averaged over tasks, with minus
+  without. Runs of one seed begin alike and are measured in the same worlds, so each seed gives one
+  difference; {LEAST_PAIRS} at least. Yes where the interval lies below 0; no where it lies above 0,
+  or where two one-sided tests show the difference to be within ±{0.5 - MARGIN[0]:.1f}; smaller
+  differences are not ruled out by that.
 - **Entropy ends below that of even attention**: by the mean over robots, heads and the last tenth
   of training, as a share of ln(N − 1). Yes where its interval lies below {EVEN_ENTROPY:g}, no where
   it lies above.

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 from innerattn.evaluate.aggregate import improvement_interval, iqm_interval
 from innerattn.evaluate.comparison import Contrast, contrast
+from innerattn.evaluate.sharing.evenness import MARGIN
 from innerattn.evaluate.statistics import Interval
 from innerattn.study.claims import LEAST_PAIRS
 from innerattn.study.competence import Competence
 from innerattn.study.over_runs import OverRuns, over_runs
 
-MARGINS = {"score": 0.05, "unevenness": 0.1}
+MARGINS = {"score": 0.05, "unevenness": 0.5 - MARGIN[0]}
 """The figures that are compared, and the largest difference that counts as none."""
 
 _SEED = 0  # of the bootstraps

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from innerattn.evaluate.comparison import contrast
-from innerattn.evaluate.sharing.evenness import MARGIN, Verdict
+from innerattn.evaluate.sharing.evenness import Verdict
 from innerattn.evaluate.sharing.printed import TEXT, PrintedRow
-from innerattn.study.claims import LEAST_PAIRS, Claim, Holds
+from innerattn.study.claims import Claim, Holds
+from innerattn.study.over_runs import OverRuns
+from innerattn.study.pairs import Pair, pairs
 from innerattn.study.table2 import Row, Table2
 from innerattn.study.table2_text import NONE, share_shown, shown, verdicts_shown
 
@@ -19,6 +18,11 @@ def sharing_claims(table: Table2) -> list[Claim]:
     rows: dict[tuple[str, str], list[Row]] = {}
     for row in table.rows:
         rows.setdefault((row.situation, row.method), []).append(row)
+    compared = {
+        (pair.situation, f"{pair.algorithm}-inner"): pair
+        for pair in pairs(table.competence)
+        if pair.figure == "unevenness"
+    }
     claims = []
     for (situation, method), own in rows.items():
         if not method.endswith(("-inner", "-uniform")):
@@ -37,9 +41,10 @@ def sharing_claims(table: Table2) -> list[Claim]:
                 holds=_all_or_one(verdicts, wanted, other),
             )
         )
-        without = rows.get((situation, method.replace("-inner", "-uniform")))
-        if inner and without:
-            claims.append(_contrast(own, without))
+        pair = compared.get((situation, method))
+        if pair is not None:
+            uniform = rows[situation, f"{pair.algorithm}-uniform"]
+            claims.append(_contrast(pair, own, uniform))
     return claims
 
 
@@ -73,30 +78,14 @@ def _measured_share(row: Row) -> str:
     return f"{row.task}: {share_shown(row.scored)}, runs {verdicts_shown(row.scored)}"
 
 
-def _unevenness(rows: Sequence[Row]) -> dict[int, float]:
-    """|share - 0.5| averaged over tasks, by the seed of each run that has rescues of every task."""
-    by_run = zip(*(row.scored.each for row in rows), strict=True)
-    shares = [[task.share.mean for task in run if task.share] for run in by_run]
-    return {
-        seed: float(np.mean(np.abs(np.array(run) - 0.5)))
-        for seed, run in zip(rows[0].seeds, shares, strict=True)
-        if len(run) == len(rows)
-    }
-
-
-def _contrast(inner: Sequence[Row], uniform: Sequence[Row]) -> Claim:
-    ours, theirs = _unevenness(inner), _unevenness(uniform)
-    seeds = sorted(ours.keys() & theirs.keys())
-    with_, without = [ours[seed] for seed in seeds], [theirs[seed] for seed in seeds]
-    pairs = np.stack([without, with_], 1)
-    found = contrast(pairs, (1.0, -1.0), 0.5 - MARGIN[0]) if len(seeds) >= LEAST_PAIRS else None
+def _contrast(pair: Pair, inner: Sequence[Row], uniform: Sequence[Row]) -> Claim:
     holds: Holds = "undecided"
-    measured = f"distance from 0.5: {_mean(with_)} with, {_mean(without)} without"
-    if found is not None:
-        measured += f"; difference {shown(found.difference)}"
-        if found.difference.low > 0.0:
+    measured = f"distance from 0.5: {_mean(pair.inner)} with, {_mean(pair.uniform)} without"
+    if pair.found is not None:
+        measured += f"; difference {shown(pair.found.difference)}"
+        if pair.found.difference.high < 0.0:
             holds = "yes"
-        elif found.difference.high < 0.0 or found.equivalent:
+        elif pair.found.difference.low > 0.0 or pair.found.equivalent:
             holds = "no"
     printed = "; ".join(
         f"{row.task}: {_distance(row.printed.row)} with, {_distance(other.printed.row)} without"
@@ -105,11 +94,11 @@ def _contrast(inner: Sequence[Row], uniform: Sequence[Row]) -> Claim:
     )
     return Claim(
         claim="more even with inner attention than without",
-        situation=inner[0].situation,
+        situation=pair.situation,
         method=f"{inner[0].method}, {uniform[0].method}",
         printed=printed or NONE,
         measured=measured,
-        runs=len(seeds),
+        runs=len(pair.seeds),
         holds=holds,
     )
 
@@ -118,5 +107,5 @@ def _distance(printed: PrintedRow) -> str:
     return f"{abs(printed.shares[0] - 0.5):.2f}"
 
 
-def _mean(values: Sequence[float]) -> str:
-    return f"{np.mean(values):.2f}" if values else NONE
+def _mean(value: OverRuns | None) -> str:
+    return f"{value.mean:.2f}" if value else NONE
