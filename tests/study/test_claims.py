@@ -55,6 +55,13 @@ def test_a_task_is_judged_by_its_runs_and_not_by_their_mean_alone() -> None:
     assert judged(made_row("td-inner", "task_1", (0.5,))) == "undecided"
 
 
+def test_a_run_without_rescues_leaves_a_task_undecided() -> None:
+    row = made_row("td-inner", "task_1", EVEN)
+    nothing = evenness(np.zeros((1000, 2), np.int64))
+    each = (*row.scored.each, nothing)
+    assert judged(replace(row, scored=replace(row.scored, each=each))) == "undecided"
+
+
 def test_claims_about_sharing() -> None:
     found = claims_of(
         td_inner=[EVEN, EVEN], td_uniform=[UNEVEN, UNEVEN], ppo_inner=[EVEN, UNEVEN], mappo=[EVEN]

@@ -1,13 +1,16 @@
 """Hand-overs of many runs: the control, means over runs by plain loops, the rule, the figures."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from innerattn.evaluate.sharing.handover import handovers
+from innerattn.evaluate.sharing.handover_attention import handover_attention
 from innerattn.report.aligned_figure import draw_aligned
 from innerattn.report.handover_figure import draw_handover
+from innerattn.study.claims import handover_claims
 from innerattn.study.fig5 import (
     Evidence,
     all_handovers,
@@ -60,8 +63,33 @@ def test_changes_of_robot_and_control_against_plain_loops(
     beyond = own - np.divide(found.robot["to_be"].change_by_run, 2.0)
     assert found.own_part_beyond_half is not None
     assert found.own_part_beyond_half.mean == pytest.approx(beyond.mean())
-    for name in ("p_by_run", "control_p_by_run"):
-        assert all(p is not None and 0.0 < p <= 1.0 for p in getattr(found, name))
+    for measured, own_p, control_p in zip(
+        inner, found.p_by_run, found.control_p_by_run, strict=True
+    ):
+        record = measured.recorded
+        own = all_handovers(record)
+        for p, of in ((own_p, own), (control_p, with_bystander(record, own))):
+            attention = handover_attention(record, of, 0)
+            assert attention is not None
+            assert p == attention.p[0]
+    assert found.p_by_run != found.control_p_by_run
+
+
+def test_a_run_without_handovers_does_not_count(inner: list[Measured]) -> None:
+    record = inner[2].recorded
+    without = replace(inner[2], recorded=replace(record, rescues=record.rescues[:0]))
+    found, of_two = evidence([*inner[:2], without]), evidence(inner[:2])
+    assert found is not None
+    assert of_two is not None
+    assert (found.seeds, found.runs, found.handovers[2]) == ((0, 1, 2), 2, 0)
+    assert found.own_part_by_run == (*of_two.own_part_by_run, None)
+    assert found.p_by_run[2] is found.control_p_by_run[2] is None
+    assert found.own_part == of_two.own_part
+    (line,), (expected,) = evidence_lines([found]), evidence_lines([of_two])
+    assert line.runs == expected.runs
+    assert line.runs.startswith("2 runs (least to largest)")
+    assert (line.robot == expected.robot).all()
+    assert {claim.runs for claim in handover_claims([found])} == {2}
 
 
 def test_the_control_takes_no_part(inner: list[Measured]) -> None:

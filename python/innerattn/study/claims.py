@@ -38,8 +38,8 @@ Every claim is judged by itself at 5 %; nothing is adjusted for their number.
 
 - *A task is shared* evenly where the runs' mean share is (its 90 % interval lies within {MARGIN[0]}
   to {MARGIN[1]}) and no run is uneven by itself; unevenly where the mean share is (its 95 %
-  interval lies outside) or more than half of the runs are uneven by themselves; else it is
-  undecided. Sharing is judged over all episodes.
+  interval lies outside) or more than half of the runs are uneven by themselves; else, and where a
+  run has no rescue of the task, it is undecided. Sharing is judged over all episodes.
 - **Even with inner attention**: yes where all tasks are shared evenly, no where one is shared
   unevenly. **Uneven without**: yes where all tasks are shared unevenly, no where one is evenly.
 - **More even with than without**: by the share's distance from 0.5, averaged over tasks, with minus
@@ -170,7 +170,7 @@ def _claim(
         method=found.method,
         printed=printed if found.situation == PRINTED_SITUATION else NONE,
         measured=measured,
-        runs=len(found.seeds),
+        runs=found.end.runs if isinstance(found, EntropyCourse) else found.runs,
         holds=holds,
     )
 

@@ -78,7 +78,8 @@ class Evidence:
         own_part: over runs, the change on the partner-to-be of the robot minus the control's.
         own_part_by_run: (N,) None for a run without hand-overs.
         own_part_beyond_half: over runs, that part minus half the robot's change.
-        p_by_run: (N,) of the permutation test, see `handover_attention`.
+        p_by_run: (N,) of the permutation test, see `handover_attention`; None for a run without
+            hand-overs.
         control_p_by_run: (N,) the same of the robot that takes no part.
     """
 
@@ -97,6 +98,11 @@ class Evidence:
     own_part_beyond_half: OverRuns | None
     p_by_run: tuple[float | None, ...]
     control_p_by_run: tuple[float | None, ...]
+
+    @property
+    def runs(self) -> int:
+        """How many runs have hand-overs."""
+        return sum(number > 0 for number in self.handovers)
 
     def to_json(self) -> dict[str, Any]:
         """As a JSON object."""
@@ -162,9 +168,8 @@ def evidence(group: Sequence[Measured]) -> Evidence | None:
     known = [run for run in seen if run is not None]
     if not known:
         return None
-    width = len(known[0].offsets)
-    robot = {role: _role(seen, role, width) for role in ROLES}
-    control_ = {role: _role(controls, role, width) for role in ROLES}
+    robot = {role: _role(seen, role) for role in ROLES}
+    control_ = {role: _role(controls, role) for role in ROLES}
     changes = (robot["to_be"].change_by_run, control_["to_be"].change_by_run)
     pairs = list(zip(*changes, strict=True))
     own, beyond_half = (
@@ -203,8 +208,7 @@ def evidence_lines(found: Sequence[Evidence]) -> list[AlignedLines]:
     lines = []
     for part in found:
         kind = part.robot["to_be"].weight.kind
-        count = len(part.seeds)
-        runs = "1 run" if count == 1 else f"{count} runs ({BAND_NAMES[kind]})"
+        runs = "1 run" if part.runs == 1 else f"{part.runs} runs ({BAND_NAMES[kind]})"
         robot, control = (
             np.stack([np.stack([w.mean, w.low, w.high]) for w in (of[r].weight for r in ROLES)])
             for of in (part.robot, part.control)
@@ -231,9 +235,8 @@ def _chooses(record: Record) -> bool:
     return weights is not None and bool((weights > even + _EVEN_WITHIN).any())
 
 
-def _role(runs: Sequence[HandoverAttention | None], role: str, width: int) -> RoleEvidence:
+def _role(runs: Sequence[HandoverAttention | None], role: str) -> RoleEvidence:
     parts: list[Attended | None] = [getattr(run, role) if run else None for run in runs]
-    weights = [part.weight[0, :, 0] if part else np.full(width, np.nan) for part in parts]
+    courses: Array = np.stack([part.weight[0, :, 0] for part in parts if part])
     changes = tuple(float(part.change[0, 0]) if part else None for part in parts)
-    courses: Array = np.stack(weights)
     return RoleEvidence(band(courses), over_runs(changes), changes)

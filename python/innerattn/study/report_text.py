@@ -107,8 +107,14 @@ def _claims(findings: Findings) -> str:
     claims = findings.claims()
     assumed = [claim for claim in claims if claim.situation == PRINTED_SITUATION]
     others = [claim for claim in claims if claim.situation != PRINTED_SITUATION]
-    parts = [_claim_table(assumed) if assumed else f"There is no {PRINTED_SITUATION} run.\n"]
-    parts += ["Runs of a task are counted as even / uneven / undecided by themselves.\n"]
+    if assumed:
+        parts = [_claim_table(assumed)]
+    elif any(run.situation == PRINTED_SITUATION for run in findings.runs):
+        parts = [f"What was asked for decides no claim about {PRINTED_SITUATION}.\n"]
+    else:
+        parts = [f"There is no {PRINTED_SITUATION} run.\n"]
+    if findings.table is not None:
+        parts += ["Runs of a task are counted as even / uneven / undecided by themselves.\n"]
     if others:
         parts += ["## The same in the other situations\n", _claim_table(others)]
     parts += ["## How it is decided\n", RULES]
@@ -159,8 +165,8 @@ def _compared(table: Table2) -> str:
     return text + (
         "\nOver situations: interquartile means of the score, and how probably a run with learnt "
         "attention scores higher than one without (Agarwal et al. 2021), by a bootstrap of runs "
-        "within situations, whose intervals are too short where these are few.\n\n"
-        + markdown_table(head_of_all, rows_of_all)
+        "within situations, as if runs of one seed had nothing in common; intervals are too short "
+        "where runs are few.\n\n" + markdown_table(head_of_all, rows_of_all)
     )
 
 

@@ -51,7 +51,7 @@ def sharing_claims(table: Table2) -> list[Claim]:
 def judged(row: Row) -> Verdict:
     """How a task is shared, over all episodes of all runs, by `RULES`."""
     verdicts, together = row.scored.verdicts(), row.scored.together
-    if together is None:
+    if together is None or any(run.share is None for run in row.scored.each):
         return "undecided"
     if together.verdict == "even" and not verdicts["uneven"]:
         return "even"
