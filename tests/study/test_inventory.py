@@ -39,7 +39,6 @@ def test_finished_and_missing(study: Path, planned: list[PlannedRun]) -> None:
     runs = finished_runs(found)
     assert [run.case for run in runs] == [one.case for one in planned[:2]]
     assert runs[0].folder == study / "runs" / "mixed-td-inner-quick-s0"
-    assert (runs[0].config, runs[0].info.state) == (planned[0].config, "done")
 
 
 @pytest.mark.parametrize("state", ["running", "interrupted"])
@@ -75,6 +74,11 @@ def test_what_cannot_be_measured_again_is_left_alone(
     shutil.rmtree(folder / "checkpoints")  # a small copy of a run has no weights
     edit(folder / "run.json", lambda info: info.update(weights_sha256=digest))
     assert find(planned, study).state == "finished"
+    first = take_inventory(planned, study, whole=True)[0]
+    assert (first.state, first.why) == (
+        "unreadable",
+        "a small copy of a run, without metrics and steps",
+    )
     (folder / "evaluation" / "summary.json").unlink()
     found = find(planned, study)
     assert (found.state, found.why) == (

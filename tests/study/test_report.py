@@ -34,6 +34,8 @@ def test_all_files_are_written_and_the_same_twice(
     write_report(runs, tmp_path, "quick")
     for name in FILES:
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes(), name
+    title = json.loads((folder / "fig5.json").read_text())["title"]
+    assert title.startswith("mixed, td-inner, seed 0")  # the first of those that are preferred
     for path in folder.glob("*.json"):
         version = 2 if path.name == "fig5_evidence.json" else 1
         assert json.loads(path.read_text())["schema_version"] == version
@@ -80,6 +82,10 @@ def test_parts_can_be_asked_for_alone(runs: list[StudyRun], tmp_path: Path) -> N
     text = (tmp_path / "report.md").read_text()
     assert "smoke run" not in text
     assert "Fig. 5:" not in text
+    write_report(runs[3:5], tmp_path, "short", ("fig4",))  # attention that is even
+    assert "There is no mixed run" not in (tmp_path / "report.md").read_text()
+    write_report(runs[5:], tmp_path, "short", ("fig4",))
+    assert "There is no mixed run" in (tmp_path / "report.md").read_text()
     assert findings.evidence is None
     with pytest.raises(ValueError, match=r"parts = \['fig6'\]: known are table2, fig4, fig5"):
         write_report(runs, tmp_path, "short", ("fig6",))

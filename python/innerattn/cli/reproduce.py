@@ -62,7 +62,8 @@ class Reproduce(Command):
             The exit code: 0, or 1 where a run failed or is left out.
 
         Raises:
-            InnerattnError: wrong options, or another study is at work in the same folder.
+            InnerattnError: wrong options, matplotlib is needed and not installed, or another study
+                is at work in the same folder.
             OSError: a file cannot be written.
             KeyboardInterrupt: the user stopped it; finished runs are kept.
         """
@@ -70,24 +71,29 @@ class Reproduce(Command):
         out = self.out or Path("studies") / name
         planned = self._planned(out)
 
+        from innerattn.report.drawing import check_format
         from innerattn.study.document import write_account
         from innerattn.study.inventory import finished_runs, take_inventory
         from innerattn.study.lock import StudyLock
         from innerattn.study.outputs import make_outputs
 
+        if self.target != "table2":
+            check_format(out / "figure.png")  # before hours of training, not after
+        whole = self.target not in ("table2", "crossed")
         console = Console(markup=False, highlight=False)
         with StudyLock.take(out) as lock:
-            found = take_inventory(planned, out)
+            found = take_inventory(planned, out, whole=whole)
             self._print_plan(console, found, out)
             try:
                 if not self.report_only:
                     self._train(found, out, lock)
             except KeyboardInterrupt:
-                found = take_inventory(planned, out)
+                found = take_inventory(planned, out, whole=whole)
                 write_account(out, self.target, self.budget, found)
                 _say_what_is_kept(found)
                 raise
-            found = take_inventory(planned, out)
+            found = take_inventory(planned, out, whole=whole)
+            write_account(out, self.target, self.budget, found)
             note = smoke_note(self.budget)
             unusable = [one for one in found if one.state != "finished"]
             reasons = [f"{one.planned.case}: {_reason(one)}" for one in unusable]

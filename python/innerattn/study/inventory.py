@@ -14,7 +14,7 @@ from innerattn.study.failures import read_failures
 from innerattn.study.plan import Case, PlannedRun
 from innerattn.study.run import digests
 from innerattn.study.scores import NotMeasuredError, read_scores
-from innerattn.train import RunInfo, read_info
+from innerattn.train import read_info
 from innerattn.train.checkpoint import plain_file
 
 State = Literal[
@@ -50,24 +50,25 @@ class FinishedRun:
     Attributes:
         case: which one it is.
         folder: the run folder; its ``evaluation`` is whole.
-        config: what it was trained with.
-        info: how it was made.
     """
 
     case: Case
     folder: Path
-    config: RunConfig
-    info: RunInfo
 
 
-def take_inventory(planned: Iterable[PlannedRun], out: Path) -> list[Found]:
+def take_inventory(planned: Iterable[PlannedRun], out: Path, *, whole: bool = False) -> list[Found]:
     """What is there of each planned run of the study in ``out``.
+
+    Args:
+        planned: the runs.
+        out: folder of the study.
+        whole: whether metrics and steps are needed, so that small copies of runs do not do.
 
     Raises:
         RunError: the study's list of failures is damaged.
     """
     failures = read_failures(out)
-    found = [_find(one) for one in planned]
+    found = [_find(one, whole) for one in planned]
     return [
         Found(one.planned, "failed", failures[name])
         if one.state in TO_TRAIN and (name := one.planned.folder.name) in failures
@@ -77,18 +78,9 @@ def take_inventory(planned: Iterable[PlannedRun], out: Path) -> list[Found]:
 
 
 def finished_runs(found: Iterable[Found]) -> list[FinishedRun]:
-    """The runs that can be used.
-
-    Raises:
-        RunError: a folder has changed since it was found.
-    """
+    """The runs that can be used."""
     return [
-        FinishedRun(
-            one.planned.case,
-            one.planned.folder,
-            one.planned.config,
-            read_info(one.planned.folder),
-        )
+        FinishedRun(one.planned.case, one.planned.folder)
         for one in found
         if one.state == "finished"
     ]
@@ -108,7 +100,7 @@ def differences(config: RunConfig, planned: RunConfig) -> list[str]:
     ]
 
 
-def _find(planned: PlannedRun) -> Found:
+def _find(planned: PlannedRun, whole: bool) -> Found:
     folder = planned.folder
     if not os.path.lexists(folder):
         return Found(planned, "missing")
@@ -130,6 +122,8 @@ def _find(planned: PlannedRun) -> Found:
         return Found(planned, "unmeasured", "trained, but not measured as a whole")
     except (InnerattnError, OSError) as error:
         return Found(planned, "unreadable", " ".join(str(error).split()))
+    if whole and not os.path.lexists(folder / "checkpoints"):
+        return Found(planned, "unreadable", "a small copy of a run, without metrics and steps")
     return Found(planned, "finished")
 
 

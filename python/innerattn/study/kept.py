@@ -31,6 +31,7 @@ def keep(run: StudyRun, target: Path) -> None:
 
     Raises:
         RunError: the run has no weights or no finished evaluation, or another is at ``target``.
+        ConfigError: a configuration cannot be read.
         OSError: a file cannot be read or written; the copy is made whole or not at all.
     """
     named = digests(run.folder)

@@ -61,13 +61,15 @@ def write_report(
 
     Raises:
         RunError: runs are missing, unfinished, not what they are listed as, or cannot be compared;
-            or matplotlib is not installed.
+            or matplotlib is not installed and a figure is to be drawn.
+        ConfigError: a configuration cannot be read.
         ValueError: a part is unknown.
         OSError: the files cannot be written; each is written whole or not at all.
     """
     if unknown := sorted(set(parts) - set(PARTS)):
         raise ValueError(f"parts = {unknown}: known are {', '.join(PARTS)}")
-    check_format(folder / "fig4.png")
+    if {"fig4", "fig5"} & set(parts):
+        check_format(folder / "fig4.png")
     groups = by_method(runs)
     ordered = [run for group in groups.values() for run in group]
     configs = read_configs(ordered)

@@ -86,6 +86,7 @@ def write_crossed(
     Raises:
         RunError: a run's evaluation is missing or is not one of two food robots; or matplotlib is
             not installed.
+        ConfigError: a configuration cannot be read.
         OSError: a file cannot be written; each is written whole or not at all.
     """
     check_format(out / "crossed.png")
