@@ -1,6 +1,7 @@
 """`innerattn robustness`: the document, the tables, the picture, and what is refused."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -30,15 +31,22 @@ def test_the_document_alone_on_standard_output(
 def test_tables_a_file_and_a_picture(
     run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    other = tmp_path / run_dir.parent.name / run_dir.name  # alike to the last but one part
+    shutil.copytree(run_dir, other)
     before = {path: path.stat().st_mtime_ns for path in run_dir.rglob("*")}
     files = {"--json": tmp_path / "found.json", "--plot": tmp_path / "found.png"}
     options = [word for option, path in files.items() for word in (option, str(path))]
-    assert main(["robustness", str(run_dir), str(run_dir), *FEW, "--seed", "1", *options]) == 0
+    assert main(["robustness", str(run_dir), str(other), *FEW, "--seed", "1", *options]) == 0
     shown = capsys.readouterr().out
     for words in ("motor gain", "lost communication", "all kinds", "oracle", "0 violations", "AUC"):
         assert words in shown
     assert all(len(line.rstrip()) <= 80 for line in shown.splitlines())
-    assert json.loads(files["--json"].read_text())["seed"] == 1
+    document = json.loads(files["--json"].read_text())
+    assert document["seed"] == 1
+    ends = [f"{path.parts[-3]}/{path.parts[-2]}/{path.name}" for path in (run_dir, other)]
+    names = [policy["policy"] for policy in document["policies"]]
+    assert names == [*ends, "greedy", "hungarian", "oracle"]
+    assert list(document["bounds"]) == list(document["attention"]) == ends
     assert files["--plot"].read_bytes().startswith(b"\x89PNG")
     assert {path: path.stat().st_mtime_ns for path in run_dir.rglob("*")} == before
 
@@ -66,6 +74,12 @@ def test_refusals_are_one_line(
     assert captured.out == ""
     assert captured.err.count("\n") == 1
     assert message in captured.err
+
+
+def test_a_run_is_measured_once(run_dir: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    again = run_dir / ".." / run_dir.name
+    assert main(["robustness", str(run_dir), str(again), *FEW]) == 2
+    assert f"RUN = {again}: is given twice" in capsys.readouterr().err
 
 
 def test_a_run_that_is_not_there_is_named(capsys: pytest.CaptureFixture[str]) -> None:

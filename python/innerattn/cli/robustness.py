@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -90,6 +90,10 @@ class Robustness(Command):
         """The kinds asked for, once every option has been looked at."""
         if not self.runs:
             raise UsageError("RUN: at least one run is needed")
+        folders = [Path(run).resolve() for run in self.runs]
+        for index, folder in enumerate(folders):
+            if folder in folders[:index]:
+                raise UsageError(f"RUN = {self.runs[index]}: is given twice")
         for name, least in (("episodes", 2), ("episode_steps", 2), ("seed", 0)):
             value = getattr(self, name)
             if value is not None and value < least:
@@ -162,14 +166,19 @@ class Robustness(Command):
             }
 
 
-def _names(runs: Iterable[str]) -> list[str]:
-    """A name for each run: that of its folder, with the folder above where two are alike."""
+def _names(runs: Sequence[str]) -> list[str]:
+    """A name for each run: the shortest end of its path that no other has, nor a script."""
     paths = [Path(run).resolve() for run in runs]
-    names = [path.name for path in paths]
-    return [
-        name if names.count(name) == 1 else f"{path.parent.name}/{name}"
-        for name, path in zip(names, paths, strict=True)
-    ]
+    taken = [*(path.parts for path in paths), *((script,) for script in _SCRIPTED)]
+
+    def named(path: Path) -> str:
+        for length in range(1, len(path.parts)):
+            end = path.parts[-length:]
+            if sum(parts[-length:] == end for parts in taken) == 1:
+                return "/".join(end)
+        return str(path)
+
+    return [named(path) for path in paths]
 
 
 def _document(
