@@ -15,7 +15,6 @@ from made_run import made_run  # noqa: E402
 from innerattn.study.crossed.arms import plan_crossed  # noqa: E402
 from innerattn.study.inventory import FinishedRun  # noqa: E402
 from innerattn.study.run import StudyRun  # noqa: E402
-from innerattn.train import read_info  # noqa: E402
 
 
 @pytest.fixture(scope="session")
@@ -34,9 +33,11 @@ def crossed_study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[
     """Runs of all arms in mixed, two of each, in a study's folder."""
     out = tmp_path_factory.mktemp("crossed")
     found = []
-    for one in plan_crossed(("td-inner", "td-uniform"), ("mixed",), range(2), "quick", out):
-        made = made_run(out / "made", "mixed", one.case.method, one.case.seed)
+    planned = plan_crossed(("td-inner", "td-uniform"), ("mixed",), range(2), "quick", out)
+    for number, one in enumerate(planned):  # no two runs alike
+        case = one.case
+        made = made_run(out / "made", "mixed", case.method, case.seed, chance=number)
         one.folder.parent.mkdir(exist_ok=True)
         made.folder.rename(one.folder)
-        found.append(FinishedRun(one.case, one.folder, one.config, read_info(one.folder)))
+        found.append(FinishedRun(one.case, one.folder))
     return out, found

@@ -19,24 +19,30 @@ LOGGED = 12
 FIELDS = ("positions", "velocities", "victims")
 
 
-def made_run(folder: Path, situation: str, method: str, seed: int) -> StudyRun:
-    """Robots go as the greedy dispatch sends them; attention and entropy are random."""
+def made_run(
+    folder: Path, situation: str, method: str, seed: int, chance: int | None = None
+) -> StudyRun:
+    """Robots go as the greedy dispatch sends them; attention and entropy are random.
+
+    Worlds and what is random are those of ``chance``; None: of ``seed``.
+    """
+    chance = seed if chance is None else chance
     small = {"train.method": method, "train.seed": seed, "train.threads": 1}
     config = load_run_config(situation, overrides={**small, "network.hidden_width": 8})
     path = make_run(folder / f"{situation}-{method}-s{seed}", config)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(chance)
     _write_metrics(path / "metrics.jsonl", method, rng)
     worlds, long_worlds = config.scenario, config.scenario.replace(episode_steps=30)
 
     def run(name: str, count: int, first: int = 0, fields: tuple[str, ...] = ()) -> Record:
-        policy = scripted_policy(name, worlds, seed)
-        return run_episodes(policy, worlds, count, seed, first_episode=first, record=fields)
+        policy = scripted_policy(name, worlds, chance)
+        return run_episodes(policy, worlds, count, chance, first_episode=first, record=fields)
 
     recorded = run("greedy", RECORDED, 0, FIELDS)
     weights = made_attention(rng, method, recorded)
     recorded = replace(recorded, policy=method, steps={**recorded.steps, "attention": weights})
     rest = replace(run("greedy", SCORED - RECORDED, RECORDED), policy=method)
-    long = run_episodes(scripted_policy("greedy", long_worlds, seed), long_worlds, LONG, seed)
+    long = run_episodes(scripted_policy("greedy", long_worlds, chance), long_worlds, LONG, chance)
     scripted = {name: [run(name, SCORED)] for name in SCRIPTED}
     standard = {method: [recorded, rest], **scripted}
     longer = {name: [replace(long, policy=name)] for name in standard}

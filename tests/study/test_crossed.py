@@ -311,7 +311,20 @@ def test_files_are_the_same_twice_and_name_every_run(
     (situation,) = document["situations"]
     assert len(situation["runs"]) == len(runs) == 18
     rows = list(csv.DictReader(before["crossed.csv"].decode().splitlines()))
-    assert [float(row["score"]) for row in rows] == [run["score"] for run in situation["runs"]]
+    by_folder = {f"runs/{run.folder.name}": run.case for run in runs}
+    scores = set()
+    for row, of_json in zip(rows, situation["runs"], strict=True):
+        case = by_folder[of_json["folder"]]
+        arm = arm_of(case)
+        own = StudyRun(case.situation, case.method, case.seed, out / of_json["folder"])
+        expected = outcome_of(read_measured(own))
+        penalty = "" if arm.penalty is None else str(arm.penalty)
+        assert (row["method"], row["credit"], row["penalty"]) == (arm.method, arm.credit, penalty)
+        assert (row["seed"], row["shared"]) == (str(case.seed), str(arm.shared))
+        for name, value in vars(expected).items():
+            assert float(row[name]) == of_json[name] == value
+        scores.add((expected.score, expected.entropy_share))
+    assert len(scores) == 18  # else runs could be taken for one another
     write_crossed(runs, out, "short")
     text = (out / "crossed.md").read_text()
     assert "smoke" not in text

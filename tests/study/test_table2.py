@@ -112,8 +112,9 @@ def test_scripted_policies_are_played_in_the_worlds_of_the_runs(
             assert figures["unevenness"] is None
         assert (counts["rescued"], counts["score_episodes"]) == (len(recorded.rescues), 60)
         assert (figures["sooner"] is None) == (counts["choices"] == 0)
-        ends = {"random": 0.0, "hungarian": 1.0}
-        assert figures["score"] == pytest.approx(ends.get(name, figures["score"]))
+        rescues = {of: one["mean"] for of, one in measured.summary["scripted"].items()}
+        score = (rescues[name] - rescues["random"]) / (rescues["hungarian"] - rescues["random"])
+        assert figures["score"] == pytest.approx(score)
     text = table2_markdown(table)
     assert text.count(f"| {name} | mean [95 %] |") == 1
     assert text.count(f"| {name} | 0 |") == 1  # of the single run in single
