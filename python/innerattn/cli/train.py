@@ -37,8 +37,8 @@ class _Sources(Command):
     budget: Budget = "quick"
     """Built-in budget: how long to train, and with which numbers."""
     config: Path | None = None
-    """TOML file with any of the keys below, in sections; wins over preset and budget. Robots, tasks,
-    obstacles and faults are set only there."""
+    """TOML file with any of the keys below, in sections; wins over preset and budget. Robots,
+    tasks, obstacles and faults are set only there."""
 
     def load(self, overrides: dict[str, object]) -> RunConfig:
         """The configuration, with single values on top."""

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from innerattn.evaluate.statistics import Interval
+from innerattn.evaluate.statistics import Interval, percentile_interval
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def iqm_interval(strata: Sequence[ArrayLike], seed: int) -> Interval:
     rows = (rng.integers(0, len(values), (_RESAMPLES, len(values))) for values in groups)
     resampled = [values[drawn] for values, drawn in zip(groups, rows, strict=True)]
     mean = interquartile_mean(np.concatenate(groups))
-    return _interval(mean, _trimmed(np.concatenate(resampled, 1)))
+    return percentile_interval(mean, _trimmed(np.concatenate(resampled, 1)))
 
 
 def improvement_interval(x: Sequence[ArrayLike], y: Sequence[ArrayLike], seed: int) -> Interval:
@@ -77,7 +77,7 @@ def improvement_interval(x: Sequence[ArrayLike], y: Sequence[ArrayLike], seed: i
         )  # how often each run is drawn
         means.append(wins.mean())
         resampled.append(((of_x @ wins) * of_y).sum(1))
-    return _interval(float(np.mean(means)), np.mean(resampled, 0))
+    return percentile_interval(float(np.mean(means)), np.mean(resampled, 0))
 
 
 def _trimmed(values: Array) -> Array:
@@ -97,8 +97,3 @@ def _values(values: ArrayLike, least: int) -> Array:
     if array.ndim != 1 or len(array) < least or not np.isfinite(array).all():
         raise ValueError(f"values {array.tolist()}: must be ({least} or more,) finite numbers")
     return array
-
-
-def _interval(mean: float, resampled: Array) -> Interval:
-    low, high = np.percentile(resampled, (2.5, 97.5))
-    return Interval(mean, float(low), float(high))

@@ -27,7 +27,7 @@ class Figures:
         episodes: how many episodes the means are over.
         episode_steps: their length [control steps].
         rescues_per_episode: of the policy.
-        score: 0 is random play, 1 scripted dispatch; None where these two do not differ.
+        score: 0 is random play, 1 scripted dispatch; None where dispatch is not surely better.
         scripted: rescues per episode of the scripted policies, by name, in the same worlds.
     """
 

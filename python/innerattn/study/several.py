@@ -10,7 +10,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from multiprocessing import connection, get_context, resource_tracker
 from multiprocessing.connection import Connection
@@ -207,7 +207,8 @@ def work(
     except KeyboardInterrupt:
         return
     except (InnerattnError, OSError) as error:
-        pipe.send(" ".join(str(error).split()))
+        with suppress(BrokenPipeError):  # nobody listens any more
+            pipe.send(" ".join(str(error).split()))
         if debug:
             raise
 

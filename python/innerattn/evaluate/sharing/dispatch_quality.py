@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,10 +38,6 @@ class DispatchQuality:
     sooner_by_chance: float | None
     regret_s: Interval | None
     regret_by_chance_s: float | None
-
-    def to_json(self) -> dict[str, Any]:
-        """As a JSON object, intervals as mean, low and high."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)

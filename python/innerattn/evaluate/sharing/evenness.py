@@ -18,7 +18,12 @@ from scipy.stats import chisquare
 from innerattn.evaluate.clusters import share_of
 from innerattn.evaluate.cooperation import shared_abilities
 from innerattn.evaluate.episodes import Record
-from innerattn.evaluate.statistics import Interval, resampled_means, student_interval
+from innerattn.evaluate.statistics import (
+    Interval,
+    percentile_interval,
+    resampled_means,
+    student_interval,
+)
 
 MARGIN = (0.4, 0.6)
 """Shares between which sharing counts as even, 0.5 ± 0.1."""
@@ -237,5 +242,4 @@ def _pooled(runs: list[NDArray[np.int64]], seed: int) -> Interval | None:
         means = resampled_means(run.astype(np.float64), int(rng.integers(2**32)), int(times.sum()))
         sums[times] = means * len(run)
     first, all_ = sums[..., 0].sum(1), sums.sum((1, 2))
-    low, high = np.percentile(first[all_ > 0] / all_[all_ > 0], (2.5, 97.5))
-    return Interval(float(total[0] / total.sum()), float(low), float(high))
+    return percentile_interval(total[0] / total.sum(), first[all_ > 0] / all_[all_ > 0])

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,10 +30,6 @@ class Waiting:
     left: int
     time_to_rescue_s: Interval | None
     time_per_rescue_s: Interval | None
-
-    def to_json(self) -> dict[str, Any]:
-        """As a JSON object, intervals as mean, low and high."""
-        return asdict(self)
 
 
 def waiting(record: Record) -> Waiting:
