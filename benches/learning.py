@@ -19,16 +19,16 @@ from learning_figure import draw_curves
 from page import LEARNING, publish, require, table
 from runs import Run, train_all
 
-from innerattn.evaluate.comparison import compare
+from innerattn.evaluate.comparison import contrast
 from innerattn.evaluate.statistics import student_interval
 from innerattn.report.drawing import write_figure
+from innerattn.study.claims import LEAST_PAIRS
+from innerattn.study.pairs import MARGINS
 from innerattn.study.table2_text import shown
 
 PRESETS = ("mixed", "double", "single")
 METHODS = {"quick": ["td-inner"], "short": ["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"]}
 SEEDS = {"quick": [0, 1, 2], "short": [0, 1, 2, 3, 4]}
-ALIKE = 0.05
-"""Scores that differ by less than this are taken for alike."""
 Found = dict[tuple[str, str], list[dict[str, Any]]]
 """Summaries of the runs of each method and preset, one per seed."""
 
@@ -65,20 +65,19 @@ def row(found: list[dict[str, Any]]) -> list[str]:
 
 
 def attention_table(found: Found) -> str:
-    """Scores with learnt attention minus those with uniform weights, where both were trained."""
+    """Scores with learnt attention minus those with uniform weights, seed by seed."""
     head = ["learnt - uniform attention"]
     for length in (25, 100):
-        head += [f"score, {length} steps [95 %]", f"alike within {ALIKE}?"]
+        head += [f"score, {length} steps [95 %]", f"alike within {MARGINS['score']}?"]
     rows = []
     for (method, preset), learnt in found.items():
         uniform = found.get((method.replace("-inner", "-uniform"), preset))
-        if not method.endswith("-inner") or uniform is None or len(learnt) < 2:
+        if not method.endswith("-inner") or uniform is None or len(learnt) < LEAST_PAIRS:
             continue
         cells = []
         for score in (_score, _long_score):
-            compared = compare(
-                [score(run) for run in learnt], [score(run) for run in uniform], ALIKE, seed=0
-            )
+            both = [(score(one), score(other)) for one, other in zip(learnt, uniform, strict=True)]
+            compared = contrast(both, (1.0, -1.0), MARGINS["score"])
             if compared is None:
                 cells += ["–", "–"]
                 continue
@@ -100,7 +99,7 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="+", type=int, help="others than a budget has by default")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     given = parser.parse_args()
-    options = () if given.encoder == "flat" else ("--network.encoder", given.encoder)
+    options = () if given.encoder == "flat" else (("network.encoder", given.encoder),)
     start = "learning" if given.warm_start == "none" else "warm_start"
     end = "" if given.encoder == "flat" else f"_{given.encoder}"
     places = {budget: f"{start}_{budget}{end}" for budget in given.budgets}

@@ -8,6 +8,7 @@ A second call goes on where the first stopped.
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import statistics
@@ -21,19 +22,25 @@ from page import ROBUSTNESS, machine, publish, table
 from runs import Run, train_all
 
 from innerattn.evaluate.statistics import student_interval
+from innerattn.study.run import digests
 
 METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform")
 SCRIPTED = ("greedy", "hungarian", "oracle")
 SEEN = ("motor_gain", "heading_bias", "unavailable")
-MASKED = ("--network.mask-unavailable",)
+MASKED = (("network.mask_unavailable", True),)
 TEAMS = {"mixed-1-food": 1, "mixed": 2, "mixed-4-food": 4, "mixed-8": 4, "mixed-16": 8}
 
 Document = dict[str, Any]
 
 
 def measured(folders: Sequence[Path], name: str, *options: str) -> Document:
-    """The document of `innerattn robustness` for these runs, kept beside them under this name."""
-    path = folders[0].parent / f"robustness-{name}.json"
+    """The document of `innerattn robustness` for these runs, kept beside them under this name.
+
+    The name ends with what tells these runs from others of their names.
+    """
+    weights = "".join(digests(folder).weights for folder in folders)
+    own = hashlib.sha256(weights.encode()).hexdigest()[:8]
+    path = folders[0].parent / f"robustness-{name}-{own}.json"
     if not path.exists():
         command = ["innerattn", "robustness", *map(str, folders), *options, "--json", str(path)]
         done = subprocess.run(command, capture_output=True, text=True)

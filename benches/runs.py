@@ -1,60 +1,68 @@
-"""Runs that benches measure: trained where they are missing, one core each, side by side."""
+"""Runs that benches measure: trained where they are missing, one core each, side by side.
+
+Without a warm start and options they are those of a study (`innerattn.study.plan`), also by name.
+"""
 
 from __future__ import annotations
 
-import os
 import shutil
-import subprocess
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+
+from innerattn.config import RunConfig, load_run_config, read_toml
+from innerattn.cores import usable_cores
+from innerattn.study.inventory import differences
+from innerattn.study.plan import of_seed
+from innerattn.study.several import Run as Training
+from innerattn.study.several import train_side_by_side
 
 
 @dataclass(frozen=True)
 class Run:
-    """One run, by what it was trained with."""
+    """One run, by what it was trained with; ``options`` are other values by dotted key."""
 
     preset: str
     method: str
     budget: str
     seed: int
     warm_start: str = "none"
-    options: tuple[str, ...] = ()
+    options: tuple[tuple[str, object], ...] = ()
+
+    @property
+    def config(self) -> RunConfig:
+        """What it is trained with; each seed is measured in worlds of its own."""
+        other = {"train.warm_start": self.warm_start, **dict(self.options), **of_seed(self.seed)}
+        return load_run_config(self.preset, self.method, self.budget, overrides=other)
 
     @property
     def name(self) -> str:
         """The name of its folder."""
         parts = [self.preset, self.method]
         parts += [] if self.warm_start == "none" else [f"from-{self.warm_start}"]
-        parts += [option.lstrip("-").replace(".", "-") for option in self.options]
+        parts += [f"{key}-{value}".replace(".", "-").lower() for key, value in self.options]
         return "-".join([*parts, self.budget, f"s{self.seed}"])
-
-    def train(self, runs: Path) -> Path:
-        """Its folder in ``runs``; trained now if it is missing or was cut short.
-
-        Raises:
-            SystemExit: training failed.
-        """
-        folder = runs / self.name
-        if (folder / "evaluation" / "summary.json").exists():
-            return folder
-        shutil.rmtree(folder, ignore_errors=True)
-        command = ["innerattn", "train", "--preset", self.preset, "--method", self.method]
-        command += ["--warm-start", self.warm_start, "--budget", self.budget]
-        command += ["--seed", str(self.seed), "--train.threads", "1", *self.options]
-        environment = os.environ | {"OMP_NUM_THREADS": "1"}
-        done = subprocess.run(
-            [*command, "--run-dir", str(folder)], env=environment, capture_output=True, text=True
-        )
-        if done.returncode:
-            sys.exit(f"{folder}: {done.stderr.strip()}")
-        print(f"{folder} done", file=sys.stderr)
-        return folder
 
 
 def train_all(wanted: Sequence[Run], runs: Path, workers: int | None = None) -> list[Path]:
-    """The folders of all runs wanted, in their order; those missing are trained side by side."""
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
-        return list(pool.map(lambda run: run.train(runs), wanted))
+    """The folders of all runs wanted, in their order; those missing or cut short are trained.
+
+    Raises:
+        SystemExit: training failed, or a folder holds another run.
+    """
+    folders = [runs / run.name for run in wanted]
+    missing = []
+    for run, folder in zip(wanted, folders, strict=True):
+        if not (folder / "evaluation" / "summary.json").exists():
+            missing.append(Training(run.config, folder))
+        elif other := differences(read_toml(folder / "config.toml"), run.config):
+            sys.exit(f"{folder}: holds another run: {'; '.join(other)}")
+    for training in missing:
+        shutil.rmtree(training.folder, ignore_errors=True)
+    train_side_by_side(missing, workers or usable_cores(), changed=lambda _: None, failed=_give_up)
+    return folders
+
+
+def _give_up(run: Training) -> None:
+    sys.exit(f"{run.folder}: {run.failure}")

@@ -1,15 +1,14 @@
-"""Do methods differ, or are they alike? From one value per run of each."""
+"""Do methods differ, or are they alike? From runs of each with the same seeds."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from itertools import combinations
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import chdtri, gammaln, nctdtrinc, stdtr, stdtrit
 
 from innerattn.evaluate.statistics import Interval
@@ -19,8 +18,6 @@ ALPHA = 0.05
 
 _ROUNDING = 1e-12  # values that are as near to each other, relatively, are the same
 _LARGE_T = 1e3  # from here on the chi alone gives four digits, more than `nctdtrinc` does
-_EXACT = 20_000  # up to so many ways to divide the runs, all are looked at
-_SHUFFLES = 9_999
 
 
 @dataclass(frozen=True)
@@ -48,23 +45,6 @@ class Contrast:
     equivalence_p: float
     equivalent: bool
     hedges_g: Interval
-
-    def to_json(self) -> dict[str, Any]:
-        """As a JSON object, intervals as mean, low and high."""
-        return asdict(self)
-
-
-@dataclass(frozen=True)
-class Comparison(Contrast):
-    """Runs of method X against runs of method Y; the difference is X - Y.
-
-    Attributes:
-        permutation_p: two-sided, of |t| of Welch among all ways to divide the runs in two (Janssen
-            1997), or among 9,999 random ones and the one seen. Of few runs there are few ways: of
-            three and three it cannot be below 2 in 20.
-    """
-
-    permutation_p: float
 
 
 def contrast(values: ArrayLike, weights: Sequence[float], margin: float) -> Contrast | None:
@@ -103,45 +83,6 @@ def contrast(values: ArrayLike, weights: Sequence[float], margin: float) -> Cont
     )
 
 
-def compare(x: ArrayLike, y: ArrayLike, margin: float, seed: int) -> Comparison | None:
-    """Compare two methods, whatever the seeds of their runs; by Welch and Satterthwaite.
-
-    Args:
-        x: (n,) one value per run, n >= 2.
-        y: (m,) the same of the other method, m >= 2.
-        margin: the largest difference that does not matter, above 0, in the values' unit.
-        seed: seed of random divisions, where there are too many for all.
-
-    Returns:
-        The comparison, ``hedges_g`` by the pooled deviation of both, which takes equal variances
-        for granted; None where the runs of neither method differ among themselves, which leaves
-        nothing to judge a difference by.
-
-    Raises:
-        ValueError: there are less than two values, or the margin is not above 0.
-    """
-    _check_margin(margin)
-    ours, theirs = _values("x", x), _values("y", y)
-    groups = (ours, theirs)
-    if all(np.ptp(values) <= _ROUNDING * np.abs(values).max() for values in groups):
-        return None
-    difference = float(ours.mean() - theirs.mean())
-    squares = [float(values.var(ddof=1)) / len(values) for values in groups]
-    error = math.sqrt(sum(squares))
-    spread = sum(
-        square**2 / (len(values) - 1) for square, values in zip(squares, groups, strict=True)
-    )
-    pooled_dof = len(ours) + len(theirs) - 2
-    within = sum((len(values) - 1) * float(values.var(ddof=1)) for values in groups)
-    effect = difference / math.sqrt(within / pooled_dof)
-    scale = math.sqrt(1 / len(ours) + 1 / len(theirs))
-    return Comparison(
-        **_judged(difference, error, error**4 / spread, margin),
-        hedges_g=_hedges_g(effect, scale, pooled_dof),
-        permutation_p=_permutation_p(np.concatenate(groups), len(ours), seed),
-    )
-
-
 def holm(p_values: Sequence[float]) -> list[float]:
     """P-values adjusted for being asked together, in their order (Holm 1979).
 
@@ -154,34 +95,6 @@ def holm(p_values: Sequence[float]) -> list[float]:
         largest = max(largest, min(1.0, (len(p_values) - rank) * p_values[i]))
         adjusted[i] = largest
     return adjusted
-
-
-def _permutation_p(values: NDArray[np.float64], n: int, seed: int) -> float:
-    """Share of divisions into n and the rest whose |t| is no less than that of the first n."""
-    ways = math.comb(len(values), n)
-    seen = np.arange(n)[None]
-    if ways <= _EXACT:
-        chosen = np.array(list(combinations(range(len(values)), n)))
-        extra = 0
-    else:
-        rows = np.tile(np.arange(len(values)), (_SHUFFLES, 1))
-        chosen = np.random.default_rng(seed).permuted(rows, axis=1)[:, :n]
-        extra = 1  # the division seen is one of them, so that p is never 0
-    least = _welch_t(values, seen)[0] * (1.0 - 1e-9)  # equal ones may differ by rounding
-    larger = int((_welch_t(values, chosen) >= least).sum())
-    return (larger + extra) / (len(chosen) + extra)
-
-
-def _welch_t(values: NDArray[np.float64], chosen: NDArray[np.int64]) -> NDArray[np.float64]:
-    """|t| of each division, (B,); ``chosen`` (B, n) are the indices of its first group."""
-    first = np.zeros((len(chosen), len(values)), bool)
-    np.put_along_axis(first, chosen, True, 1)
-    n = chosen.shape[1]
-    x = values[chosen]
-    y = np.broadcast_to(values, first.shape)[~first].reshape(len(chosen), -1)
-    apart = np.abs(x.mean(1) - y.mean(1))
-    error = np.sqrt(x.var(1, ddof=1) / n + y.var(1, ddof=1) / y.shape[1])
-    return np.where(error > 0.0, apart / np.where(error > 0.0, error, 1.0), np.inf)
 
 
 def _judged(difference: float, error: float, dof: float, margin: float) -> dict[str, Any]:
@@ -213,10 +126,3 @@ def _hedges_g(effect: float, scale: float, dof: int) -> Interval:
 def _check_margin(margin: float) -> None:
     if not (math.isfinite(margin) and margin > 0.0):
         raise ValueError(f"margin = {margin}: must be finite and above 0")
-
-
-def _values(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    array = np.asarray(values, np.float64)
-    if array.ndim != 1 or len(array) < 2 or not np.isfinite(array).all():
-        raise ValueError(f"{name} = {array.tolist()}: must be (2 or more,) finite numbers")
-    return array
