@@ -18,6 +18,7 @@ from typing import Any
 
 from page import CROSSED, PAPER_PROTOCOL, REPRODUCTION, publish
 
+from innerattn.errors import InnerattnError
 from innerattn.study.kept import keep
 from innerattn.study.run import StudyRun
 
@@ -47,8 +48,11 @@ def main() -> None:
             "page has a place, or was interrupted; make all or crossed"
         )
     page, pictures = place
+    try:
+        _keep_runs(account["runs"], study, DOCS / "records" / page.stem)
+    except InnerattnError as error:
+        sys.exit(str(error))
     publish("report", _with_pictures(study / name, pictures), page)
-    _keep_runs(account["runs"], study, DOCS / "records" / page.stem)
 
 
 def _with_pictures(report: Path, prefix: str) -> str:
