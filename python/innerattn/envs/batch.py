@@ -54,8 +54,10 @@ class BatchEnv:
 
     Autoreset is Gymnasium's SAME_STEP: on an episode's last step `obs` is the next episode's
     first already and `final_obs` holds the last of the old one. What a step gives are C-contiguous
-    read-only views of buffers owned by the environment, valid until the step after next;
-    `copy=True` gives fresh arrays, as `reset` and `observe` always do.
+    read-only views of buffers owned by the environment, valid until the step after next, which
+    gives the same array objects again: change neither their shape nor their dtype in place, and
+    let no thread read them while another steps. `copy=True` gives fresh arrays, as `reset` and
+    `observe` always do.
     World i depends on scenario, seed, `first_env + i` and its actions alone, whatever the number of
     threads or worlds.
 
@@ -231,7 +233,7 @@ class BatchEnv:
             velocities: (E, R, 2), m/s.
 
         Raises:
-            ValueError: wrong shape, or numbers that are not finite.
+            ValueError: wrong shape, numbers that are not finite, or places outside the arena.
         """
         given = {"positions": positions, "velocities": velocities}
         arrays = {

@@ -272,7 +272,7 @@ impl Batch {
 
     /// A mask with one flag for each env.
     fn mask(&self, mask: Option<Bound<PyArray1<bool>>>) -> PyResult<Option<Vec<bool>>> {
-        let mask = mask.map(|mask| mask.to_vec()).transpose()?;
+        let mask = mask.map(|mask| mask.readonly().as_array().to_vec());
         let wanted = self.worlds.num_envs();
         match mask.as_ref().map(Vec::len) {
             Some(found) if found != wanted => {
@@ -343,7 +343,7 @@ impl Batch {
             return Ok(self.no_rescues.clone_ref(py));
         }
         let helpers = self.worlds.rules().scenario.max_needs();
-        let mut rows = Vec::with_capacity(rescues.len() * (6 + helpers));
+        let mut rows = Vec::with_capacity(rescues.len() * (RESCUE_FIELDS.len() + helpers));
         for rescue in rescues {
             rows.extend([i64::from(rescue.env), rescue.episode as i64]);
             rows.extend([rescue.step, rescue.slot, rescue.victim, rescue.task].map(i64::from));
