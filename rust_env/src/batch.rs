@@ -273,7 +273,8 @@ impl Batch {
     /// motion; rules and victims are left alone.
     ///
     /// # Errors
-    /// [`Error::Argument`] for numbers that are not finite or too many or few.
+    /// [`Error::Argument`] for numbers that are not finite or too many or few, and for places outside the
+    /// arena; nothing has changed then.
     pub fn set_motion(&mut self, positions: &[f32], velocities: &[f32]) -> Result<()> {
         let robots = self.rules.team.len();
         for (name, values) in [("positions", positions), ("velocities", velocities)] {
@@ -286,6 +287,15 @@ impl Batch {
                     rule: format!("must be {wanted} finite numbers"),
                 });
             }
+        }
+        let half = self.rules.scenario.arena_half_width_m as f32;
+        if let Some(index) = positions.iter().position(|value| value.abs() > half) {
+            let (env, robot) = (index / (2 * robots), index / 2 % robots);
+            return Err(Error::Argument {
+                name: "positions",
+                value: format!("{} (env {env}, robot {robot})", positions[index]),
+                rule: format!("must be in -{half}..={half} m"),
+            });
         }
         let vector = |pair: &[f32]| Vec2::new(pair[0], pair[1]);
         let rows = zip(positions.chunks_exact(2 * robots), velocities.chunks_exact(2 * robots));

@@ -170,6 +170,8 @@ def test_bad_resets_and_motions_change_nothing() -> None:
     places = env.positions()
     spoilt = places.copy()
     spoilt[2, 1, 0] = np.nan
+    outside = places.copy()
+    outside[2, 1, 0] = -0.61
     for error, message, attempt in [
         (TypeError, "mask has dtype int64", lambda: env.reset(mask=[1, 0, 1])),
         (TypeError, "mask has dtype", lambda: env.reset(mask=[[True, False, True]])),
@@ -177,6 +179,11 @@ def test_bad_resets_and_motions_change_nothing() -> None:
         (ValueError, "seed = -1", lambda: env.reset(seed=-1)),
         (TypeError, "seed = 0.5", lambda: env.reset(seed=0.5)),
         (ValueError, "positions", lambda: env.set_motion(spoilt, places)),
+        (
+            ValueError,
+            r"positions = -0.61 \(env 2, robot 1\): must be in -0.6\.\.=0.6 m",
+            lambda: env.set_motion(outside, places),
+        ),
         (ValueError, "velocities", lambda: env.set_motion(places, spoilt)),
         (ValueError, r"positions has shape .*must be", lambda: env.set_motion(places[:2], places)),
         (ValueError, r"positions has shape \(4, 2\)", lambda: env.set_motion(places[0], places)),
