@@ -19,9 +19,10 @@ pub enum Kind {
     PositionNoise,
     /// Deviation of the error, on each axis, in the robot's sense of its own velocity, m/s; 0 is healthy.
     VelocityNoise,
-    /// Share of control steps in which it sees what it saw the step before; 0 is healthy.
+    /// Share of control steps in which its sensors give what they took in the step before; 0 is healthy.
     FrozenSensor,
-    /// Share of control steps in which it sees nothing but its own abilities; 0 is healthy.
+    /// Share of control steps in which it sees nothing but what it knows of itself: abilities,
+    /// availability and, where they are seen, faults; 0 is healthy.
     Blackout,
     /// Share of control steps in which it neither drives nor helps, but is still in the way; 0 is healthy.
     Unavailable,
@@ -80,7 +81,7 @@ impl Kind {
     }
 
     /// What two faults of this kind come to: factors multiply, angles add up, errors and strikes are
-    /// independent of each other.
+    /// independent of each other, and errors no larger than one fault's may be.
     #[must_use]
     pub fn combined(self, one: f32, other: f32) -> f32 {
         match self {
@@ -90,8 +91,8 @@ impl Kind {
                 let sum = one + other;
                 if sum.abs() > turn / 2.0 { sum - turn.copysign(sum) } else { sum }
             }
-            Self::PositionNoise | Self::VelocityNoise => one.hypot(other),
-            _ => one + other - one * other,
+            Self::PositionNoise | Self::VelocityNoise => one.hypot(other).min(self.range().1 as f32),
+            _ => one + other * (1.0 - one),
         }
     }
 }
@@ -167,6 +168,12 @@ mod tests {
         assert!((Kind::HeadingBias.combined(3.0, 1.0) - (4.0 - std::f32::consts::TAU)).abs() < 1e-6);
         assert!((Kind::Blackout.combined(0.5, 0.5) - 0.75).abs() < 1e-6);
         assert!((Kind::PositionNoise.combined(3.0, 4.0) - 5.0).abs() < 1e-6);
+        assert_eq!(Kind::PositionNoise.combined(8.0, 8.0).to_bits(), 10.0_f32.to_bits());
+        for share in [0.0, 0.1, 0.3, 0.7, 1.0] {
+            // What strikes always does so beside anything else.
+            assert_eq!(Kind::Blackout.combined(1.0, share).to_bits(), 1.0_f32.to_bits());
+            assert_eq!(Kind::Blackout.combined(share, 1.0).to_bits(), 1.0_f32.to_bits());
+        }
         assert!((Kind::MotorGain.combined(0.5, 0.5) - 0.25).abs() < 1e-6);
     }
 }
