@@ -197,7 +197,7 @@ impl Condition {
         Some(&row.1)
     }
 
-    /// Whether its numbers are of these rules' sizes and in range.
+    /// Whether its numbers are of these rules' sizes, and numbers.
     #[must_use]
     pub fn fits(&self, rules: &Rules) -> bool {
         let robots = rules.team.len();
@@ -295,4 +295,43 @@ fn normal(stream: &mut Stream) -> Vec2 {
     let radius = (-2.0 * (1.0 - stream.unit()).ln()).sqrt();
     let (sin, cos) = (std::f32::consts::TAU * stream.unit()).sin_cos();
     Vec2::new(radius * cos, radius * sin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fault::Fault;
+    use crate::scenario::Scenario;
+
+    #[test]
+    fn what_is_of_other_sizes_or_no_number_does_not_fit() {
+        let frozen = Fault {
+            robot: "food_1".into(),
+            kind: Kind::FrozenSensor,
+            value: 1.0,
+            onset_step: 0,
+            onset_rate_hz: None,
+            duration_steps: None,
+        };
+        let rules = Rules::new(Scenario { faults: vec![frozen], ..Scenario::default() }).expect("a scenario");
+        let mut good = Condition::default();
+        good.begin(&rules, Moment { seed: 1, stream: 0, episode: 0, step: 0 });
+        good.hold(&vec![0.5; rules.team.len() * rules.layout.width()]);
+        assert!(good.fits(&rules));
+        assert_eq!(good.held.len(), 1);
+        let spoilt: [fn(&mut Condition); 7] = [
+            |condition| condition.levels.truncate(3),
+            |condition| condition.levels[2][0] = f32::NAN,
+            |condition| condition.spans.clear(),
+            |condition| condition.spans.push(condition.spans[0]),
+            |condition| condition.held[0].0 = 4,
+            |condition| condition.held[0].1.truncate(5),
+            |condition| condition.held[0].1[3] = f32::INFINITY,
+        ];
+        for (number, spoil) in spoilt.into_iter().enumerate() {
+            let mut condition = good.clone();
+            spoil(&mut condition);
+            assert!(!condition.fits(&rules), "{number}");
+        }
+    }
 }

@@ -51,7 +51,7 @@ fn per_env_step(engine: Engine) -> f64 {
 fn bytes_a_world(engine: Engine) -> usize {
     const ENVS: usize = 4096;
     let before = BYTES.load(Relaxed);
-    let batch = Batch::new(Scenario { engine, ..Scenario::default() }, options(ENVS, 0));
+    let batch = Batch::new(Scenario { engine, ..Scenario::default() }, options(ENVS, 0)).expect("a batch");
     let bytes = (BYTES.load(Relaxed) - before) / ENVS;
     drop(batch);
     bytes

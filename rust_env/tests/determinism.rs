@@ -13,12 +13,14 @@ const STEPS: usize = 150;
 /// and without faults.
 fn scenarios() -> Vec<Scenario> {
     let tight = Scenario { arena_half_width_m: 0.6, spawn_clearance_m: 0.1, ..Scenario::default() };
+    let tight = Scenario { contact_cost: 0.1, ..tight };
     let scenarios = [
         tight.clone(),
         Scenario {
             situation: Situation::Double,
             actions: Actions::Continuous,
             obstacles: some_obstacles(),
+            contact_cost: 0.1,
             ..Scenario::default()
         },
         Scenario { faults: coming_and_going(&tight.robots), observe_faults: true, ..tight.clone() },
@@ -26,7 +28,6 @@ fn scenarios() -> Vec<Scenario> {
             situation: Situation::Single,
             robots: mixed_team(12),
             shaping: Shaping::Potential,
-            contact_cost: 0.1,
             end_when_rescued: Some(2),
             ..tight
         },
@@ -80,7 +81,7 @@ fn a_world_alone_is_the_same_world_in_a_batch() {
                 assert!(table.shown(0, to - from) == whole.shown(from, to), "worlds {from}..{to}");
             }
         }
-        assert!(touched || scenario.contact_cost <= 0.0, "a test without contacts proves little");
+        assert!(touched, "a test without contacts proves little");
     }
 }
 
@@ -105,7 +106,11 @@ fn neighbours_change_nothing() {
 
 #[test]
 fn an_episode_does_not_depend_on_the_one_before() {
-    let scenario = Scenario { end_when_rescued: Some(1), ..scenarios()[0].clone() };
+    scenarios().into_iter().filter(|scenario| scenario.robots.len() == 4).for_each(begins_the_same);
+}
+
+fn begins_the_same(scenario: Scenario) {
+    let scenario = Scenario { end_when_rescued: Some(1), ..scenario };
     let mut tables = [(); 2].map(|()| Table::new(scenario.clone(), options(4, 3)));
     for (table, seed) in tables.iter_mut().zip([6, 7]) {
         actions(seed, 4, 4).iter().take(10).for_each(|actions| table.step(actions));

@@ -73,7 +73,7 @@ fn an_ended_world_stays_ended() {
     assert_refused(&mut other, &first.batch.snapshot(), "an image of ended worlds");
 }
 
-/// A batch in mid-episode, its image, and an image of another scenario and another size.
+/// A batch in mid-episode, and an image of it some steps before.
 fn sample() -> (Table, Vec<u8>) {
     let mut table = Table::new(scenarios().remove(1), options(ENVS, 1));
     walk(&mut table, 1, 12);

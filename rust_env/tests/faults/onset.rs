@@ -36,10 +36,14 @@ fn random_onsets_come_at_their_rate_and_again() {
     let envs = 4000;
     let mut table = Table::new(alone(faults), options(envs, 2));
     let (mut healthy, mut onsets, mut before) = (0_u32, 0_u32, vec![false; envs]);
+    let mut lengths = vec![0_u32; envs];
     for step in 0..99 {
         let now: Vec<bool> = table.batch.worlds().map(|world| world.condition.unavailable() == 1).collect();
-        for (before, now) in before.iter().zip(&now) {
+        for ((before, now), length) in before.iter().zip(&now).zip(&mut lengths) {
             assert!(step >= 10 || !now);
+            assert!(*now || [0, 5].contains(length), "it lasted {length} steps");
+            *length = if *now { *length + 1 } else { 0 };
+            assert!(*length <= 5, "it came again without a healthy step between");
             if step >= 10 && !before {
                 healthy += 1;
                 onsets += u32::from(*now);

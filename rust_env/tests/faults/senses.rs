@@ -3,7 +3,7 @@
 use innerattn_env::fault::{Fault, Kind};
 
 use crate::common::{Table, chance, fault, options, random_drive};
-use crate::{EAST, column, row, team};
+use crate::{EAST, STAY, column, row, team};
 
 #[test]
 fn frozen_sensors_repeat_what_they_saw_to_the_bit() {
@@ -95,6 +95,37 @@ fn lost_communication_takes_the_teammates_and_nothing_else() {
         assert_eq!(row(&table, 0)[index], wanted, "{name}");
     }
     assert_eq!(row(&table, 1), row(&healthy, 1));
+}
+
+#[test]
+fn a_worse_fault_meets_the_same_chances() {
+    let envs = 200;
+    let tables = |kind, values: [f64; 2]| {
+        values.map(|value| Table::new(team(vec![fault("food_0", kind, value)]), options(envs, 8)))
+    };
+    let mut healthy = Table::new(team(vec![]), options(envs, 8));
+    let [mut few, mut many] = tables(Kind::Blackout, [0.3, 0.6]);
+    let [mut small, mut large] = tables(Kind::PositionNoise, [0.1, 0.2]);
+    let (x, y) = (column(&healthy, "own.position.x"), column(&healthy, "own.position.y"));
+    let width = healthy.batch.rules().layout.width();
+    let (mut both, mut more) = (0, 0);
+    for _ in 0..20 {
+        for table in [&mut healthy, &mut few, &mut many, &mut small, &mut large] {
+            table.step(&vec![STAY; 4 * envs]);
+        }
+        for row in (0..envs).map(|env| 4 * env * width) {
+            let dark = |table: &Table| table.obs[row + x] == 0.0 && table.obs[row + y] == 0.0;
+            assert!(!dark(&few) || dark(&many));
+            both += i32::from(dark(&few));
+            more += i32::from(dark(&many));
+            for column in [x, y] {
+                let [one, other] =
+                    [&small, &large].map(|table| table.obs[row + column] - healthy.obs[row + column]);
+                assert!((2.0 * one - other).abs() < 1e-5, "{one} {other}");
+            }
+        }
+    }
+    assert!(900 < both && both < 1500 && 2100 < more && more < 2700, "{both} {more} of 4000");
 }
 
 #[test]
