@@ -25,7 +25,7 @@ trait Engine: Send + Sync {
     fn envs_worth_a_thread(&self) -> usize;
 }
 
-/// The engines' scratch memory; one for each thread, and nothing in it outlives a period.
+/// The engines' scratch memory; one for each part of a batch, and nothing in it outlives a period.
 #[derive(Default)]
 pub struct Workspace {
     rapier: rapier::Scratch,

@@ -39,7 +39,7 @@ pub fn bodies(scenario: &Scenario) -> Vec<Body> {
         .collect()
 }
 
-/// The actions of some worlds, one for each robot, already checked.
+/// The actions of some worlds, one for each robot; [`crate::batch::Batch::step`] checks them.
 #[derive(Debug, Clone, Copy)]
 pub enum Commands<'a> {
     /// Discrete actions, one integer for each robot.

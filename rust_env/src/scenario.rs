@@ -107,7 +107,7 @@ pub struct Robot {
     pub kind: String,
     /// What it can bring to a victim.
     pub abilities: Vec<String>,
-    /// Speed above which it does not drive, m/s.
+    /// Speed that no period begins with more than, m/s.
     pub max_speed_mps: f64,
     /// Mass, kg.
     pub mass_kg: f64,

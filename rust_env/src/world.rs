@@ -17,7 +17,7 @@ use crate::scenario::{MAX_ROBOTS, Shaping, Situation};
 use crate::task::{Rescue, Victim};
 
 /// Whether and how an episode ended with a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ending {
     /// The scenario's goal was reached.
     pub terminated: bool,
@@ -46,7 +46,7 @@ pub struct World {
     pub step: u32,
     /// Whether the episode is over (only seen while autoreset is disabled).
     pub over: bool,
-    /// Whether no reset was asked for yet: the first one keeps episode 0.
+    /// Whether there was neither a reset nor a step yet: the first reset then keeps episode 0.
     pub fresh: bool,
     /// Victims rescued in this episode.
     pub rescued: u32,

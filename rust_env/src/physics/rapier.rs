@@ -119,7 +119,7 @@ impl Rapier {
         }
     }
 
-    /// Puts whoever was squeezed too deep into a wall back to its edge: walls give way to no weight.
+    /// Puts whoever was squeezed too deep into a wall back to near its edge: walls give way to no weight.
     fn keep_inside(&self, positions: &mut [Vec2], velocities: &mut [Vec2]) {
         for (index, (at, velocity)) in positions.iter_mut().zip(velocities).enumerate() {
             let limit = self.shapes.arena - (1.0 - MOST_IN_WALL) * self.shapes.radii[index];

@@ -10,7 +10,8 @@ use crate::fault::Fault;
 use crate::matching::fillable;
 
 impl Scenario {
-    /// Checks every value and every rule between values.
+    /// Checks every value and every rule between values, but for whether all fits into the arena, see
+    /// [`crate::place::Placing::new`].
     ///
     /// # Errors
     /// [`Error::Scenario`] for the first rule that is broken.
@@ -65,7 +66,7 @@ impl Scenario {
             within(&key("drive_force_n"), robot.drive_force_n, 0.0, 1e5, "N")?;
         }
         let ratio = self.mass_ratio();
-        if ratio > MAX_MASS_RATIO {
+        if ratio > MAX_MASS_RATIO * (1.0 + 1e-12) {
             let rule = format!("must be at most {MAX_MASS_RATIO}");
             return broken("robots (heaviest to lightest mass_kg)", &ratio, &rule);
         }
