@@ -191,7 +191,7 @@ class PlainTD:
         self.kind, self.td, self.column = network.attention, td, availability_column
         self.actor_adam = Adam(td.learning_rate, 0.0)
         self.critic_adam = Adam(td.learning_rate, td.critic_weight_decay)
-        self.critic_loss = self.actor_loss = float("nan")
+        self.figures: dict[str, float] = {}
         self.gradients: dict[str, Tensor] = {}
 
     def joined(self) -> dict[str, Tensor]:
@@ -244,8 +244,9 @@ class PlainTD:
         critic = self.networks["critic"]
         out = values(critic, batch.obs, batch.actions, self.kind, self.available(batch.obs))
         loss = self.td.attention_logit_penalty * out.penalty
-        for i, q in enumerate(out.q):
-            loss = loss + ((pick(q, batch.actions[:, i]) - target[:, i]) ** 2).mean()
+        taken = [pick(q, batch.actions[:, i]) for i, q in enumerate(out.q)]
+        for i, q_taken in enumerate(taken):
+            loss = loss + ((q_taken - target[:, i]) ** 2).mean()
         gradients = self._backward(critic, loss)
         for key, i in gradients:
             if key.startswith("attention."):
@@ -255,7 +256,9 @@ class PlainTD:
         gradients = {key: factor * g for key, g in gradients.items()}
         self._record("critic", critic, gradients)
         self.critic_adam.step(critic, gradients)
-        self.critic_loss = float(loss.detach())
+        mean = float(torch.stack(taken).detach().mean())
+        self.figures = {"critic_loss": float(loss.detach()), "q_mean": mean}
+        self.figures["critic_grad_norm"] = norm
 
     def _actor(self, obs: Tensor, draw: Draw) -> None:
         actor, tau = self.networks["actor"], 1 / self.td.reward_scale
@@ -273,14 +276,19 @@ class PlainTD:
                 terms = drawn * (tau * drawn - pick(own_q, actions[:, i]) + baseline).detach()
             loss = loss + terms.mean()
         gradients = self._backward(actor, loss)
+        norms = []
         for i in range(len(log_prob)):
             own = [key for key in gradients if key[1] == i]
             norm = sum(float((gradients[key] ** 2).sum()) for key in own) ** 0.5
+            norms.append(norm)
             for key in own:
                 gradients[key] = gradients[key] * clip_factor(norm, self.td.actor_grad_clip)
         self._record("actor", actor, gradients)
         self.actor_adam.step(actor, gradients)
-        self.actor_loss = float(loss.detach())
+        entropies = [-(log_pi.exp() * log_pi).sum(1).mean() for log_pi in log_prob]
+        self.figures["actor_loss"] = float(loss.detach())
+        self.figures["policy_entropy"] = float(torch.stack(entropies).detach().mean())
+        self.figures["actor_grad_norm"] = sum(norms) / len(norms)
 
     @staticmethod
     def _backward(network: PlainNetwork, loss: Tensor) -> dict[tuple[str, int], Tensor]:

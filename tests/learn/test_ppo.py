@@ -1,5 +1,8 @@
 """The on-policy learner against a plain form of it, in float64: rollouts, losses, updates."""
 
+import math
+
+import numpy as np
 import pytest
 import torch
 from reference import Adam, PlainNetwork, PlainTD, clip_factor, pick, policy, values
@@ -149,8 +152,8 @@ class PlainPPO:
         advantage = (advantage - advantage.mean(dim=1, keepdim=True)) / (spread + 1e-8)
         return {"advantage": advantage, "target": target}
 
-    def update(self, rows, obs: Tensor, actions: Tensor) -> tuple[float, float]:
-        """Losses of the critic and the actors on rows; obs (B, R, D), actions (B, R)."""
+    def update(self, rows, obs: Tensor, actions: Tensor) -> dict[str, float]:
+        """An update by rows, and its figures by name; obs (B, R, D), actions (B, R)."""
         numbers = self.numbers
         value, penalty = self.fitted(obs, actions)
         loss = numbers.attention_logit_penalty * penalty
@@ -166,16 +169,22 @@ class PlainPPO:
             if key.startswith("attention."):
                 gradients[key, part] = gradients[key, part] / len(value)
         norm = sum(float((g**2).sum()) for g in gradients.values()) ** 0.5
+        figures = {"critic_loss": float(loss.detach()), "critic_grad_norm": norm}
+        figures["q_mean"] = float(torch.stack(list(value)).detach().mean())
         factor = clip_factor(norm, numbers.critic_grad_clip)
         self.critic_adam.step(self.critic, {key: factor * g for key, g in gradients.items()})
 
         total = torch.zeros((), dtype=obs.dtype)
+        low, high = 1 - numbers.clip, 1 + numbers.clip
+        entropies, divergences, outside = [], [], []
         for robot, log_pi in enumerate(policy(self.actor, obs)):
             ratio = (pick(log_pi, actions[:, robot]) - rows.log_prob[robot]).exp()
             for r, a, entropy in zip(
                 ratio, rows.advantage[robot], -(log_pi.exp() * log_pi).sum(1), strict=True
             ):
-                low, high = 1 - numbers.clip, 1 + numbers.clip
+                entropies.append(entropy.item())
+                divergences.append(r.item() - 1 - math.log(r.item()))
+                outside.append(not low <= r.item() <= high)
                 bounded = low if r.item() < low else high if r.item() > high else r
                 worse = (
                     r * a
@@ -185,13 +194,21 @@ class PlainPPO:
                 )
                 total = total - (worse + numbers.entropy_weight * entropy) / len(ratio)
         gradients = PlainTD._backward(self.actor, total)
+        norms = []
         for robot in range(len(value)):
             own = [key for key in gradients if key[1] == robot]
             norm = sum(float((gradients[key] ** 2).sum()) for key in own) ** 0.5
+            norms.append(norm)
             for key in own:
                 gradients[key] = gradients[key] * clip_factor(norm, numbers.actor_grad_clip)
         self.actor_adam.step(self.actor, gradients)
-        return float(loss.detach()), float(total.detach())
+        return figures | {
+            "actor_loss": float(total.detach()),
+            "policy_entropy": float(np.mean(entropies)),
+            "actor_grad_norm": float(np.mean(norms)),
+            "kl": float(np.mean(divergences)),
+            "clip_share": float(np.mean(outside)),
+        }
 
 
 @pytest.mark.parametrize("value_clip", [None, 0.01])
@@ -238,10 +255,9 @@ def test_rollouts_and_updates_agree_with_the_plain_form(
             chosen = torch.arange(first, first + 6)
             rows = rollout.take(chosen)
             obs, actions = rows.obs.transpose(0, 1), rows.actions.t()
-            losses = plain.update(rows, obs, actions)
+            figures = plain.update(rows, obs, actions)
             found = dict(zip(ppo._METRICS, learner.update(rows).tolist(), strict=True))
-            assert found["critic_loss"] == pytest.approx(losses[0], rel=1e-10, abs=1e-10)
-            assert found["actor_loss"] == pytest.approx(losses[1], rel=1e-10, abs=1e-10)
+            assert found == pytest.approx(figures, rel=1e-10, abs=1e-10)
             clipped += found["clip_share"]
             state = learner.state()
             for name, tensor in (
@@ -269,12 +285,24 @@ def test_learning_waits_for_a_full_rollout_and_then_uses_every_row() -> None:
 def test_a_large_divergence_ends_the_epochs() -> None:
     numbers = {"epochs": 50, "learning_rate": 0.05, "clip": 0.9}
     free, held = make(2, numbers=numbers), make(2, numbers=numbers | {"stop_at_kl": 0.01})
+    divergences: list[float] = []
+    original = held.update
+    kl = ppo._METRICS.index("kl")
+
+    def watched(rows: ppo.Rollout) -> Tensor:
+        figures = original(rows)
+        divergences.append(float(figures[kl]))
+        return figures
+
+    held.update = watched  # type: ignore[method-assign]
     for learner in (free, held):
         collect(learner, 2, 0)
         learner.learn()
     assert free.updates == 50 * 3
-    assert held.updates < free.updates
-    assert held.updates % 3 == 0
+    assert held.updates == len(divergences) < free.updates
+    by_epoch = np.reshape(divergences, (-1, 3)).mean(1)
+    assert (by_epoch[:-1] <= 0.01).all()
+    assert by_epoch[-1] > 0.01
 
 
 def test_one_seed_gives_the_same_bytes_and_another_does_not() -> None:

@@ -108,7 +108,8 @@ class PPO(ActorCritic):
                 for chosen in torch.split(order, self._config.minibatch_size)
             ]
             rows += epoch
-            if stop is not None and float(torch.stack(epoch)[:, 6].mean()) > stop:
+            kl = torch.stack(epoch)[:, _METRICS.index("kl")].mean()
+            if stop is not None and float(kl) > stop:
                 break
         means = torch.stack(rows).mean(dim=0).tolist()
         return dict(zip(_METRICS, means, strict=True))
