@@ -69,6 +69,24 @@ def test_values_and_gradients_are_those_of_copies(
     assert all(one.startswith("attention.") for one in trained)
 
 
+def test_several_threads_give_the_same_bytes() -> None:
+    torch.set_num_threads(4)
+    try:
+        robots, width = 8, 256
+        layer = PerRobotLinear(robots, width, width, generator())
+        share_by_kind(layer, ["food"] * robots)
+        x = torch.randn(robots, 32, width, generator=generator(1))
+        gradients = set()
+        for _ in range(20):
+            layer.zero_grad()
+            layer(x).square().sum().backward()
+            (weight, _) = layer.parameters()
+            gradients.add(weight.grad.numpy().tobytes())
+        assert len(gradients) == 1
+    finally:
+        torch.set_num_threads(1)
+
+
 def test_robots_of_a_kind_act_alike() -> None:
     actor = make("actor", None)
     share_by_kind(actor, KINDS)

@@ -33,21 +33,20 @@ def share_by_kind(network: nn.Module, kinds: Sequence[str]) -> None:
 
 
 class _RowsByKind(nn.Module):
-    """From parameters by kind (K, ...) to parameters by robot (R, ...), and back."""
+    """From parameters by kind (K, ...) to parameters by robot (R, ...), and back.
 
-    kind: Tensor
-    first: Tensor
+    Rows are taken one by one: the gradient of an index adds up in any order on several threads.
+    """
 
     def __init__(self, kinds: Sequence[str]) -> None:
         super().__init__()
         names = list(dict.fromkeys(kinds))
-        of_robot = [names.index(kind) for kind in kinds]
-        first = [list(kinds).index(name) for name in names]
-        self.register_buffer("kind", torch.tensor(of_robot), persistent=False)
-        self.register_buffer("first", torch.tensor(first), persistent=False)
+        self._kind = [names.index(kind) for kind in kinds]
+        self._first = [list(kinds).index(name) for name in names]
 
     def forward(self, by_kind: Tensor) -> Tensor:
-        return by_kind[self.kind]
+        rows = by_kind.unbind()
+        return torch.stack([rows[kind] for kind in self._kind])
 
     def right_inverse(self, by_robot: Tensor) -> Tensor:
-        return by_robot[self.first]
+        return torch.stack([by_robot[robot] for robot in self._first])
