@@ -60,6 +60,8 @@ def test_tables_a_file_and_a_picture(
         (["--plot", "map.jpeg"], 1, "must end in .pdf, .png, .svg"),
         (["--json", "nowhere/a.json"], 1, "nowhere: no such folder"),
         (["--json", "/tmp"], 1, "/tmp: is a folder; must be a file"),
+        (["--json", "/dev/null"], 1, "/dev/null: is no plain file, and would be replaced"),
+        (["--seed", str(2**64)], 1, f"seed = {2**64}: must be"),
     ],
 )
 def test_refusals_are_one_line(

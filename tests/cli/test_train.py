@@ -114,12 +114,11 @@ def test_sources_and_their_order(asked: list[tuple[RunConfig, Path]], tmp_path: 
         (["--train.seed", "7"], "train.seed", 7),
         (["--train.device", "cuda:1"], "train.device", "cuda:1"),
         (["--train.threads", "2"], "train.threads", 2),
-        (["--train.threads", "None"], "train.threads", None),
         (["--scenario.end-when-rescued", "2"], "scenario.end_when_rescued", 2),
         (["--scenario.rescue-credit", "team"], "scenario.rescue_credit", "team"),
         (["--network.mask-unavailable"], "network.mask_unavailable", True),
         (["--td.learning_rate=1e-4"], "td.learning_rate", 1e-4),
-        (["--evaluate.greedy-actions"], "evaluate.greedy_actions", True),
+        (["--evaluate.no-greedy-actions"], "evaluate.greedy_actions", False),
     ],
 )
 def test_single_options(
@@ -186,11 +185,21 @@ def test_divergence_is_one_line(
     assert json.loads((path / "run.json").read_text())["state"] == "interrupted"
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--td.replay-capacity", str(10**15)],
+        [
+            *("--warm-start", "hungarian"),
+            *("--imitation.env-steps", str(10**14), "--imitation.memory-env-steps", str(10**14)),
+        ],
+    ],
+)
 def test_what_memory_cannot_hold_is_one_line(
-    tiny: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    options: list[str], tiny: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    options = ["--run-dir", str(tmp_path / "run"), *tiny, "--td.replay-capacity", str(10**15)]
-    assert main(["train", *options]) == 1
+    assert main(["train", "--run-dir", str(tmp_path / "run"), *tiny, *options]) == 1
+    assert not (tmp_path / "run").exists()
     err = capsys.readouterr().err
     assert err.startswith("innerattn: error: out of memory: Unable to allocate ")
     assert err.count("\n") == 1

@@ -141,6 +141,15 @@ def test_potential_shaping_goes_with_the_learners_discount(method: str) -> None:
     load_run_config(method=method, overrides={"scenario.shaping_discount": 0.9})
 
 
+def test_a_fault_begins_within_every_length_that_is_measured() -> None:
+    fault = {"robot": "food_0", "kind": "unavailable", "value": 1.0, "onset_step": 100}
+    given: dict[str, object] = {"scenario.episode_steps": 200, "scenario.faults": [fault]}
+    message = r"faults\[0\]\.onset_step = 100: must be below evaluate\.long_episode_steps = 100"
+    with pytest.raises(ConfigError, match=message):
+        load_run_config(overrides=given)
+    load_run_config(overrides={**given, "evaluate.long_episode_steps": 200})
+
+
 def test_heads_must_divide_width() -> None:
     with pytest.raises(ValidationError, match=r"network\.hidden_width = 100.*attention_heads = 8"):
         NetworkConfig(hidden_width=100, attention_heads=8)

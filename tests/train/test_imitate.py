@@ -192,7 +192,7 @@ def test_agreement_with_the_script_grows(small_config: Configure) -> None:
 
 
 def test_of_more_states_than_it_holds_a_memory_keeps_the_last() -> None:
-    memory = _Memory(capacity=5, seed=0)
+    memory = _Memory((5, 2, 3), seed=0)
     for start, count in ((0, 3), (3, 12), (15, 1)):
         labels = torch.arange(start, start + count)
         memory.add(labels.float()[:, None, None].expand(-1, 2, 3), labels[:, None].expand(-1, 2))

@@ -5,6 +5,7 @@ It checks no value: the models do, when the options are put back into a configur
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -43,12 +44,14 @@ def check_target(path: Path) -> None:
     """Refuse in time what no file can be written to.
 
     Raises:
-        RunError: it is a folder, or lies in none.
+        RunError: it is something else than a file, such as a link, or lies in no folder.
     """
     if not path.parent.is_dir():
         raise RunError(f"{path.parent}: no such folder")
     if path.is_dir():
         raise RunError(f"{path}: is a folder; must be a file")
+    if os.path.lexists(path) and (path.is_symlink() or not path.is_file()):
+        raise RunError(f"{path}: is no plain file, and would be replaced; - is standard output")
 
 
 def short_option(name: str, default: object) -> OptionField:

@@ -69,6 +69,9 @@ class Robustness(Command):
             left_out = "where attention goes" if robots > 1 else "attention, its bounds included"
             why = f"left out: {left_out}, which has no choice in a team of {robots}"
             print(f"innerattn: {why}", file=sys.stderr)
+        if self.json != Path("-"):
+            console = Console(markup=False, highlight=False)
+            print_robustness(console, grid, found, bounds, attention)
         if self.json is not None:
             parts = _document(grid, found, methods, bounds, attention)
             document = json.dumps(parts, indent=1, allow_nan=False)
@@ -76,9 +79,6 @@ class Robustness(Command):
                 print(document)
             else:
                 write_whole(self.json, f"{document}\n".encode())
-        if self.json != Path("-"):
-            console = Console(markup=False, highlight=False)
-            print_robustness(console, grid, found, bounds, attention)
         if self.plot is not None:
             from innerattn.report.heatmap import write_heatmap
 
@@ -94,7 +94,7 @@ class Robustness(Command):
         for index, folder in enumerate(folders):
             if folder in folders[:index]:
                 raise UsageError(f"RUN = {self.runs[index]}: is given twice")
-        for name, least in (("episodes", 2), ("episode_steps", 2), ("seed", 0)):
+        for name, least in (("episodes", 2), ("episode_steps", 2)):
             value = getattr(self, name)
             if value is not None and value < least:
                 flag = name.replace("_", "-")
@@ -112,17 +112,16 @@ class Robustness(Command):
         return kinds
 
     def _retention(self, kinds: tuple[str, ...]) -> tuple[Grid, dict[str, Kept], dict[str, str]]:
-        from innerattn.config import read_toml
         from innerattn.evaluate.faults.grid import Grid, play_all
         from innerattn.evaluate.trained import load_trained
         from innerattn.scripted import scripted_policy
-        from innerattn.train import read_info
         from innerattn.train.build import thread_count, torch_threads
+        from innerattn.train.checkpoint import read_config
 
-        read_info(self.runs[0])
-        config = read_toml(Path(self.runs[0]) / "config.toml")
+        config = read_config(self.runs[0])
         steps = self.episode_steps or 2 * config.scenario.episode_steps
-        seed = config.evaluate.seed if self.seed is None else self.seed
+        given = {} if self.seed is None else {"seed": self.seed}
+        seed = config.evaluate.replace(**given).seed
         scenario = config.scenario.replace(episode_steps=steps, faults=())
         grid = Grid(scenario, kinds=kinds, episodes=self.episodes, seed=seed)
         policies: list[tuple[str, Any]] = []

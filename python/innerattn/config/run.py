@@ -324,6 +324,13 @@ class RunConfig(Model):
                     raise ValueError(
                         f"{section}.{key} = {value!r}: train.method = {method!r} needs {wanted!r}"
                     )
+        longest = self.evaluate.long_episode_steps
+        for index, fault in enumerate(self.scenario.faults):
+            if fault.onset_step >= longest:
+                raise ValueError(
+                    f"scenario.faults[{index}].onset_step = {fault.onset_step}: must be below "
+                    f"evaluate.long_episode_steps = {longest}, a length that is measured, too"
+                )
         section = "ppo" if on_policy(method) else "td"
         gamma, world = getattr(self, section).gamma, self.scenario
         if world.shaping == "potential" and world.shaping_discount != gamma:

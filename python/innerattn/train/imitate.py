@@ -27,12 +27,14 @@ class Imitation:
 
         Raises:
             ConfigError: no such script.
+            MemoryError: `imitation.memory_env_steps` is too large.
         """
         self._config = config.imitation
         self._script = scripted_policy(config.train.warm_start, env.scenario)
         self._env, self._learner, self._collector = env, learner, collector
         capacity = min(self._config.memory_env_steps, self._config.env_steps + env.num_envs)
-        self._memory = _Memory(capacity, config.train.seed)
+        shape = (capacity, env.num_robots, env.obs_width)
+        self._memory = _Memory(shape, config.train.seed)
         self._unpaid_env_steps = 0
 
     @property
@@ -79,18 +81,21 @@ class Imitation:
 class _Memory:
     """The newest labelled states, drawn uniformly with replacement."""
 
-    def __init__(self, capacity: int, seed: int) -> None:
-        self._capacity = capacity
+    def __init__(self, shape: tuple[int, int, int], seed: int) -> None:
+        """Reserve the memory for observations of this shape, (capacity, R, D).
+
+        Raises:
+            MemoryError: there is not that much.
+        """
+        self._capacity = shape[0]
         self._seen = 0
-        self._obs = self._actions = torch.empty(0)
+        self._obs = torch.from_numpy(np.empty(shape, np.float32))
+        self._actions = torch.from_numpy(np.empty(shape[:2], np.uint8))
         number = np.random.SeedSequence([seed, 1]).generate_state(1, np.uint64)[0]
         self._generator = torch.Generator().manual_seed(int(number))
 
     def add(self, obs: Tensor, actions: Tensor) -> None:
         """Keep states (E, R, D) and what the script would do there (E, R)."""
-        if not self._seen:
-            self._obs = torch.empty(self._capacity, *obs.shape[1:])
-            self._actions = torch.empty(self._capacity, *actions.shape[1:], dtype=torch.uint8)
         rows = torch.arange(len(obs))[-self._capacity :]  # of more than it holds, the last
         place = (self._seen + rows) % self._capacity
         self._obs[place] = obs.cpu()[rows]
