@@ -2,14 +2,13 @@
 
 import json
 import math
-import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import torch
 
-from innerattn.config import RunConfig
+from innerattn.config import RunConfig, load_run_config
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError, RunError
 from innerattn.learn.types import Learner
@@ -175,7 +174,14 @@ def test_torch_threads_are_as_before(small_config: Configure, tmp_path: Path) ->
         torch.set_num_threads(before)
 
 
-@pytest.mark.parametrize(("batch", "threads"), [(1, 1), (512, 1), (1024, 2)])
-def test_networks_get_a_thread_for_each_512_rows(batch: int, threads: int) -> None:
-    config = RunConfig.model_validate({"td": {"batch_size": batch}})
-    assert thread_count(config) == min(threads, len(os.sched_getaffinity(0)))
+@pytest.mark.parametrize("cores", [1, 2, 8])
+@pytest.mark.parametrize(("rows", "threads"), [(1, 1), (512, 1), (1024, 2), (6400, 12)])
+@pytest.mark.parametrize(
+    ("method", "key"), [("td-inner", "td.batch_size"), ("ppo-inner", "ppo.minibatch_size")]
+)
+def test_networks_get_a_thread_for_each_512_rows(
+    rows: int, threads: int, cores: int, method: str, key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("innerattn.train.build.usable_cores", lambda: cores)
+    config = load_run_config(method=method, overrides={key: rows})
+    assert thread_count(config) == min(threads, cores)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import resource
 from pathlib import Path
 
 import numpy as np
@@ -104,3 +105,20 @@ def test_divergence_is_named(
         file.append({"env_steps": 600, "rescues_per_episode": None, **figures})
     assert str(caught.value) == f"training diverged at env_steps = 600: {named}: must be finite"
     assert not (tmp_path / "metrics.jsonl").exists()
+
+
+def test_a_line_that_does_not_fit_leaves_the_file_as_it_was(tmp_path: Path) -> None:
+    path = tmp_path / "metrics.jsonl"
+    file = MetricsFile(path)
+    file.append({"env_steps": 1, "losses": {}})
+    before = path.read_bytes()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 10, limits[1]))  # a full disk
+    try:
+        with pytest.raises(OSError, match="No space left on device"):
+            file.append({"env_steps": 2, "losses": {}})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert path.read_bytes() == before
+    file.append({"env_steps": 3, "losses": {}})
+    assert [json.loads(line)["env_steps"] for line in path.read_text().splitlines()] == [1, 3]

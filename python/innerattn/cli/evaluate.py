@@ -13,7 +13,7 @@ from rich.console import Console
 from innerattn.cli.options import Command, check_target
 from innerattn.cli.progress import Evaluating
 from innerattn.cli.tables import print_summary
-from innerattn.config import EvaluateConfig, Scenario, read_toml
+from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
 
@@ -73,7 +73,7 @@ class Evaluate(Command):
 
     def _measure(self) -> Evaluation:
         from innerattn.evaluate import SCRIPTED, evaluate_policy, evaluate_run, scripted_policy
-        from innerattn.train import read_info
+        from innerattn.train.checkpoint import read_config
 
         if self.policy in SCRIPTED:
             scenario = self._worlds(Scenario.preset("mixed"))
@@ -85,8 +85,7 @@ class Evaluate(Command):
             raise RunError(
                 f"{self.policy}: neither a run's folder nor one of {', '.join(SCRIPTED)}"
             )
-        read_info(self.policy)
-        config = read_toml(Path(self.policy) / "config.toml")
+        config = read_config(self.policy)
         scenario, settings = self._worlds(config.scenario), self._settings(config.evaluate)
         with Evaluating() as progress:
             return evaluate_run(

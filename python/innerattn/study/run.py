@@ -96,7 +96,7 @@ def read_configs(runs: Sequence[StudyRun]) -> list[RunConfig]:
             situation and seed were measured in different worlds, so that they are no pairs.
         ConfigError: a configuration cannot be read.
     """
-    configs = [read_toml(run.folder / "config.toml") for run in runs]
+    configs = [read_toml(plain_file(run.folder / "config.toml")) for run in runs]
     seen: dict[tuple[str, str], tuple[Path, dict[str, Any]]] = {}
     measured: dict[tuple[str, int], tuple[Path, int]] = {}
     for run, config in zip(runs, configs, strict=True):

@@ -108,6 +108,9 @@ class RunFolder:
         except OSError as error:
             shutil.rmtree(partial, ignore_errors=True)
             raise RunError(f"{path}: cannot make the run folder ({error.strerror})") from error
+        except BaseException:
+            shutil.rmtree(partial, ignore_errors=True)
+            raise
         return cls(path, info)
 
     def save_weights(self, tensors: Mapping[str, Tensor], env_steps: int) -> None:
@@ -166,7 +169,7 @@ def read_info(run: str | Path) -> RunInfo:
         raise RunError(f"{path}: no such run folder")
     try:
         info = RunInfo(**json.loads(plain_file(path / "run.json").read_text("utf-8")))
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, ValueError, TypeError, RecursionError) as error:
         raise RunError(f"{path / 'run.json'}: not the record of a run") from error
     if info.schema_version != SCHEMA_VERSION:
         raise RunError(
@@ -176,6 +179,18 @@ def read_info(run: str | Path) -> RunInfo:
     if info.state not in get_args(State):
         raise RunError(f"{path / 'run.json'}: state {info.state!r} is not one of {get_args(State)}")
     return info
+
+
+def read_config(run: str | Path) -> RunConfig:
+    """The configuration of a run.
+
+    Raises:
+        RunError: no run folder, none of ours, or its ``config.toml`` is no plain file.
+        ConfigError: that is not valid.
+    """
+    path = Path(run)
+    read_info(path)
+    return read_toml(plain_file(path / "config.toml"))
 
 
 def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learner]:
@@ -191,8 +206,7 @@ def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learne
         ConfigError: its ``config.toml`` is not valid.
     """
     path = Path(run)
-    read_info(path)
-    config = read_toml(plain_file(path / "config.toml"))
+    config = read_config(path)
     train = config.train.model_copy(update={"device": device})
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         learner = build_learner(config.model_copy(update={"train": train}), env)

@@ -28,9 +28,9 @@ def compiles(config: RunConfig) -> bool:
     worth = config.train.device == "cpu" and _rows(config) >= _WORTH_ROWS
     if choice == "auto" and not worth:
         return False
-    problem = _problem()
+    problem = _problem(config.train.device)
     if problem is not None:
-        _log.warning("Updates run uncompiled, which is slower: no working C++ compiler %s", problem)
+        _log.warning("Updates run uncompiled, which is slower: no working compiler %s", problem)
     return problem is None
 
 
@@ -42,8 +42,8 @@ def _rows(config: RunConfig) -> int:
     return steps // config.td.update_every_env_steps * config.td.batch_size
 
 
-def _problem() -> str | None:
-    """What keeps the compiler from working, found by compiling a line; None where it works.
+def _problem(device: str) -> str | None:
+    """What keeps the compiler from working there, found by compiling a line; None where it works.
 
     A compiler alone is not enough: Python's headers, for one, are needed, too.
     """
@@ -52,7 +52,7 @@ def _problem() -> str | None:
         return x.exp() + 1.0
 
     try:
-        torch.compile(line)(torch.ones(8))
+        torch.compile(line)(torch.ones(8, device=device))
     except Exception as error:  # whatever a missing part of the tool chain raises
         reason = [text for text in str(error).splitlines() if text.strip()]
         return f"({reason[0] if reason else type(error).__name__})"

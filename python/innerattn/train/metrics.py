@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
+import os
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -36,12 +38,16 @@ class MetricsFile:
 
         Raises:
             RunError: training has diverged.
+            OSError: the line cannot be written; the file is as it was.
         """
         refuse_divergence(metrics, metrics["env_steps"])
-        line = json.dumps(metrics, allow_nan=False)
+        line = f"{json.dumps(metrics, allow_nan=False)}\n".encode()
         # One write of one line to a file opened for appending: a reader never sees half of it.
         with self._path.open("ab", buffering=0) as file:
-            file.write(f"{line}\n".encode())
+            before = file.tell()
+            if file.write(line) < len(line):  # the disk is full, say
+                file.truncate(before)
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self._path))
 
 
 class Interval:
