@@ -43,7 +43,11 @@ def parallel_env(
 
     Raises:
         ConfigError: unknown preset, field or render mode, or an invalid value.
+        TypeError: ``scenario`` or ``seed`` is of another type.
+        ValueError: ``seed`` is out of range.
     """
+    if not isinstance(scenario, (Scenario, str)):
+        raise TypeError(f"scenario = {scenario!r}: must be a Scenario or the name of a preset")
     if isinstance(scenario, str):
         scenario = Scenario.preset(scenario)
     if max_cycles is not None:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
+from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
 from innerattn.errors import ConfigError
 from innerattn.scripted.assignment import Needs, assign, pair_costs
 from innerattn.scripted.policy import Policy, View
@@ -34,7 +35,7 @@ class RandomPolicy:
         shape = view.positions.shape
         if self._continuous:
             return self._rng.uniform(-1.0, 1.0, shape).astype(np.float32)
-        return self._rng.integers(0, 5, shape[:2])
+        return self._rng.integers(0, NUM_DISCRETE_ACTIONS, shape[:2])
 
 
 class _Dispatcher(ABC):
