@@ -48,7 +48,7 @@ def test_the_page_on_the_crossed_design(tmp_path: Path, capsys: pytest.CaptureFi
     assert shown("crossed") == text.replace("(crossed", "(images/reproduction-crossed")
 
 
-@pytest.mark.parametrize("name", ["paper_protocol"])
+@pytest.mark.parametrize("name", ["paper_protocol", "reproduction"])
 def test_pages_on_the_paper(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """All but what needs the steps of the runs, which are not kept."""
     target, every, *options = command(name)
