@@ -1,8 +1,8 @@
 """What methods learn: trains every missing run, one core each, and tabulates scores over seeds.
 
-`python benches/learning.py RUNS` fills a place in `docs/learning.md` for each budget and draws its
-learning curves, and others when given `--warm-start hungarian` or `--encoder entities`. A second
-call goes on where the first stopped.
+`python benches/learning.py RUNS` fills a place in `docs/learning.md` for each budget and draws the
+learning curves that are shown there, and others when given `--warm-start hungarian` or
+`--encoder entities`. A second call goes on where the first stopped.
 """
 
 from __future__ import annotations
@@ -122,7 +122,9 @@ def main() -> None:
         head += ["score, 25 steps", "score, 100 steps"]
         tables = [table(head, rows), attention_table(found)]
         publish(place, "\n\n".join(filter(None, tables)), LEARNING)
-        write_figure(LEARNING.parent / "images" / f"{place}.png", draw_curves(folders))
+        picture = LEARNING.parent / "images" / f"{place}.png"
+        if f"(images/{picture.name})" in LEARNING.read_text():
+            write_figure(picture, draw_curves(folders))
 
 
 if __name__ == "__main__":
