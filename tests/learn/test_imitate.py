@@ -76,7 +76,8 @@ def test_a_simple_rule_is_soon_imitated(kind: type) -> None:
     for seed in range(400):
         obs = states(seed, 128)
         learner.imitate(obs, rule(obs), 0.01)
-    assert changed(learner, before) == {"actor", "actor_adam"}
+    slow_copy = {"target_actor"} if kind is TD else set()
+    assert changed(learner, before) == {"actor", "actor_adam"} | slow_copy
     obs = states(1000, 2000)
     assert (learner.act(obs, greedy=True) == rule(obs)).float().mean() > 0.9
 
@@ -97,3 +98,31 @@ def test_frozen_actors_stay_while_the_critic_learns(kind: type) -> None:
         learner.observe(transitions(seed), torch.zeros(8, dtype=torch.bool))
         learner.learn()
     assert {"actor", "actor_adam"} <= changed(learner, before)
+
+
+def test_td_looks_ahead_with_the_policy_that_imitates() -> None:
+    learner = make(TD)
+    for seed in range(3):
+        learner.imitate(states(seed, 8), rule(states(seed, 8)), 0.01)
+        for slow, own in zip(
+            learner.target_actor.parameters(), learner.actor.parameters(), strict=True
+        ):
+            assert torch.equal(slow, own)
+
+
+def test_ppo_learns_nothing_from_steps_of_another_policy() -> None:
+    """Steps while it was frozen are as if they had never been, and the other way round."""
+    never = torch.zeros(8, dtype=torch.bool)
+
+    def learnt(seeds: list[int], frozen_first: bool) -> dict[str, Tensor]:
+        learner = make(PPO)
+        for number, seed in enumerate(seeds):
+            learner.actor_frozen = frozen_first and number == 0
+            learner.observe(transitions(seed), never)
+            learner.learn()
+        assert learner.updates > 0
+        return learner.state()
+
+    clean, mixed, whole = learnt([1, 2], False), learnt([0, 1, 2], True), learnt([0, 1], False)
+    assert all(torch.equal(clean[name], mixed[name]) for name in clean)
+    assert not all(torch.equal(clean[name], whole[name]) for name in clean)

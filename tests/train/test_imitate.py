@@ -53,6 +53,7 @@ class Watched:
         return 1.5
 
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
+        assert self.actor_frozen  # what is observed now is not of the policy that will learn
         assert torch.equal(batch.obs, self.met[-1])
         assert truncated.shape == (12,)
 

@@ -81,10 +81,17 @@ class PPO(ActorCritic):
         self._step = self._update_all
         self._shuffle = torch.Generator().manual_seed(self._data_seed)
         self._steps: list[tuple[Transitions, Tensor]] = []
+        self._steps_of_frozen = False
         self.scale = ReturnScale(team.num_robots, ppo.gamma, device)
 
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
-        """Keep one control step of E worlds until the rollout is full; see `Learner.observe`."""
+        """Keep one control step of E worlds until the rollout is full; see `Learner.observe`.
+
+        A rollout is of one policy: what a frozen actor did, which something else may have changed
+        since, is no part of what a learning one is judged by.
+        """
+        if self.actor_frozen != self._steps_of_frozen:
+            self._steps, self._steps_of_frozen = [], self.actor_frozen
         self._steps.append((batch, truncated))
 
     def learn(self) -> dict[str, float] | None:

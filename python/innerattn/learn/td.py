@@ -107,6 +107,18 @@ class TD(ActorCritic):
         if len(self.replay) >= min(self._config.warmup_env_steps, self.replay.capacity):
             self._unpaid_env_steps += len(batch.obs)
 
+    @torch.no_grad()
+    def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
+        """Step the policies towards given actions, and their slow copies with them.
+
+        The critic's targets are then of the policies that imitate. See `Learner.imitate`.
+        """
+        loss = super().imitate(obs, actions, learning_rate)
+        torch._foreach_copy_(
+            list(self._values["target_actor"].values()), list(self._values["actor"].values())
+        )
+        return loss
+
     def learn(self) -> dict[str, float] | None:
         """Do one update for every `update_every_env_steps` env-steps since the warm-up.
 

@@ -43,7 +43,8 @@ class Learner(Protocol):
     """A policy that improves from what it is shown.
 
     Attributes:
-        actor_frozen: While set, `learn` trains all but the policy.
+        actor_frozen: While set, `learn` trains all but the policy, which others may change by
+            `imitate`; to be set before `observe`.
     """
 
     actor_frozen: bool
@@ -68,7 +69,7 @@ class Learner(Protocol):
         """
 
     def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
-        """Do one step of Adam towards given actions, and nothing else.
+        """Do one step of Adam of the policy towards given actions.
 
         The step goes down the cross-entropy -mean_b log pi_i(a_bi | o_bi), summed over robots i.
 

@@ -61,8 +61,8 @@ class Imitation:
         if losses:
             figures["imitation_loss"] = sum(losses) / len(losses)
         if (1.0 - share) * self._config.env_steps <= self._config.critic_env_steps:
-            self._learner.observe(transitions, truncated)
             self._learner.actor_frozen = True
+            self._learner.observe(transitions, truncated)
             figures |= self._learner.learn() or {}
             self._learner.actor_frozen = False
         return transitions, figures
