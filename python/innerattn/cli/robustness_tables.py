@@ -10,6 +10,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from innerattn.cli.tables import plus_minus
+
 if TYPE_CHECKING:
     from innerattn.evaluate import Interval
     from innerattn.evaluate.bounds.figures import Bounds
@@ -76,7 +78,7 @@ def print_robustness(
 
 
 def _by_kind(grid: Grid, found: Mapping[str, Kept], heads: Sequence[str]) -> Table:
-    show = _text if len(found) <= _MOST_WITH_INTERVALS else _mean
+    show = plus_minus if len(found) <= _MOST_WITH_INTERVALS else _mean
     table = _table("kept", *heads)
     means = {name: kept.by_kind() for name, kept in found.items()}
     for k, kind in enumerate(grid.kinds):
@@ -98,7 +100,7 @@ def _by_severity(grid: Grid, kept: Kept) -> Table:
         curve = kept.cells.value[k, :, :, 0].mean(1)
         robot, interval = worst_robot(grid, kept, k)
         cells = [f"{value:.2f}" for value in curve]
-        table.add_row(_words(kind), *cells, f"{robot} {_text(interval)}")
+        table.add_row(_words(kind), *cells, f"{robot} {plus_minus(interval)}")
     return table
 
 
@@ -111,7 +113,7 @@ def _after_onset(grid: Grid, kept: Kept) -> Table:
     early, late = kept.early.mean((1, 2)), kept.late.mean((1, 2))
     for k, kind in enumerate(grid.kinds):
         parts = (early[k], late[k], late[k] - early[k])
-        table.add_row(_words(kind), *(_text(part.interval()) for part in parts))
+        table.add_row(_words(kind), *(plus_minus(part.interval()) for part in parts))
     return table
 
 
@@ -158,11 +160,13 @@ def _print_attention(console: Console, name: str, found: FaultAttention) -> None
         table.add_row(
             _words(kind.kind),
             f"{sum(after) / len(after):.2f}",
-            _text(kind.effect.mean),
-            _text(kind.auc.mean),
+            plus_minus(kind.effect.mean),
+            plus_minus(kind.auc.mean),
         )
     table.add_section()
-    table.add_row("all kinds", "", _text(found.effect.mean), _text(found.auc.mean), style="bold")
+    table.add_row(
+        "all kinds", "", plus_minus(found.effect.mean), plus_minus(found.auc.mean), style="bold"
+    )
     console.print(table)
     console.print(_ATTENTION_KEY.format(even=found.even_share))
 
@@ -185,9 +189,3 @@ def _share(value: float | None) -> str:
 
 def _mean(interval: Interval) -> str:
     return "-" if math.isnan(interval.mean) else f"{interval.mean:.2f}"
-
-
-def _text(interval: Interval) -> str:
-    if math.isnan(interval.low):
-        return "-"
-    return f"{interval.mean:.2f} ± {(interval.high - interval.low) / 2:.2f}"

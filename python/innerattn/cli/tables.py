@@ -135,7 +135,7 @@ def _scripted_cells(figures: Figures, name: str) -> tuple[str, str]:
 
 def plus_minus(interval: Interval | None) -> str:
     """A mean and half its interval, as tables show them."""
-    if interval is None:
+    if interval is None or math.isnan(interval.low):
         return "-"
     return f"{interval.mean:.2f} ± {(interval.high - interval.low) / 2:.2f}"
 
