@@ -1,5 +1,7 @@
 """Assignment: every world's plan against scipy's, one world at a time."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from innerattn.config import Robot, Scenario, Task
 from innerattn.scripted import assignment
-from innerattn.scripted.assignment import FORBIDDEN, Needs, assign, pair_costs
+from innerattn.scripted.assignment import FORBIDDEN, Needs, assign, can_be_rescued, pair_costs
 
 
 def priced(cost: np.ndarray, chosen: np.ndarray) -> tuple[int, float]:
@@ -99,3 +101,20 @@ def test_a_robot_with_two_abilities_fills_one_need() -> None:
     permitted = Needs(scenario).permitted(np.array([[True]]), np.array([[0]]))
     chosen = assign(pair_costs(np.array([[[0.1], [5.0]]]), permitted))
     np.testing.assert_array_equal(chosen, [[1, 0]])
+
+
+@settings(max_examples=60, deadline=None)
+@given(shape=st.sampled_from([(1, 1, 1), (3, 2, 2), (5, 1, 3), (4, 3, 4)]), seed=st.integers(0, 99))
+def test_who_can_be_rescued_by_trying_every_order(shape: tuple[int, int, int], seed: int) -> None:
+    robots, victims, needs = shape
+    rng = np.random.default_rng(seed)
+    needed = rng.random((6, victims, needs)) < 0.7
+    permitted = needed[:, None] & (rng.random((6, *shape)) < 0.5)
+    found = can_be_rescued(permitted, needed)
+    for world in range(6):
+        for victim in range(victims):
+            wanted = np.flatnonzero(needed[world, victim])
+            assert found[world, victim] == any(
+                all(permitted[world, r, victim, n] for r, n in zip(order, wanted, strict=True))
+                for order in permutations(range(robots), len(wanted))
+            )

@@ -142,6 +142,24 @@ def test_the_oracle_sends_whom_it_can(kind: str) -> None:
     assert chosen(OraclePolicy(DOUBLE), broken)[0] == 0
 
 
+def test_the_oracle_waits_where_there_is_hope() -> None:
+    faults = HEALTHY.copy()
+    faults["unavailable"][:, 3] = 1.0  # medical_0, for victim 0
+    seen = view([(0, 0), (-0.1, 0), (0.8, 0), (0.5, 0.5)], [(0, 0.1, 0), (1, 0.9, 0)])
+    assert chosen(OraclePolicy(DOUBLE), seen._replace(faults=faults)) == [1, -1, 1, -1]
+
+
+def test_the_oracle_keeps_more_than_one_that_knows_of_no_fault() -> None:
+    for lost in ("navigation_0", "medical_0"):
+        faults = (Fault(robot=lost, kind="unavailable", value=1.0),)
+        scenario = Scenario.preset("mixed-1-food").replace(situation="double", faults=faults)
+        hungarian, oracle = (
+            run_episodes(scripted_policy(name, scenario), scenario, 100, 5).rescue_counts().mean()
+            for name in ("hungarian", "oracle")
+        )
+        assert oracle > 1.5 * hungarian
+
+
 @pytest.mark.parametrize("actions", ["discrete", "continuous"])
 @pytest.mark.parametrize(("kind", "value"), [("heading_bias", 3.0), ("speed_limit", 0.0)])
 def test_the_oracle_lives_with_faults(actions: str, kind: str, value: float) -> None:

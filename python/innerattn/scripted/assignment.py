@@ -60,8 +60,8 @@ def pair_costs(times: NDArray[np.float64], permitted: NDArray[np.bool_]) -> NDAr
     """Cost of sending a robot to fill a need of a victim.
 
     A victim is rescued when the last helper is there, so a robot's cost is its own arrival time or,
-    if later, the earliest time at which all other needs could be filled; a share of its own
-    arrival time decides between robots that would both be early.
+    if later, the earliest time at which every other need, each for itself, could be filled; a share
+    of its own arrival time decides between robots that would both be early.
 
     Args:
         times: (E, R, V) arrival times [s].
@@ -77,6 +77,22 @@ def pair_costs(times: NDArray[np.float64], permitted: NDArray[np.bool_]) -> NDAr
     last = soonest.max(-1)[:, None, :, None]
     costs = np.where(permitted, np.maximum(own, last) + _OWN_SHARE * own, FORBIDDEN)
     return costs.reshape(*times.shape[:2], -1)
+
+
+def can_be_rescued(permitted: NDArray[np.bool_], needed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether robots can fill all needs of a victim at once, each robot one of them.
+
+    Args:
+        permitted: (E, R, V, N) which robot can fill which need.
+        needed: (E, V, N) the needs that there are.
+
+    Returns:
+        (E, V) bool; True where nothing is needed.
+    """
+    worlds, robots, victims, needs = permitted.shape
+    pairs = permitted.transpose(0, 2, 1, 3).reshape(-1, robots, needs)
+    filled = (assign(np.where(pairs, 0.0, FORBIDDEN)) >= 0).sum(1).reshape(worlds, victims)
+    return np.asarray(filled == needed.sum(-1))
 
 
 def assign(costs: NDArray[np.float64]) -> NDArray[np.int64]:

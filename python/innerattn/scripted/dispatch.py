@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from innerattn.config import Scenario
 from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
 from innerattn.errors import ConfigError
-from innerattn.scripted.assignment import Needs, assign, pair_costs
+from innerattn.scripted.assignment import Needs, assign, can_be_rescued, pair_costs
 from innerattn.scripted.policy import Policy, View
 from innerattn.scripted.steering import Steering
 
@@ -26,7 +26,10 @@ class RandomPolicy:
     name = "random"
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
-        """Take the kind of actions from ``scenario``; ``seed`` fixes the draws."""
+        """Take the kind of actions from ``scenario``; ``seed`` fixes the draws.
+
+        They follow each other: how many worlds are stepped at once decides who gets which.
+        """
         self._continuous = scenario.actions == "continuous"
         self._rng = np.random.default_rng(seed)
 
@@ -39,7 +42,7 @@ class RandomPolicy:
 
 
 class _Dispatcher(ABC):
-    """What both dispatching policies share: every step, targets first and then actions."""
+    """What all dispatching policies share: every step, targets first and then actions."""
 
     knows_faults = False
     """Whether the robots reckon with faults, or take all to be healthy."""
@@ -88,7 +91,9 @@ class HungarianPolicy(_Dispatcher):
         permitted = self.needs.permitted(view.victims["present"], view.victims["task"])
         faults = self._faults(view)
         if faults is not None:
+            needed = np.asarray(permitted.any(1))
             permitted &= (faults["unavailable"] < 1.0)[:, :, None, None]
+            permitted &= can_be_rescued(permitted, needed)[:, None, :, None]
         times = self.steering.arrival_times(view.positions, view.velocities, places, faults)
         need = assign(pair_costs(times, permitted))
         return np.where(need >= 0, need // permitted.shape[-1], -1)
@@ -98,7 +103,7 @@ class OraclePolicy(HungarianPolicy):
     """As `hungarian`, and knows every fault.
 
     It reckons with weak, slow and misled drives, steers against a bias, and sends nobody who is
-    never available.
+    never available, nor anybody to a victim that cannot be rescued without such a robot.
     """
 
     name = "oracle"
