@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,9 +20,11 @@ from innerattn.config.files import write_whole
 from innerattn.envs.batch import FAULT_KINDS
 
 if TYPE_CHECKING:
+    from innerattn.config import Scenario
     from innerattn.evaluate.bounds.figures import Bounds
-    from innerattn.evaluate.faults.grid import Grid, Kept
+    from innerattn.evaluate.faults.grid import Grid, Kept, MakePolicy
     from innerattn.evaluate.faults.shift_figures import FaultAttention
+    from innerattn.evaluate.trained import TrainedPolicy
 
 _SCRIPTED = ("greedy", "hungarian", "oracle")
 
@@ -124,13 +127,12 @@ class Robustness(Command):
         seed = config.evaluate.replace(**given).seed
         scenario = config.scenario.replace(episode_steps=steps, faults=())
         grid = Grid(scenario, kinds=kinds, episodes=self.episodes, seed=seed)
-        policies: list[tuple[str, Any]] = []
+        policies: list[tuple[str, MakePolicy]] = []
         methods: dict[str, str] = {}
         for name, run in zip(_names(self.runs), self.runs, strict=True):
-            trained, policy = load_trained(run, scenario)
-            policies.append((name, policy))
-            methods[name] = trained.train.method
-        policies += [(name, scripted_policy(name, scenario, seed)) for name in _SCRIPTED]
+            methods[name] = load_trained(run, scenario)[0].train.method
+            policies.append((name, partial(_trained, run, scenario)))
+        policies += [(name, partial(scripted_policy, name, scenario, seed)) for name in _SCRIPTED]
         with torch_threads(thread_count(config)), Evaluating() as progress:
             found = play_all(policies, grid, num_threads=config.train.threads, progress=progress)
         return grid, found, methods
@@ -163,6 +165,13 @@ class Robustness(Command):
                 for name, run in zip(_names(self.runs), self.runs, strict=True)
                 if bounds[name].attention == "inner"
             }
+
+
+def _trained(run: str, scenario: Scenario) -> TrainedPolicy:
+    """The policy of a run that fits these worlds, as if it had never acted."""
+    from innerattn.evaluate.trained import load_trained
+
+    return load_trained(run, scenario)[1]
 
 
 def _names(runs: Sequence[str]) -> list[str]:

@@ -1,7 +1,8 @@
 """What policies still achieve when a robot fails: every kind of fault, severity, robot and onset.
 
 The worlds are the same for all policies and faults, and the same as without a fault, so that every
-comparison is paired. Trained actors are frozen: nobody learns from a fault.
+comparison is paired; a policy that draws its actions begins with the same draws each time. Trained
+actors are frozen: nobody learns from a fault.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ ONSETS = ("start", "middle")
 RESAMPLES = 2000
 """Of the bootstrap that all policies of a grid share."""
 
+MakePolicy = Callable[[], Policy]
+"""Makes a policy that has not acted yet."""
 ProgressCall = Callable[[int, int], None]
 """Called with the episodes done and the episodes to do."""
 
@@ -73,19 +76,16 @@ class Played:
     """Rescues of one policy.
 
     Attributes:
-        policy: its name.
         clean: (E, T) int64 rescues by world and control step, without a fault.
         faulty: (K, S, R, O, E, T) int16 the same with each fault.
     """
 
-    policy: str
     clean: NDArray[np.int64]
     faulty: NDArray[np.int16]
 
 
 def play(
-    policy: Policy,
-    name: str,
+    policy: MakePolicy,
     grid: Grid,
     *,
     num_threads: int | None = None,
@@ -94,15 +94,14 @@ def play(
     """Run a policy without and with every fault of the grid.
 
     Args:
-        policy: what drives the robots.
-        name: what to call it.
+        policy: makes what drives the robots, anew for each fault.
         grid: the worlds and the faults.
         num_threads: threads that step the worlds; none: all cores.
         progress: called with the number of episodes each time some are done.
     """
 
     def rescues(worlds: Scenario) -> NDArray[np.int64]:
-        record = run_episodes(policy, worlds, grid.episodes, grid.seed, num_threads=num_threads)
+        record = run_episodes(policy(), worlds, grid.episodes, grid.seed, num_threads=num_threads)
         if progress is not None:
             progress(grid.episodes)
         return rescues_by_step(record)
@@ -115,7 +114,7 @@ def play(
                 for o, onset in enumerate(ONSETS):
                     worlds = grid.worlds(kind, severity, robot, onset)
                     faulty[k, s, robot, o] = rescues(worlds)
-    return Played(name, clean, faulty)
+    return Played(clean, faulty)
 
 
 def rescues_by_step(record: Record) -> NDArray[np.int64]:
@@ -174,7 +173,7 @@ def kept(played: Played, grid: Grid) -> Kept:
 
 
 def play_all(
-    policies: Sequence[tuple[str, Policy]],
+    policies: Sequence[tuple[str, MakePolicy]],
     grid: Grid,
     *,
     num_threads: int | None = None,
@@ -183,7 +182,7 @@ def play_all(
     """Run policies through the grid, in the same worlds.
 
     Args:
-        policies: names and policies.
+        policies: names, and what makes each policy.
         grid: the worlds and the faults.
         num_threads: threads that step the worlds; none: all cores.
         progress: called each time some episodes are done.
@@ -202,6 +201,6 @@ def play_all(
 
     found = {}
     for name, policy in policies:
-        played = play(policy, name, grid, num_threads=num_threads, progress=count)
+        played = play(policy, grid, num_threads=num_threads, progress=count)
         found[name] = kept(played, grid)
     return found
