@@ -106,6 +106,12 @@ def test_an_episode_that_ends_early_counts_no_further() -> None:
         )
 
 
+@pytest.mark.parametrize("episodes", [0, -1])
+def test_no_episodes_are_refused(episodes: int) -> None:
+    with pytest.raises(ValueError, match=f"episodes = {episodes}: must be at least 1"):
+        record_of("random", Scenario.preset("mixed"), episodes)
+
+
 def test_unknown_fields_are_refused() -> None:
     with pytest.raises(ValueError, match="'smell'"):
         record_of("random", Scenario.preset("mixed"), 1, record=("smell",))

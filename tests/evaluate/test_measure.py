@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import torch
 
-from innerattn.config import EvaluateConfig, Scenario, load_run_config
-from innerattn.errors import RunError
+from innerattn.config import EvaluateConfig, Fault, Scenario, load_run_config
+from innerattn.errors import ConfigError, RunError
 from innerattn.evaluate import (
     evaluate_policy,
     evaluate_run,
@@ -18,6 +18,7 @@ from innerattn.evaluate import (
 )
 from innerattn.evaluate.episodes import FIELDS
 from innerattn.evaluate.summary import summarise
+from innerattn.scripted.dispatch import GreedyPolicy
 from innerattn.train import train
 
 SETTINGS = EvaluateConfig(
@@ -132,6 +133,22 @@ def test_without_attention_none_is_recorded_or_reported(tmp_path: Path) -> None:
     assert summary["attention_entropy"] == summary["attention_entropy_share"] == {}
     recorded = read_records(tmp_path / "evaluation")[0]
     assert list(recorded.steps) == [name for name in FIELDS if name != "attention"]
+
+
+def test_a_policy_is_not_measured_against_itself() -> None:
+    class Mine(GreedyPolicy):
+        name = "hungarian"
+
+    worlds = Scenario.preset("mixed")
+    with pytest.raises(ValueError, match=r"name = 'hungarian'.*HungarianPolicy.*a Mine needs"):
+        evaluate_policy(Mine(worlds), worlds, SETTINGS)
+
+
+def test_faults_after_the_second_length_are_refused() -> None:
+    late = Fault(robot="food_0", kind="blackout", value=1.0, onset_step=40)
+    worlds = Scenario.preset("mixed").replace(episode_steps=60, faults=(late,))
+    with pytest.raises(ConfigError, match=r"onset_step = 40: .*long_episode_steps = 40"):
+        evaluate_policy(scripted_policy("greedy", worlds), worlds, SETTINGS)
 
 
 def test_a_scripted_policy_is_measured_once() -> None:

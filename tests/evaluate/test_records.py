@@ -11,7 +11,7 @@ import pytest
 from innerattn.config import Scenario
 from innerattn.errors import RunError
 from innerattn.evaluate.episodes import FIELDS, Record, run_episodes
-from innerattn.evaluate.records import read_records, write_records
+from innerattn.evaluate.records import FORMAT, read_records, write_records
 from innerattn.scripted import scripted_policy
 
 
@@ -113,4 +113,49 @@ def test_an_unknown_version_is_refused(
     write_records(records, tmp_path)
     monkeypatch.undo()
     with pytest.raises(RunError, match="schema version 2, only 1"):
+        read_records(tmp_path)
+
+
+def test_files_of_two_evaluations_are_refused(records: list[Record], tmp_path: Path) -> None:
+    """Also where only the episodes differ, and nothing that describes them."""
+    others = [replace(records[0], seed=3), run_like(records[0], first_episode=5)]
+    for number, other in enumerate(others):
+        write_records([records[0]], tmp_path / "one")
+        write_records([other], tmp_path / "other")
+        (tmp_path / "other" / "rescues.parquet").replace(tmp_path / "one" / "rescues.parquet")
+        with pytest.raises(RunError, match=["of different episodes", "do not fit"][number]):
+            read_records(tmp_path / "one")
+
+
+def run_like(record: Record, first_episode: int) -> Record:
+    """The same policy in the worlds of other episodes, numbered as if they were the same."""
+    policy = scripted_policy(record.policy, record.scenario)
+    found = run_episodes(
+        policy, record.scenario, 5, record.seed, first_episode=first_episode, record=FIELDS
+    )
+    steps = {**found.steps, "attention": record.steps["attention"]}
+    rescues = found.rescues.copy()
+    rescues["episode"] -= first_episode
+    assert (np.bincount(rescues["episode"], minlength=5) != record.rescue_counts()).any()
+    return replace(found, first_episode=0, rescues=rescues, steps=steps)
+
+
+@pytest.mark.parametrize("head", ["[]", "3", '{"records": []}', '{"schema_version": 1}'])
+def test_files_described_by_something_else_are_refused(
+    records: list[Record], tmp_path: Path, head: str
+) -> None:
+    write_records(records, tmp_path)
+    for name in ("episodes.parquet", "rescues.parquet"):
+        table = pq.read_table(tmp_path / name)
+        pq.write_table(table.replace_schema_metadata({FORMAT: head}), tmp_path / name)
+    with pytest.raises(RunError, match="not a file of"):
+        read_records(tmp_path)
+
+
+def test_a_description_without_episodes_is_refused(records: list[Record], tmp_path: Path) -> None:
+    write_records(records, tmp_path)
+    path = tmp_path / "episodes.parquet"
+    table = pq.read_table(path)
+    pq.write_table(table.filter(pa.compute.less(table["record"], 3)), path)
+    with pytest.raises(RunError, match="do not fit their description"):
         read_records(tmp_path)

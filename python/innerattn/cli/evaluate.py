@@ -39,7 +39,9 @@ class Evaluate(Command):
     """Episodes that rescues are averaged over, at least --episodes; None: as the run says, or
     1000."""
     long_episodes: int | None = None
-    """Episodes of the second length, 100 control steps; None: as the run says, or 200."""
+    """Episodes of the second length; None: as the run says, or 200."""
+    long_episode_steps: int | None = None
+    """The second length [control steps]; None: as the run says, or 100."""
     seed: int | None = None
     """Seed of the worlds; None: as the run says, or 12345."""
     json: Path | None = None
@@ -97,7 +99,7 @@ class Evaluate(Command):
         return worlds.replace(**self._given("situation", "episode_steps"))
 
     def _settings(self, settings: EvaluateConfig) -> EvaluateConfig:
-        names = ("episodes", "score_episodes", "long_episodes", "seed")
+        names = ("episodes", "score_episodes", "long_episodes", "long_episode_steps", "seed")
         return settings.replace(**self._given(*names))
 
     def _given(self, *names: str) -> dict[str, object]:

@@ -13,6 +13,7 @@ from innerattn.config.run import (
     RunConfig,
     TDConfig,
     TrainConfig,
+    refuse_late_faults,
 )
 from innerattn.config.scenario import SCENARIOS, Fault, Obstacle, Robot, Scenario, Task
 
@@ -33,5 +34,6 @@ __all__ = [
     "TrainConfig",
     "load_run_config",
     "read_toml",
+    "refuse_late_faults",
     "write_toml",
 ]

@@ -15,6 +15,7 @@ from pydantic import BaseModel, Field, model_validator
 from innerattn.config.files import preset_names
 from innerattn.config.model import Model
 from innerattn.config.scenario import Scenario
+from innerattn.errors import ConfigError
 
 BUDGETS = preset_names("budgets")
 """Names of the built-in budgets: how long to train, and with which numbers."""
@@ -267,6 +268,21 @@ class EvaluateConfig(Model):
     seed: int = Field(12_345, ge=0, lt=2**63, description="seed of the evaluation's worlds")
 
 
+def refuse_late_faults(scenario: Scenario, evaluate: EvaluateConfig) -> None:
+    """Refuse to measure worlds whose faults begin after episodes of the second length.
+
+    Raises:
+        ConfigError: one does; the message names it.
+    """
+    longest = evaluate.long_episode_steps
+    for index, fault in enumerate(scenario.faults):
+        if fault.onset_step >= longest:
+            raise ConfigError(
+                f"scenario.faults[{index}].onset_step = {fault.onset_step}: must be below "
+                f"evaluate.long_episode_steps = {longest}, a length that is measured, too"
+            )
+
+
 class RunConfig(Model):
     """A whole run. What `train.method` needs follows from it where it is not given.
 
@@ -324,13 +340,7 @@ class RunConfig(Model):
                     raise ValueError(
                         f"{section}.{key} = {value!r}: train.method = {method!r} needs {wanted!r}"
                     )
-        longest = self.evaluate.long_episode_steps
-        for index, fault in enumerate(self.scenario.faults):
-            if fault.onset_step >= longest:
-                raise ValueError(
-                    f"scenario.faults[{index}].onset_step = {fault.onset_step}: must be below "
-                    f"evaluate.long_episode_steps = {longest}, a length that is measured, too"
-                )
+        refuse_late_faults(self.scenario, self.evaluate)
         section = "ppo" if on_policy(method) else "td"
         gamma, world = getattr(self, section).gamma, self.scenario
         if world.shaping == "potential" and world.shaping_discount != gamma:

@@ -106,7 +106,12 @@ def run_episodes(
 
     Returns:
         The record.
+
+    Raises:
+        ValueError: less than one episode, or an unknown field to record.
     """
+    if episodes < 1:
+        raise ValueError(f"episodes = {episodes}: must be at least 1")
     unknown = set(record) - set(FIELDS)
     if unknown:
         raise ValueError(f"record = {sorted(unknown)}: known are {', '.join(FIELDS)}")

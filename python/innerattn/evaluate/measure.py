@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from innerattn.config import EvaluateConfig, Scenario
+from innerattn.config import EvaluateConfig, Scenario, refuse_late_faults
 from innerattn.config.files import write_whole
 from innerattn.evaluate.episodes import FIELDS, Record, run_episodes
 from innerattn.evaluate.records import write_records
@@ -63,7 +63,19 @@ def evaluate_policy(
         warm_start: the scripted policy that its training began by imitating, or "none".
         num_threads: threads that step the worlds; none: all cores.
         progress: called each time some episodes are done.
+
+    Raises:
+        ConfigError: a fault begins too late for one of the two lengths.
+        ValueError: the policy has the name of a scripted one, and is another.
     """
+    refuse_late_faults(scenario, settings)
+    if policy.name in SCRIPTED:
+        script = type(scripted_policy(policy.name, scenario))
+        if type(policy) is not script:
+            raise ValueError(
+                f"policy.name = {policy.name!r}: is that of {script.__name__}, which every policy "
+                f"is measured against; a {type(policy).__name__} needs another"
+            )
     names = dict.fromkeys((policy.name, *SCRIPTED))
     scored = max(settings.score_episodes, settings.episodes)
     total = (scored + settings.long_episodes) * len(names)

@@ -49,14 +49,17 @@ def read_records(folder: str | Path) -> list[Record]:
     """The records that `write_records` wrote, in their order.
 
     Raises:
-        RunError: a file is missing, not Parquet, or not of this format and version.
+        RunError: a file is missing, not Parquet, or not of this format and version, or the two do
+            not belong together.
     """
     folder = Path(folder)
     episodes, heads = _read(folder / _EPISODES)
-    rescues, _ = _read(folder / _RESCUES)
+    rescues, others = _read(folder / _RESCUES)
+    if heads != others:
+        raise RunError(f"{folder}: {_EPISODES} and {_RESCUES} are of different episodes")
     try:
         return [_record(i, head, episodes, rescues) for i, head in enumerate(heads)]
-    except (KeyError, ValueError, TypeError, pa.ArrowException) as error:
+    except (LookupError, ValueError, TypeError, AttributeError, pa.ArrowException) as error:
         raise RunError(f"{folder}: records do not fit their description ({error})") from error
 
 
@@ -153,13 +156,12 @@ def _read(path: Path) -> tuple[pa.Table, list[dict[str, Any]]]:
     try:
         table = pq.read_table(path)
         head = json.loads((table.schema.metadata or {})[FORMAT.encode()])
-    except (OSError, ValueError, KeyError, pa.ArrowException) as error:
+        version, records = head["schema_version"], list(head["records"])
+    except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
         raise RunError(f"{path}: not a file of {FORMAT}") from error
-    if head.get("schema_version") != SCHEMA_VERSION:
-        raise RunError(
-            f"{path}: schema version {head.get('schema_version')}, only {SCHEMA_VERSION} is known"
-        )
-    return table, list(head["records"])
+    if version != SCHEMA_VERSION:
+        raise RunError(f"{path}: schema version {version}, only {SCHEMA_VERSION} is known")
+    return table, records
 
 
 def _record(index: int, head: dict[str, Any], episodes: pa.Table, rescues: pa.Table) -> Record:
@@ -168,7 +170,7 @@ def _record(index: int, head: dict[str, Any], episodes: pa.Table, rescues: pa.Ta
     scenario = Scenario.model_validate(head["scenario"])
     names, reward_names = tuple(head["robot_names"]), tuple(head["reward_names"])
     lengths = _numbers(rows["steps"])
-    return Record(
+    record = Record(
         policy=head["policy"],
         scenario=scenario,
         robot_names=names,
@@ -184,6 +186,10 @@ def _record(index: int, head: dict[str, Any], episodes: pa.Table, rescues: pa.Ta
             if name in head["steps"]
         },
     )
+    listed, counted = record.rescue_counts(), _numbers(rows["rescues"])
+    if not np.array_equal(listed, counted):
+        raise ValueError(f"{listed.sum()} rescues are listed, {counted.sum()} were counted")
+    return record
 
 
 def _steps(name: str, layout: dict[str, Any], rows: pa.Table) -> NDArray[Any]:

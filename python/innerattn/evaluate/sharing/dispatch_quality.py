@@ -22,7 +22,8 @@ class DispatchQuality:
     """How well the choice of helpers fits arrival times, as estimated when victims appeared.
 
     A robot may be busy with another victim then, so even the best dispatch does not always send
-    the one that would be there sooner; compare with a scripted policy in the same worlds. Figures
+    the one that would be there sooner; compare with a scripted policy in the same worlds. Robots
+    are taken to be healthy: of worlds with faults the figures say little. Figures
     are None without choices, and ``regret_s`` where all choices come from one episode.
 
     Attributes:
@@ -46,14 +47,12 @@ class Choices:
 
     Attributes:
         episode: (N,) int64 from 0, position in the record.
-        task: (N,) int64.
         helper: (N,) int64 the robot that helped.
         times: (N, R) float64 arrival times of all robots at the victim, at the step it appeared
             [s]; inf for robots that could not have filled the need.
     """
 
     episode: NDArray[np.int64]
-    task: NDArray[np.int64]
     helper: NDArray[np.int64]
     times: NDArray[np.float64]
 
@@ -80,10 +79,10 @@ def choices_of(record: Record) -> Choices:
                 able = np.array([ability in robot.abilities for robot in scenario.robots])
                 times = np.where(able, _times(record, events), np.inf)
                 episode = events["episode"] - record.first_episode
-                parts.append((episode, events["task"], events[f"helper_{need}"], times))
+                parts.append((episode, events[f"helper_{need}"], times))
     if not parts:
         none = np.zeros(0, np.int64)
-        return Choices(none, none, none, np.zeros((0, scenario.num_robots)))
+        return Choices(none, none, np.zeros((0, scenario.num_robots)))
     return Choices(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
