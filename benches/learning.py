@@ -118,7 +118,7 @@ def main() -> None:
         found: Found = {case: [_summary(run) for run in runs] for case, runs in folders.items()}
         rows = [[f"{method}, {preset}", *row(found[method, preset])] for method, preset in cases]
         listed = ", ".join(map(str, seeds))
-        head = [f"{budget}, seeds {listed}", "rescues, 25 steps"]
+        head = [f"{budget}, seed{'s' if len(seeds) > 1 else ''} {listed}", "rescues, 25 steps"]
         head += ["score, 25 steps", "score, 100 steps"]
         tables = [table(head, rows), attention_table(found)]
         publish(place, "\n\n".join(filter(None, tables)), LEARNING)
