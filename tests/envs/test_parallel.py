@@ -172,7 +172,11 @@ def test_state_is_the_world(scenario: Scenario) -> None:
         ({"food_0": 0}, ValueError, "food_1"),
         (STAY | {"food_2": 0}, ValueError, "food_2"),
         (STAY | {"medical_0": 5}, ValueError, "robot 3|medical_0"),
-        (STAY | {"medical_0": 0.5}, TypeError, "dtype"),
+        (STAY | {"medical_0": 0.5}, TypeError, r"actions\['medical_0'\] = 0.5: must be an integer"),
+        (STAY | {"medical_0": True}, TypeError, "medical_0"),
+        (STAY | {"medical_0": "1"}, TypeError, "medical_0"),
+        (STAY | {"medical_0": [1]}, ValueError, r"actions\['medical_0'\] has shape \(1,\)"),
+        ([0, 0, 0, 0], TypeError, "actions is a list: must be a dict"),
     ],
 )
 def test_wrong_actions_change_nothing(
@@ -184,6 +188,33 @@ def test_wrong_actions_change_nothing(
     with pytest.raises(error, match=message):
         env.step(actions)
     np.testing.assert_array_equal(env.state(), before)
+
+
+@pytest.mark.parametrize(
+    ("action", "error", "message"),
+    [
+        (["0", "1"], TypeError, "must be two numbers"),
+        ([1j, 0], TypeError, "must be two numbers"),
+        ([True, False], TypeError, "must be two numbers"),
+        ([0.5], ValueError, r"actions\['food_1'\] has shape \(1,\): must be \(2,\)"),
+        ([0.5, 2.0], ValueError, "robot 1"),
+    ],
+)
+def test_wrong_forces_change_nothing(
+    action: list[Any], error: type[Exception], message: str
+) -> None:
+    env = parallel_env(seed=0, actions="continuous")
+    env.reset()
+    before = env.state()
+    with pytest.raises(error, match=message):
+        env.step({key: [0.0, 0.0] for key in STAY} | {"food_1": action})
+    np.testing.assert_array_equal(env.state(), before)
+
+
+def test_integers_of_all_widths_are_actions() -> None:
+    env = parallel_env(seed=0)
+    env.reset()
+    env.step(STAY | {"food_0": np.uint64(2), "food_1": np.array(3, np.int8)})
 
 
 def test_arguments_are_checked() -> None:

@@ -136,16 +136,19 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         Raises:
             gymnasium.error.ResetNeeded: no episode is going on.
             ValueError: an action is missing, is of no live agent, or is out of range.
-            TypeError: an action is of the wrong type.
+            TypeError: an action is of the wrong type, or ``actions`` is no dict.
         """
         agents = self.agents
+        if not isinstance(actions, dict):
+            raise TypeError(f"actions is a {type(actions).__name__}: must be a dict by agent")
         if not agents:
             raise ResetNeeded("no episode is going on: call reset() before step()")
         if actions.keys() != set(agents):
             wrong = sorted(actions.keys() ^ set(agents))
             raise ValueError(f"actions must be of the live agents {agents}; differs in {wrong}")
-        dtype = np.float32 if self.scenario.actions == "continuous" else None
-        step = self._env.step(np.asarray([[actions[agent] for agent in agents]], dtype))
+        step = self._env.step(
+            np.stack([[self._checked(agent, actions[agent]) for agent in agents]])
+        )
         terminated, truncated = bool(step.terminated[0]), bool(step.truncated[0])
         if terminated or truncated:
             self.agents = []
@@ -156,6 +159,18 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
             dict.fromkeys(agents, truncated),
             self._infos(step.rescues),
         )
+
+    def _checked(self, agent: str, action: Action) -> NDArray[Any]:
+        """An action as the worlds take it; whether it is in range they say themselves."""
+        continuous = self.scenario.actions == "continuous"
+        kinds, shape, dtype = ("fiu", (2,), np.float32) if continuous else ("iu", (), np.int64)
+        given = np.asarray(action)
+        if given.dtype.kind not in kinds:
+            wanted = "two numbers" if continuous else "an integer"
+            raise TypeError(f"actions[{agent!r}] = {action!r}: must be {wanted}")
+        if given.shape != shape:
+            raise ValueError(f"actions[{agent!r}] has shape {given.shape}: must be {shape}")
+        return given.astype(dtype)
 
     def state(self) -> NDArray[np.float32]:
         """The whole world, of shape `state_space.shape`, float32, world frame.
