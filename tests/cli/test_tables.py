@@ -113,6 +113,23 @@ def test_attention_has_nats_and_shares() -> None:
     assert any("ln 3 = 1.10" in " ".join(row) for row in printed(summary(entropy=entropy)))
 
 
+def test_large_teams_and_many_heads_are_told_in_full() -> None:
+    worlds = Scenario.preset("mixed-16")
+    food = [robot.name for robot in worlds.robots if robot.kind == "food"]
+    counts = {"task_1": dict.fromkeys(food, 1234) | {"medical_3": 7}, "task_2": {}}
+    entropy = {robot.name: [2.25] * 9 for robot in worlds.robots}
+    out = io.StringIO()
+    found = summary(cooperation=counts, entropy=entropy)
+    print_summary(Console(file=out, width=80, markup=False), found, worlds)
+    assert "…" not in out.getvalue()
+    rows = cells(out.getvalue())
+    assert ["robot", "task_1 (food + medicine)", "task_2 (food + information)"] in rows
+    assert ["food_7", "1,234 (12%)"] in rows
+    heads = [row[1:] for row in rows if row[:1] == ["robot"] and row[1].startswith("head")]
+    assert heads == [[f"head {n}" for n in some] for some in ((1, 2, 3, 4), (5, 6, 7, 8), (9,))]
+    assert sum(row[:2] == ["navigation_3", "2.25 (112%)"] for row in rows) == 3
+
+
 def test_what_was_not_measured_is_not_mentioned() -> None:
     text = " ".join(cell for row in printed(summary()) for cell in row).lower()
     assert "helped" not in text

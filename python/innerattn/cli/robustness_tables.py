@@ -54,6 +54,8 @@ def print_robustness(
         bounds: of each run's critic, by name.
         attention: of each run with learnt attention, by name.
     """
+    from innerattn.scripted import SCRIPTED
+
     scenario = grid.scenario
     console.print(
         f"\nRescues kept when a robot fails: {scenario.situation}, {grid.episodes:,} worlds of "
@@ -61,9 +63,10 @@ def print_robustness(
         style="bold",
     )
     # Names of runs are too long to stand over columns.
-    heads = [f"run {i + 1}" if name in bounds else name for i, name in enumerate(found)]
+    runs = [name for name in found if name not in (*SCRIPTED, "oracle")]
+    heads = [f"run {i + 1}" if name in runs else name for i, name in enumerate(found)]
     console.print(_by_kind(grid, found, heads))
-    for head, name in zip(heads, bounds, strict=False):
+    for head, name in zip(heads, runs, strict=False):
         console.print(f"  {head}: {name}", soft_wrap=True)
     console.print(_KEY)
     first, kept = next(iter(found.items()))

@@ -20,6 +20,7 @@ _KEY = """\
   hungarian: robots assigned to victims by arrival time
   score: 0 plays like random, 1 like hungarian; ± is half the 95 % interval
 """
+_MOST_COLUMNS = 4  # that 80 columns hold beside names
 _KEY_OF_SEEDS = """\
   score: 0 plays like random, 1 like hungarian
   mean: ± is half the 95 % interval over seeds (Student's t), in the same worlds
@@ -51,7 +52,8 @@ def print_summary(console: Console, summary: Summary, scenario: Scenario) -> Non
         console.print(_cooperation(summary, scenario))
     if summary.attention_entropy:
         console.print("Attention entropy of each robot's critic, in nats", style="bold")
-        console.print(_attention(summary))
+        for table in _attention(summary):
+            console.print(table)
         if scenario.num_robots > 2:
             others = scenario.num_robots - 1
             console.print(
@@ -143,33 +145,48 @@ def plus_minus(interval: Interval | None) -> str:
 def _cooperation(summary: Summary, scenario: Scenario) -> Table:
     counts = summary.cooperation
     robots = list(dict.fromkeys(name for of_task in counts.values() for name in of_task))
-    table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("task")
-    for robot in robots:
-        table.add_column(robot, justify="right")
+    rows = [["task", *robots]]
     for task in scenario.tasks:
         of_task = counts[task.name]
         total = sum(of_task.values())
         cells = [_with_share(of_task[robot], total) if robot in of_task else "" for robot in robots]
-        table.add_row(f"{task.name} ({' + '.join(task.needs)})", *cells)
-    return table
+        rows.append([f"{task.name} ({' + '.join(task.needs)})", *cells])
+    if len(robots) > _MOST_COLUMNS:
+        rows = [list(column) for column in zip(*rows, strict=True)]
+        rows[0][0] = "robot"
+    return _table(rows)
 
 
 def _with_share(count: int, total: int) -> str:
     return f"{count:,} ({count / total:.0%})" if total else "0"
 
 
-def _attention(summary: Summary) -> Table:
-    table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("robot")
+def _attention(summary: Summary) -> list[Table]:
+    """A table for every few heads."""
     heads = len(next(iter(summary.attention_entropy.values())))
-    for head in range(heads):
-        table.add_column(f"head {head + 1}", justify="right")
+    return [
+        _attention_of(summary, range(first, min(first + _MOST_COLUMNS, heads)))
+        for first in range(0, heads, _MOST_COLUMNS)
+    ]
+
+
+def _attention_of(summary: Summary, heads: range) -> Table:
+    rows = [["robot", *(f"head {head + 1}" for head in heads)]]
     for robot, nats in summary.attention_entropy.items():
         shares = summary.attention_entropy_share[robot]
         cells = [
-            f"{value:.2f}" + ("" if share is None else f" ({share:.0%})")
-            for value, share in zip(nats, shares, strict=True)
+            f"{nats[head]:.2f}" + ("" if (share := shares[head]) is None else f" ({share:.0%})")
+            for head in heads
         ]
-        table.add_row(robot, *cells)
+        rows.append([robot, *cells])
+    return _table(rows)
+
+
+def _table(rows: Sequence[Sequence[str]]) -> Table:
+    """The first row is the head; figures stand to the right."""
+    table = Table(box=box.SIMPLE_HEAD)
+    for number, name in enumerate(rows[0]):
+        table.add_column(name, justify="right" if number else "left", overflow="fold")
+    for row in rows[1:]:
+        table.add_row(*row)
     return table
