@@ -14,7 +14,7 @@ train: setup ## train TD-innerATT on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
 
 test: setup lint ## every check but the long one
-	cargo test --quiet
+	cargo test --quiet --locked
 	pytest -n auto --dist worksteal
 
 test-slow: setup ## the long checks: ten million env-steps of contacts, compilers at their slowest
@@ -36,7 +36,8 @@ format: setup ## format all code
 	ruff format
 
 bench: setup ## speed of worlds and learner on this machine, beside their peers; fills docs/performance.md
-	PIP_QUIET=1 maturin develop --release --quiet --extras dev,peers || echo "Without peers: they cannot be installed here."
+	PIP_QUIET=1 maturin develop --release --quiet --locked --extras dev,peers || \
+	{ echo "Without peers: they cannot be installed here."; PIP_QUIET=1 maturin develop --release --quiet --locked --extras dev; }
 	cargo bench --quiet
 	python benches/compare_envs.py
 	python benches/env_cost.py
@@ -54,7 +55,7 @@ $(VENV)/.installed: pyproject.toml
 
 $(VENV)/.built: $(VENV)/.installed $(RUST)
 	@echo "Compiling the worlds."
-	PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --release --quiet --extras dev
+	PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --release --quiet --locked --extras dev
 	@touch $@
 
 docs: setup ## draw the pictures of the documentation

@@ -29,14 +29,16 @@ TINY = {"train.env_steps": 128, "train.num_envs": 4, "train.threads": 1}
     ],
 )
 def test_long_runs_are_compiled(
-    method: str, budget: str, steps: int | None, expected: bool
+    method: str, budget: str, steps: int | None, expected: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("innerattn.train.compilation._problem", lambda _: None)
     overrides = {} if steps is None else {"train.env_steps": steps}
     config = load_run_config(method=method, budget=budget, overrides=overrides)
     assert compiles(config) is expected
 
 
-def test_the_choice_wins(caplog: pytest.LogCaptureFixture) -> None:
+def test_the_choice_wins(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("innerattn.train.compilation._problem", lambda _: None)
     with caplog.at_level(logging.WARNING):
         assert not compiles(load_run_config(budget="paper", overrides={"train.compile": "off"}))
         assert compiles(load_run_config(overrides={"train.compile": "on"}))
