@@ -1,6 +1,19 @@
 """Exceptions that a user of innerattn can catch; each message is one line."""
 
 
+def one_line(error: BaseException) -> str:
+    """What an error says, in one line; of one that lacked memory, first of all that."""
+    text = " ".join(str(error).split())
+    return f"out of memory: {text}" if lacked_memory(error) else text
+
+
+def lacked_memory(error: BaseException) -> bool:
+    """Whether memory was lacking; PyTorch says so by a `RuntimeError`."""
+    if isinstance(error, RuntimeError):
+        return "can't allocate memory" in str(error) or "out of memory" in str(error)
+    return isinstance(error, MemoryError)
+
+
 class InnerattnError(Exception):
     """Base of all errors that innerattn raises on purpose."""
 

@@ -2,7 +2,10 @@
 
 import json
 import math
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -120,3 +123,29 @@ def test_wrong_values(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
         err = capsys.readouterr().err
         assert err.startswith(f"innerattn: error: {message}")
         assert err.count("\n") == 1
+
+
+def test_a_scenario_is_checked_as_it_is_measured(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "late.toml"
+    path.write_text(
+        'faults = [{robot = "food_0", kind = "blackout", value = 1.0, onset_step = 50}]\n'
+    )
+    options = ["evaluate", "random", "--scenario", str(path), *FEW]
+    assert main(options) == 1  # an episode has 25 steps
+    assert "onset_step = 50" in capsys.readouterr().err
+    longer = ["--episode-steps", "60", "--long-episode-steps", "80"]
+    assert main([*options, *longer, "--json", "-"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["episode_steps"], document["long"]["episode_steps"]) == (60, 80)
+
+
+def test_output_that_cannot_be_written_as_it_is_is_written_anyhow() -> None:
+    found = subprocess.run(
+        [sys.executable, "-m", "innerattn", "evaluate", "greedy", *FEW],
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        check=True,
+    )
+    assert b" ? " in found.stdout  # the sign between a mean and its half interval

@@ -4,6 +4,7 @@ import io
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from rich.console import Console
 
 from innerattn.cli.progress import Evaluating, SeveralRuns, Training
@@ -31,6 +32,12 @@ def shown(*, terminal: bool, steps: list[Progress]) -> str:
         for step in steps:
             show(step)
     return out.getvalue()
+
+
+def test_a_terminal_that_draws_no_bar_has_plain_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "dumb")
+    steps = [progress(float(second), 40 * second) for second in range(1, 26)]
+    assert shown(terminal=True, steps=steps) == shown(terminal=False, steps=steps) != ""
 
 
 def test_plain_lines_every_ten_seconds() -> None:

@@ -55,8 +55,8 @@ def test_tables_a_file_and_a_picture(
     ("options", "code", "message"),
     [
         (["--faults", "rust"], 2, "--faults = 'rust': known are all, motor_gain"),
-        (["--episodes", "1"], 2, "--episodes = 1: must be at least 2"),
-        (["--episode-steps", "1"], 2, "--episode-steps = 1: must be at least 2"),
+        (["--episodes", "1"], 2, "--episodes = 1: must be 2 to 1,000,000"),
+        (["--episode-steps", "1"], 2, "--episode-steps = 1: must be 2 to 1,000,000"),
         (["--plot", "map.jpeg"], 1, "must end in .pdf, .png, .svg"),
         (["--json", "nowhere/a.json"], 1, "nowhere: no such folder"),
         (["--json", "/tmp"], 1, "/tmp: is a folder; must be a file"),

@@ -1,16 +1,23 @@
 """`innerattn train`: options become the run's configuration, and a run ends with its evaluation."""
 
 import json
+import os
 import re
+import signal
+import subprocess
+import sys
+import time
 import tomllib
 from pathlib import Path
 
 import pytest
+import torch
 
 from innerattn.cli.main import main
 from innerattn.cli.progress import Training
 from innerattn.config import RunConfig, load_run_config, read_toml
 from innerattn.errors import RunError
+from innerattn.learn import TD
 
 
 def test_a_run_is_complete(run_dir: Path) -> None:
@@ -188,10 +195,10 @@ def test_divergence_is_one_line(
 @pytest.mark.parametrize(
     "options",
     [
-        ["--td.replay-capacity", str(10**15)],
+        ["--td.replay-capacity", str(10**9)],
         [
             *("--warm-start", "hungarian"),
-            *("--imitation.env-steps", str(10**14), "--imitation.memory-env-steps", str(10**14)),
+            *("--imitation.env-steps", str(10**12), "--imitation.memory-env-steps", str(10**9)),
         ],
     ],
 )
@@ -203,6 +210,84 @@ def test_what_memory_cannot_hold_is_one_line(
     err = capsys.readouterr().err
     assert err.startswith("innerattn: error: out of memory: Unable to allocate ")
     assert err.count("\n") == 1
+
+
+def test_what_torch_cannot_hold_is_one_line_too(
+    tiny: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fail(*_: object) -> None:
+        torch.empty(2**58)
+
+    monkeypatch.setattr(TD, "update", fail)
+    assert main(["train", "--run-dir", str(tmp_path / "run"), *tiny]) == 1
+    err = capsys.readouterr().err
+    assert err.startswith("innerattn: error: out of memory: ")
+    assert err.count("\n") == 1
+    monkeypatch.setattr(TD, "update", lambda *_: torch.zeros(2) + torch.zeros(3))
+    with pytest.raises(RuntimeError, match="size of tensor"):  # a fault of ours is shown as one
+        main(["train", "--run-dir", str(tmp_path / "other"), *tiny])
+
+
+@pytest.mark.parametrize(
+    ("option", "most"),
+    [
+        ("td.replay-capacity", 10**9),
+        ("imitation.memory-env-steps", 10**9),
+        ("train.env-steps", 10**15),
+    ],
+)
+def test_counts_beyond_any_machine_are_refused(
+    option: str, most: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run"
+    assert main(["train", "--run-dir", str(path), f"--{option}", str(most + 1)]) == 1
+    err = capsys.readouterr().err
+    assert f"{option.replace('-', '_')} = {most + 1}: must be less than or equal to {most}" in err
+    assert not path.exists()
+
+
+def test_a_run_without_an_update_says_so(
+    tiny: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["train", "--run-dir", str(tmp_path / "run"), *tiny]) == 0
+    assert "nothing was learnt" not in capsys.readouterr().err
+    short = [*tiny, "--train.env-steps", "40"]
+    assert main(["train", "--run-dir", str(tmp_path / "short"), *short]) == 0
+    assert "short: 40 env-steps are too few for one update" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names are not bytes everywhere")
+def test_a_name_that_weights_cannot_have_is_refused_before_training(
+    tiny: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = os.fsdecode(os.fsencode(tmp_path) + b"/run\xff")
+    assert main(["train", "--run-dir", path, *tiny]) == 1
+    assert "is no UTF-8" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_several_runs_need_a_name(tiny: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["train", "--seeds", "0", "--run-dir", "", *tiny]) == 2
+    assert "--run-dir .: must end in a name" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_request_to_end_keeps_the_weights(name: str, tiny: list[str], tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    options = [*tiny, "--train.env-steps", "100000000"]
+    command = [sys.executable, "-m", "innerattn", "train", "--run-dir", str(path), *options]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        while not (path / "metrics.jsonl").exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        process.send_signal(getattr(signal, name))
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert f"what was learnt is kept in {path}" in err.decode()
+    assert json.loads((path / "run.json").read_text())["state"] == "interrupted"
 
 
 def test_existing_folder_is_refused(

@@ -95,8 +95,10 @@ class Evaluate(Command):
             )
 
     def _worlds(self, scenario: Scenario) -> Scenario:
-        worlds = scenario if self.scenario is None else Scenario.from_toml(self.scenario)
-        return worlds.replace(**self._given("situation", "episode_steps"))
+        given = self._given("situation", "episode_steps")
+        if self.scenario is not None:
+            return Scenario.from_toml(self.scenario, **given)
+        return scenario.replace(**given)
 
     def _settings(self, settings: EvaluateConfig) -> EvaluateConfig:
         names = ("episodes", "score_episodes", "long_episodes", "long_episode_steps", "seed")

@@ -1,13 +1,18 @@
 """The command `innerattn`: picks the command, runs it and turns errors into exit codes.
 
-0 done, 1 failed with one line on standard error, 2 wrong usage, 130 interrupted.
+0 done, 1 failed with one line on standard error, 2 wrong usage, 130 interrupted,
+by Ctrl-C or by a signal that asks for the end.
 """
 
 from __future__ import annotations
 
+import io
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Annotated, Any
 
 import tyro
@@ -18,7 +23,7 @@ from innerattn.cli.options import UsageError
 from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
 from innerattn.cli.train import command_type
-from innerattn.errors import InnerattnError
+from innerattn.errors import InnerattnError, lacked_memory, one_line
 
 _DESCRIPTION = "Train teams of unlike robots to rescue together, and measure how they do it."
 
@@ -36,20 +41,40 @@ def main(argv: Sequence[str] | None = None) -> int:
         SystemExit: help was asked for (code 0), or the options are wrong (code 2).
     """
     argv = list(sys.argv[1:] if argv is None else argv)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # better a "?" than no table at all
     try:
-        return int(_parse(argv).run())
+        with _stopped_like_by_hand():
+            return int(_parse(argv).run())
     except KeyboardInterrupt:
         print("innerattn: interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:  # the reader of our output has left, e.g. `innerattn info | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (InnerattnError, OSError, MemoryError) as error:
-        if "--debug" in argv:
+    except (InnerattnError, OSError, MemoryError, RuntimeError) as error:
+        known = not isinstance(error, RuntimeError) or lacked_memory(error)
+        if "--debug" in argv or not known:
             raise
-        what = "out of memory: " if isinstance(error, MemoryError) else ""
-        print(f"innerattn: error: {what}{' '.join(str(error).split())}", file=sys.stderr)
+        print(f"innerattn: error: {one_line(error)}", file=sys.stderr)
         return 2 if isinstance(error, UsageError) else 1
+
+
+@contextmanager
+def _stopped_like_by_hand() -> Iterator[None]:
+    """Let a request to end, and the end of the terminal, do what Ctrl-C does: save and leave."""
+    signals = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    changed = []
+    if threading.current_thread() is threading.main_thread():
+        changed = [one for one in signals if signal.getsignal(one) == signal.SIG_DFL]
+    for one in changed:
+        signal.signal(one, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for one in changed:
+            signal.signal(one, signal.SIG_DFL)
 
 
 def _parse(argv: list[str]) -> Any:

@@ -41,15 +41,19 @@ class Command:
 
 
 def check_target(path: Path) -> None:
-    """Refuse in time what no file can be written to.
+    """Refuse in time what no file can be written to; - is standard output.
 
     Raises:
         RunError: it is something else than a file, such as a link, or lies in no folder.
     """
+    if path == Path("-"):
+        return
     if not path.parent.is_dir():
         raise RunError(f"{path.parent}: no such folder")
     if path.is_dir():
         raise RunError(f"{path}: is a folder; must be a file")
+    if not os.access(path.parent, os.W_OK):
+        raise RunError(f"{path.parent}: nothing can be written there")
     if os.path.lexists(path) and (path.is_symlink() or not path.is_file()):
         raise RunError(f"{path}: is no plain file, and would be replaced; - is standard output")
 

@@ -33,7 +33,7 @@ class Work:
         self._clock = clock
         self._start = self._last_line = clock()
         self._bar: Progress | None = None
-        if self._console.is_terminal:
+        if self._console.is_terminal and not self._console.is_dumb_terminal:
             self._bar = Progress(
                 BarColumn(bar_width=16),
                 TextColumn("{task.description}"),  # two lines, so that 80 columns hold them

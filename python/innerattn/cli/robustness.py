@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from innerattn.evaluate.trained import TrainedPolicy
 
 _SCRIPTED = ("greedy", "hungarian", "oracle")
+_MOST = 1_000_000  # episodes, and steps of one
 
 
 @dataclass(kw_only=True)
@@ -99,9 +100,9 @@ class Robustness(Command):
                 raise UsageError(f"RUN = {self.runs[index]}: is given twice")
         for name, least in (("episodes", 2), ("episode_steps", 2)):
             value = getattr(self, name)
-            if value is not None and value < least:
+            if value is not None and not least <= value <= _MOST:
                 flag = name.replace("_", "-")
-                raise UsageError(f"--{flag} = {value}: must be at least {least}")
+                raise UsageError(f"--{flag} = {value}: must be {least} to {_MOST:,}")
         for path in (self.json, self.plot):
             if path is not None:
                 check_target(path)

@@ -113,12 +113,13 @@ class _Train(_Sources):
         try:
             with Training() as progress:
                 train(config, run_dir, progress=progress)
+            with Evaluating() as progress:
+                evaluation = evaluate_run(run_dir, progress=progress)
         except KeyboardInterrupt:
             _say_what_is_kept([run_dir])
             raise
-        with Evaluating() as progress:
-            evaluation = evaluate_run(run_dir, progress=progress)
         evaluation.write(run_dir / "evaluation")
+        _say_if_nothing_was_learnt([run_dir])
         print_summary(console, evaluation.summary, config.scenario)
         console.print(f"Measure it again with: innerattn evaluate {run_dir}", soft_wrap=True)
         return 0
@@ -139,6 +140,7 @@ class _Train(_Sources):
         except KeyboardInterrupt:
             _say_what_is_kept([run.folder for run in runs])
             raise
+        _say_if_nothing_was_learnt([run.folder for run in runs if run.state == "done"])
         print_seeds(console, {run.config.train.seed: run.summary for run in runs})
         console.print("Run folders", style="bold")
         for run in runs:
@@ -148,6 +150,8 @@ class _Train(_Sources):
     def _folder_of_seed(self, config: RunConfig, stamp: str) -> Path:
         if self.run_dir is None:
             return self._new_run_dir(config, stamp)
+        if not self.run_dir.name:
+            raise UsageError(f"--run-dir {self.run_dir}: must end in a name")
         return Path(f"{self.run_dir}-s{config.train.seed}")
 
     def _new_run_dir(self, config: RunConfig, stamp: str) -> Path:
@@ -179,6 +183,19 @@ def _say_what_is_kept(folders: Sequence[Path]) -> None:
     for folder in folders:
         if (folder / "checkpoints" / "latest").exists():
             print(f"innerattn: what was learnt is kept in {folder}", file=sys.stderr)
+
+
+def _say_if_nothing_was_learnt(folders: Sequence[Path]) -> None:
+    from innerattn.train import read_info
+
+    for folder in folders:
+        info = read_info(folder)
+        if not info.updates:
+            print(
+                f"innerattn: warning: {folder}: {info.env_steps:,} env-steps are too few for one "
+                "update; nothing was learnt from rewards",
+                file=sys.stderr,
+            )
 
 
 def command_type(argv: Sequence[str]) -> Any:

@@ -20,6 +20,11 @@ from innerattn.errors import ConfigError
 BUDGETS = preset_names("budgets")
 """Names of the built-in budgets: how long to train, and with which numbers."""
 
+MOST_ROWS = 1_000_000_000
+"""Of anything that is held in memory: far beyond what any machine holds."""
+MOST_STEPS = 1_000_000_000_000_000
+"""Of anything that is counted in steps."""
+
 Method = Literal["td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo"]
 Attention = Literal["inner", "uniform", "none"]
 WarmStart = Literal["none", "hungarian", "greedy"]
@@ -110,14 +115,22 @@ class TDConfig(Model):
         le=1.0,
         description="share of the step size left at the end of training; it falls evenly",
     )
-    batch_size: int = Field(256, ge=1, description="transitions per update")
+    batch_size: int = Field(256, ge=1, le=MOST_ROWS, description="transitions per update")
     update_every_env_steps: int = Field(
-        50, ge=1, description="one update per so many steps, all worlds counted [env-steps]"
+        50,
+        ge=1,
+        le=MOST_STEPS,
+        description="one update per so many steps, all worlds counted [env-steps]",
     )
     warmup_env_steps: int = Field(
-        1_000, ge=0, description="steps collected before the first update [env-steps]"
+        1_000,
+        ge=0,
+        le=MOST_STEPS,
+        description="steps collected before the first update [env-steps]",
     )
-    replay_capacity: int = Field(200_000, ge=1, description="size of the replay memory")
+    replay_capacity: int = Field(
+        200_000, ge=1, le=MOST_ROWS, description="size of the replay memory"
+    )
     attention_logit_penalty: float = Field(
         0.0, ge=0.0, description="weight of the squared attention logits in the critic's loss"
     )
@@ -163,10 +176,10 @@ class PPOConfig(Model):
         description="share of the step size left at the end of training; it falls evenly",
     )
     rollout_steps: int = Field(
-        25, ge=1, description="control steps of every world between updates [steps]"
+        25, ge=1, le=MOST_ROWS, description="control steps of every world between updates [steps]"
     )
-    epochs: int = Field(5, ge=1, description="passes over a rollout")
-    minibatch_size: int = Field(400, ge=1, description="rows of a rollout per update")
+    epochs: int = Field(5, ge=1, le=1_000, description="passes over a rollout")
+    minibatch_size: int = Field(400, ge=1, le=MOST_ROWS, description="rows of a rollout per update")
     clip: float = Field(0.2, gt=0.0, lt=1.0, description="how far a probability ratio counts")
     value_clip: float | None = Field(
         None, gt=0.0, description="how far a value may move per rollout; None: freely"
@@ -197,14 +210,22 @@ class ImitationConfig(Model):
     place: ClassVar[str] = "imitation"
 
     env_steps: int = Field(
-        750_000, ge=1, description="length of imitation, all worlds counted [env-steps]"
+        750_000,
+        ge=1,
+        le=MOST_STEPS,
+        description="length of imitation, all worlds counted [env-steps]",
     )
     critic_env_steps: int = Field(
-        100_000, ge=0, description="last part of it in which the critic learns too [env-steps]"
+        100_000,
+        ge=0,
+        le=MOST_STEPS,
+        description="last part of it in which the critic learns too [env-steps]",
     )
-    batch_size: int = Field(1_024, ge=1, description="labelled states per step of the actors")
+    batch_size: int = Field(
+        1_024, ge=1, le=MOST_ROWS, description="labelled states per step of the actors"
+    )
     update_every_env_steps: int = Field(
-        256, ge=1, description="one step of the actors per so many steps [env-steps]"
+        256, ge=1, le=MOST_STEPS, description="one step of the actors per so many steps [env-steps]"
     )
     learning_rate: float = Field(0.002, gt=0.0, le=1.0, description="step size of Adam")
     final_learning_rate_share: float = Field(
@@ -214,7 +235,10 @@ class ImitationConfig(Model):
         description="share of the step size left at the end of imitation; it falls evenly",
     )
     memory_env_steps: int = Field(
-        500_000, ge=1, description="newest labelled states that batches are drawn from [env-steps]"
+        500_000,
+        ge=1,
+        le=MOST_ROWS,
+        description="newest labelled states that batches are drawn from [env-steps]",
     )
 
 
@@ -240,10 +264,13 @@ class TrainConfig(Model):
     )
     num_envs: int = Field(64, ge=1, le=1_000_000, description="worlds stepped side by side")
     env_steps: int = Field(
-        150_000, ge=1, description="length of learning from rewards, all worlds counted [env-steps]"
+        150_000,
+        ge=1,
+        le=MOST_STEPS,
+        description="length of learning from rewards, all worlds counted [env-steps]",
     )
     log_every_env_steps: int = Field(
-        5_000, ge=1, description="one line of metrics per so many steps [env-steps]"
+        5_000, ge=1, le=MOST_STEPS, description="one line of metrics per so many steps [env-steps]"
     )
 
 
@@ -256,9 +283,9 @@ class EvaluateConfig(Model):
         80, ge=1, le=1_000_000, description="episodes that cooperation is counted over"
     )
     score_episodes: int = Field(
-        1_000, ge=1, le=1_000_000, description="episodes that rescues are averaged over"
+        1_000, ge=2, le=1_000_000, description="episodes that rescues are averaged over"
     )
-    long_episodes: int = Field(200, ge=1, le=1_000_000, description="episodes of the second length")
+    long_episodes: int = Field(200, ge=2, le=1_000_000, description="episodes of the second length")
     long_episode_steps: int = Field(
         100, ge=1, le=100_000, description="second episode length [control steps]"
     )

@@ -180,8 +180,12 @@ class Scenario(Model):
         return cls.model_validate(preset_table("scenarios", name))
 
     @classmethod
-    def from_toml(cls, path: str | Path) -> Scenario:
+    def from_toml(cls, path: str | Path, **fields: object) -> Scenario:
         """The scenario in a TOML file whose keys are this model's fields.
+
+        Args:
+            path: the file.
+            **fields: values that win over the file's.
 
         Raises:
             ConfigError: the file cannot be read, is not TOML, or describes no valid scenario.
@@ -192,7 +196,7 @@ class Scenario(Model):
                 f"{path}: configures a run; a scenario's file has the keys of [scenario]"
             )
         try:
-            return cls.model_validate(table)
+            return cls.model_validate(table | fields)
         except ValidationError as error:
             raise config_error(error, "scenario", str(path)) from error
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from innerattn.config import RunConfig
-from innerattn.errors import InnerattnError
+from innerattn.errors import InnerattnError, lacked_memory, one_line
 
 if TYPE_CHECKING:
     from innerattn.evaluate import Summary
@@ -206,10 +206,12 @@ def work(
         pipe.send(evaluation.summary)
     except KeyboardInterrupt:
         return
-    except (InnerattnError, OSError) as error:
-        with suppress(BrokenPipeError):  # nobody listens any more
-            pipe.send(" ".join(str(error).split()))
-        if debug:
+    except (InnerattnError, OSError, MemoryError, RuntimeError) as error:
+        known = not isinstance(error, RuntimeError) or lacked_memory(error)
+        if known:
+            with suppress(BrokenPipeError):  # nobody listens any more
+                pipe.send(one_line(error))
+        if debug or not known:
             raise
 
 

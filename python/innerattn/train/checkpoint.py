@@ -149,11 +149,16 @@ class RunFolder:
 
 
 def refuse_existing(path: Path) -> None:
-    """Let no run overwrite anything.
+    """Let no run overwrite anything, nor lie where its weights cannot be read.
 
     Raises:
-        RunError: something is at ``path``.
+        RunError: something is at ``path``, or its name is no UTF-8.
     """
+    try:
+        str(path.absolute()).encode()
+    except UnicodeEncodeError as error:
+        name = ascii(str(path.absolute()))
+        raise RunError(f"{name}: is no UTF-8; safetensors needs a path that is") from error
     if os.path.lexists(path):
         raise RunError(f"{path}: exists already; choose another run folder or remove it")
 
