@@ -130,9 +130,8 @@ def apart(kind: str, name: str, num_envs: int = 1) -> dict[str, float] | None:
     command = [sys.executable, __file__, kind, name, str(num_envs)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
-        print(
-            f"{name}, {kind}, {num_envs}: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr
-        )
+        why = [f"its process ended with code {done.returncode}", *done.stderr.strip().splitlines()]
+        print(f"{name}, {kind}, {num_envs}: {why[-1]}", file=sys.stderr)
         return None
     result: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
     return result
