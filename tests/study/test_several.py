@@ -104,7 +104,9 @@ def test_runs_are_those_of_single_commands_and_a_failure_leaves_them_alone(
     assert f"  {path}-s5 (done)\n  {path}-s1 (failed)\n  {path}-s3 (done)\n" in out
 
 
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_ctrl_c_saves_every_run_and_leaves_no_process(
+    sent: signal.Signals,
     tiny: list[str],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -114,7 +116,7 @@ def test_ctrl_c_saves_every_run_and_leaves_no_process(
     def press_ctrl_c(runs: Sequence[Run]) -> None:
         """As a terminal sends it: to every process, too early for some to hear it well."""
         for process in processes():
-            os.kill(process.pid or 0, signal.SIGINT)
+            os.kill(process.pid or 0, sent)
         if all(run.share > 0.0 for run in runs[:2]):
             raise KeyboardInterrupt
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from innerattn.train import Progress
 
 _SPAWN = get_context("spawn")
+_FOR_THE_FIRST = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+"""Signals that only the first process minds; the others learn of the end from it."""
 _TRAINING = 0.95
 """Part of a run that is training; the rest is evaluation."""
 _REPORT_EVERY_S = 0.2
@@ -127,7 +129,7 @@ def _start(
     run: Run, running: dict[Connection, tuple[Run, BaseProcess]], debug: bool, keep: object
 ) -> None:
     """Start a process that Ctrl-C does not reach: what a terminal sends, it sends to all."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # handed down to the process
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _FOR_THE_FIRST)  # handed down to the process
     try:
         pipe, its_end = _SPAWN.Pipe()
         arguments = (run.config, run.folder, its_end, debug, keep, run.trained)
