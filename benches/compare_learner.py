@@ -109,7 +109,7 @@ def pace_and_start_s(compiled: str, threads: int) -> tuple[float, float]:
         command = [sys.executable, "-m", "innerattn", "train", "--budget", "paper", "--seed", "0"]
         command += ["--train.env-steps", str(25 * MEASURED_UPDATES), "--compile", compiled]
         command += ["--train.threads", str(threads), "--train.log-every-env-steps", "2500"]
-        command += ["--evaluate.score-episodes", "1", "--evaluate.long-episodes", "1"]
+        command += ["--evaluate.score-episodes", "2", "--evaluate.long-episodes", "2"]
         subprocess.run([*command, "--run-dir", str(run)], check=True, capture_output=True)
         lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     first, last = lines[0], lines[-1]

@@ -32,7 +32,7 @@ def test_two_robots_learn_to_rescue(method: str, tmp_path: Path) -> None:
         }
     )
     _, policy = load_trained(train(config, tmp_path / "run"))
-    settings = EvaluateConfig(episodes=1, score_episodes=400, long_episodes=1)
+    settings = EvaluateConfig(episodes=1, score_episodes=400, long_episodes=2)
     found = evaluate_policy(policy, scenario, settings, num_threads=1).summary.to_json()
     random = found["scripted"]["random"]["high"]
     assert found["rescues_per_episode"]["low"] > 1.0 > 5 * random
