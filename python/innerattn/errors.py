@@ -18,6 +18,11 @@ class InnerattnError(Exception):
     """Base of all errors that innerattn raises on purpose."""
 
 
+def needs_no_traceback(error: Exception) -> bool:
+    """Whether one line says all about an error: ours, a file's, or a lack of memory."""
+    return isinstance(error, InnerattnError | OSError) or lacked_memory(error)
+
+
 class ConfigError(InnerattnError, ValueError):
     """A configuration, preset or scenario is not valid; the message names the key."""
 

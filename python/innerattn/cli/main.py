@@ -23,7 +23,7 @@ from innerattn.cli.options import UsageError
 from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
 from innerattn.cli.train import command_type
-from innerattn.errors import InnerattnError, lacked_memory, one_line
+from innerattn.errors import needs_no_traceback, one_line
 
 _DESCRIPTION = "Train teams of unlike robots to rescue together, and measure how they do it."
 
@@ -53,9 +53,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has left, e.g. `innerattn info | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (InnerattnError, OSError, MemoryError, RuntimeError) as error:
-        known = not isinstance(error, RuntimeError) or lacked_memory(error)
-        if "--debug" in argv or not known:
+    except Exception as error:
+        if "--debug" in argv or not needs_no_traceback(error):
             raise
         print(f"innerattn: error: {one_line(error)}", file=sys.stderr)
         return 2 if isinstance(error, UsageError) else 1

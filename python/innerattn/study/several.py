@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from innerattn.config import RunConfig
-from innerattn.errors import InnerattnError, lacked_memory, one_line
+from innerattn.errors import needs_no_traceback, one_line
 
 if TYPE_CHECKING:
     from innerattn.evaluate import Summary
@@ -208,12 +208,12 @@ def work(
         pipe.send(evaluation.summary)
     except KeyboardInterrupt:
         return
-    except (InnerattnError, OSError, MemoryError, RuntimeError) as error:
-        known = not isinstance(error, RuntimeError) or lacked_memory(error)
-        if known:
+    except Exception as error:
+        told = needs_no_traceback(error)
+        if told:
             with suppress(BrokenPipeError):  # nobody listens any more
                 pipe.send(one_line(error))
-        if debug or not known:
+        if debug or not told:
             raise
 
 
