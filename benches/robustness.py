@@ -1,8 +1,8 @@
 """Robustness over seeds and methods: what is kept under faults, bounds, attention, redundancy.
 
-`python benches/robustness.py RUNS` trains every missing run (one core each), measures it with
-`innerattn robustness`, keeps the documents in RUNS, and fills the tables of `docs/robustness.md`.
-A second call goes on where the first stopped.
+`python benches/robustness.py RUNS` trains every missing run, measures them with
+`innerattn robustness` (one core each, side by side), keeps the documents in RUNS, and fills the
+tables of `docs/robustness.md`. A second call goes on where the first stopped.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import statistics
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -89,9 +90,7 @@ def deployment(documents: Sequence[Document]) -> str:
     names = (*METHODS, *SCRIPTED)
 
     def cell(kind: str, column: int) -> str:
-        if column < len(METHODS):
-            return of_runs([by_kind(one, column, kind) for one in documents])
-        return within_run(by_kind(documents[0], column, kind))
+        return of_runs([by_kind(one, column, kind) for one in documents])
 
     def difference(kind: str, column: int) -> str:
         inner, uniform = 2 * column, 2 * column + 1
@@ -103,11 +102,10 @@ def deployment(documents: Sequence[Document]) -> str:
         )
 
     rescues = [
-        [one["policies"][c]["rescues_per_episode"] for one in documents] for c in range(len(names))
+        of_runs([one["policies"][column]["rescues_per_episode"] for one in documents])
+        for column in range(len(names))
     ]
-    scripts = [within_run(one[0]) for one in rescues[len(METHODS) :]]
-    trained = [of_runs(one) for one in rescues[: len(METHODS)]]
-    clean = table(["", *names], [["rescues", *trained, *scripts]])
+    clean = table(["", *names], [["rescues", *rescues]])
     heads = ["inner - uniform", "td", "ppo"]
     return "\n\n".join(
         [kinds_table(["kept", *names], kinds, cell), clean, kinds_table(heads, kinds, difference)]
@@ -268,34 +266,40 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     given = parser.parse_args()
 
-    def trained(*wanted: Run) -> list[Path]:
-        return train_all(wanted, given.runs, given.workers)
+    plain = {
+        seed: [Run("mixed", method, "short", seed) for method in METHODS] for seed in given.seeds
+    }
+    with_faults = {
+        seed: [
+            Run("mixed-faults", "td-inner", "short", seed),
+            Run("mixed-faults", "td-inner", "short", seed, options=MASKED),
+            Run("mixed", "td-inner", "short", seed),
+        ]
+        for seed in given.seeds
+    }
+    teams = {preset: [Run(preset, "td-inner", "quick", 0)] for preset in TEAMS}
+    documents = [*plain.values(), *with_faults.values(), *teams.values()]
+    every_run = dict.fromkeys(run for runs in documents for run in runs)
+    train_all(list(every_run), given.runs, given.workers)
 
-    of_seed = []
-    for seed in given.seeds:
-        folders = trained(*(Run("mixed", method, "short", seed) for method in METHODS))
-        of_seed.append(measured(folders, f"mixed-s{seed}"))
+    def measure(runs: Sequence[Run], name: str, *options: str) -> Future[Document]:
+        return side_by_side.submit(measured, [given.runs / r.name for r in runs], name, *options)
+
+    lost = ("--faults", "unavailable", "--episodes", "200")
+    with ThreadPoolExecutor(given.workers) as side_by_side:
+        plainly = [measure(runs, f"mixed-s{seed}") for seed, runs in plain.items()]
+        faulty = [
+            measure(runs, f"trained-with-faults-s{seed}") for seed, runs in with_faults.items()
+        ]
+        each = {preset: measure(runs, f"team-{preset}", *lost) for preset, runs in teams.items()}
+
+    of_seed = [one.result() for one in plainly]
     publish("deployment", f"{machine('torch')}.\n\n{deployment(of_seed)}", ROBUSTNESS)
     publish("recovery", recovery(of_seed), ROBUSTNESS)
     publish("bounds", bounds(of_seed), ROBUSTNESS)
     publish("attention", attention(of_seed), ROBUSTNESS)
-
-    with_faults = []
-    for seed in given.seeds:
-        folders = trained(
-            Run("mixed-faults", "td-inner", "short", seed),
-            Run("mixed-faults", "td-inner", "short", seed, options=MASKED),
-            Run("mixed", "td-inner", "short", seed),
-        )
-        with_faults.append(measured(folders, f"trained-with-faults-s{seed}"))
-    publish("training", training(with_faults), ROBUSTNESS)
-
-    teams = {}
-    for preset in TEAMS:
-        folders = trained(Run(preset, "td-inner", "quick", 0))
-        options = ("--faults", "unavailable", "--episodes", "200")
-        teams[preset] = measured(folders, f"team-{preset}", *options)
-    publish("redundancy", redundancy(teams), ROBUSTNESS)
+    publish("training", training([one.result() for one in faulty]), ROBUSTNESS)
+    publish("redundancy", redundancy({k: one.result() for k, one in each.items()}), ROBUSTNESS)
 
 
 if __name__ == "__main__":
