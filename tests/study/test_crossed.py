@@ -310,7 +310,9 @@ def test_files_are_the_same_twice_and_name_every_run(
     document = json.loads(before["crossed.json"])
     (situation,) = document["situations"]
     assert len(situation["runs"]) == len(runs) == 18
+    assert "smoke run" in document["note"]
     rows = list(csv.DictReader(before["crossed.csv"].decode().splitlines()))
+    assert {row["note"] for row in rows} == {document["note"]}
     by_folder = {f"runs/{run.folder.name}": run.case for run in runs}
     scores = set()
     for row, of_json in zip(rows, situation["runs"], strict=True):
@@ -326,6 +328,8 @@ def test_files_are_the_same_twice_and_name_every_run(
         scores.add((expected.score, expected.entropy_share))
     assert len(scores) == 18  # else runs could be taken for one another
     write_crossed(runs, out, "short")
+    for name in names:
+        assert (out / name).read_bytes() != before[name], name
     text = (out / "crossed.md").read_text()
     assert "smoke" not in text
     assert "Not in any" not in text

@@ -11,7 +11,7 @@ from innerattn.cli.main import main
 from innerattn.config import BUDGETS, RunConfig
 from innerattn.errors import ConfigError, RunError
 from innerattn.study.crossed.arms import plan_crossed
-from innerattn.study.plan import METHODS, SITUATIONS, TARGETS, Case, PlannedRun, plan, smoke_note
+from innerattn.study.plan import METHODS, SITUATIONS, TARGETS, Case, PlannedRun, plan
 
 OUT = Path("study")
 
@@ -78,8 +78,3 @@ def test_unknown_names_are_refused() -> None:
         plan(METHODS, ("triple",), (0,), "quick", OUT)
     with pytest.raises(ConfigError, match="'long': known are paper, quick, short"):
         plan(METHODS, SITUATIONS, (0,), "long", OUT)
-
-
-def test_quick_is_no_result() -> None:
-    assert "no result" in (smoke_note("quick") or "")
-    assert smoke_note("short") is smoke_note("paper") is None

@@ -1,5 +1,6 @@
 """The whole report on made runs: its files, the same bytes twice, and what it says."""
 
+import csv
 import json
 import shutil
 from dataclasses import replace
@@ -11,6 +12,7 @@ from innerattn.config import read_toml
 from innerattn.errors import RunError
 from innerattn.study.report import write_report
 from innerattn.study.run import StudyRun, read_configs
+from innerattn.study.smoke import smoke_note
 from innerattn.train.weights import digest_of
 
 FIGURES = ("fig4", "fig5", "fig5_evidence")
@@ -45,7 +47,6 @@ def test_the_report_opens_with_claims_and_ends_with_the_runs(
     runs: list[StudyRun], folder: Path
 ) -> None:
     text = (folder / "report.md").read_text()
-    assert "**This is a smoke run.**" in text
     assert text.index("| claim |") < text.index("## Table II") < text.index("## Fig. 4")
     mixed, others = text.split("## The same in the other situations")
     assert "| even sharing with inner attention | mixed | td-inner |" in mixed
@@ -56,7 +57,28 @@ def test_the_report_opens_with_claims_and_ends_with_the_runs(
         assert f"`{digest_of(run.folder / 'checkpoints/0/weights.safetensors')}`" in text
     for name in FIGURES:
         assert f"({name}.png)" in text
-    assert (folder / "table2.md").read_text() in text
+    assert (folder / "table2.md").read_text().split("\n\n", 1)[1] in text  # but for the note
+
+
+def test_every_file_of_a_smoke_run_says_so(
+    runs: list[StudyRun], folder: Path, tmp_path: Path
+) -> None:
+    write_report(runs, tmp_path, "short")
+    note = smoke_note("quick") or ""
+    for name in FILES:
+        smoke, other = (of / name for of in (folder, tmp_path))
+        if smoke.suffix in (".pdf", ".png"):
+            assert smoke.read_bytes() != other.read_bytes()
+            continue
+        assert note[1:] in smoke.read_text(), name
+        assert "smoke" not in other.read_text(), name
+    assert {row[-1] for row in _rows(folder / "table2.csv")[1:]} == {note}
+    for name in ("table2.csv", "fig4.csv"):
+        assert [row[:-1] for row in _rows(folder / name)] == _rows(tmp_path / name)
+
+
+def _rows(path: Path) -> list[list[str]]:
+    return list(csv.reader(path.read_text().splitlines()))
 
 
 def test_runs_within_the_study_are_named_from_there(runs: list[StudyRun], tmp_path: Path) -> None:

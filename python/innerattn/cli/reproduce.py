@@ -18,7 +18,8 @@ from innerattn.cli.reproduce_tables import print_scores
 from innerattn.config import BUDGETS
 from innerattn.study.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
 from innerattn.study.crossed.arms import plan_crossed
-from innerattn.study.plan import SITUATIONS, TARGETS, PlannedRun, plan, smoke_note
+from innerattn.study.plan import SITUATIONS, TARGETS, PlannedRun, plan
+from innerattn.study.smoke import smoke_note
 
 if TYPE_CHECKING:
     from innerattn.study.inventory import Found

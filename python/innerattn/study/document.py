@@ -10,9 +10,9 @@ from typing import Any
 
 from innerattn.config.files import write_whole
 from innerattn.study.inventory import Found
-from innerattn.study.plan import smoke_note
 from innerattn.study.run import digests
 from innerattn.study.scores import read_scores
+from innerattn.study.smoke import smoke_note
 from innerattn.train import read_info
 
 SCHEMA_VERSION = 1

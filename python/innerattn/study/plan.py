@@ -117,10 +117,3 @@ def of_seed(seed: int) -> dict[str, object]:
         "train.threads": 1,
         "evaluate.seed": EvaluateConfig().seed + seed,
     }
-
-
-def smoke_note(budget: str) -> str | None:
-    """What every output of a study says whose runs are too short to mean anything; none else."""
-    if budget != "quick":
-        return None
-    return "budget quick: a smoke run, no result; its runs are too short to compare methods"

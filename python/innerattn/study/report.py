@@ -24,6 +24,7 @@ from innerattn.study.run import (
     read_measured,
 )
 from innerattn.study.scene import choose_scene, scene_json
+from innerattn.study.smoke import mark_figure, noted_csv, noted_markdown, smoke_note
 from innerattn.study.table2 import PRINTED_SITUATION, table2
 from innerattn.study.table2_text import table2_csv, table2_markdown
 
@@ -51,8 +52,8 @@ def write_report(
     Args:
         runs: finished runs with evaluations; they are read only.
         folder: where to write.
-        budget: name of the budget they were trained with; with "quick" the report says that it is a
-            smoke run.
+        budget: name of the budget they were trained with; with "quick" every file says that this is
+            a smoke run.
         parts: which of `PARTS`.
         left_out: what is said of runs that were planned and are not among ``runs``.
 
@@ -95,7 +96,8 @@ def write_report(
     )
     folder.mkdir(parents=True, exist_ok=True)
     _write_parts(findings, folder)
-    write_whole(folder / "report.md", report_markdown(findings).encode())
+    text = noted_markdown(report_markdown(findings), budget)
+    write_whole(folder / "report.md", text.encode())
     return findings
 
 
@@ -111,35 +113,41 @@ def _scene(groups: Sequence[Sequence[Measured]]) -> HandoverScene | None:
 
 
 def _write_parts(findings: Findings, folder: Path) -> None:
+    budget = findings.budget
     if findings.table is not None:
-        _write_json(folder / "table2.json", findings.table.to_json())
-        write_whole(folder / "table2.md", table2_markdown(findings.table).encode())
-        write_whole(folder / "table2.csv", table2_csv(findings.table).encode())
+        _write_json(folder / "table2.json", findings.table.to_json(), budget)
+        text = noted_markdown(table2_markdown(findings.table), budget)
+        write_whole(folder / "table2.md", text.encode())
+        lines = noted_csv(table2_csv(findings.table), budget)
+        write_whole(folder / "table2.csv", lines.encode())
     if findings.courses is not None:
-        _write_json(folder / "fig4.json", fig4_json(findings.courses))
-        write_whole(folder / "fig4.csv", fig4_csv(findings.courses).encode())
-        lines = fig4_lines(findings.courses)
-        _draw(folder, "fig4", draw_entropy(lines, PRINTED_NATS) if lines else None)
+        _write_json(folder / "fig4.json", fig4_json(findings.courses), budget)
+        write_whole(folder / "fig4.csv", noted_csv(fig4_csv(findings.courses), budget).encode())
+        courses = fig4_lines(findings.courses)
+        _draw(folder / "fig4", draw_entropy(courses, PRINTED_NATS) if courses else None, budget)
     if findings.evidence is not None:
-        _write_json(folder / "fig5_evidence.json", evidence_json(findings.evidence))
+        _write_json(folder / "fig5_evidence.json", evidence_json(findings.evidence), budget)
         drawn = draw_aligned(evidence_lines(findings.evidence)) if findings.evidence else None
-        _draw(folder, "fig5_evidence", drawn)
+        _draw(folder / "fig5_evidence", drawn, budget)
         if findings.scene is not None:
-            _write_json(folder / "fig5.json", scene_json(findings.scene))
+            _write_json(folder / "fig5.json", scene_json(findings.scene), budget)
         else:
             (folder / "fig5.json").unlink(missing_ok=True)
-        _draw(folder, "fig5", draw_handover(findings.scene) if findings.scene else None)
+        _draw(folder / "fig5", draw_handover(findings.scene) if findings.scene else None, budget)
 
 
-def _write_json(path: Path, document: dict[str, Any]) -> None:
-    write_whole(path, f"{json.dumps(document, allow_nan=False)}\n".encode())
+def _write_json(path: Path, document: dict[str, Any], budget: str) -> None:
+    noted = {"note": smoke_note(budget), **document}
+    write_whole(path, f"{json.dumps(noted, allow_nan=False)}\n".encode())
 
 
-def _draw(folder: Path, name: str, figure: Figure | None) -> None:
+def _draw(path: Path, figure: Figure | None, budget: str) -> None:
     """Write a figure, or remove that of other runs where there is none."""
+    if figure is not None:
+        mark_figure(figure, budget)
     for suffix in (".pdf", ".png"):
-        path = folder / f"{name}{suffix}"
+        drawn = path.with_suffix(suffix)
         if figure is None:
-            path.unlink(missing_ok=True)
+            drawn.unlink(missing_ok=True)
         else:
-            write_figure(path, figure)
+            write_figure(drawn, figure)

@@ -77,14 +77,8 @@ def report_markdown(findings: Findings) -> str:
 
 
 def _opening(findings: Findings) -> str:
-    text = ""
-    if findings.budget == "quick":
-        text = (
-            "> **This is a smoke run.** The budget `quick` shows that everything works; robots "
-            "have learnt far too little for any of these figures to mean something.\n\n"
-        )
     seeds = sorted({run.seed for run in findings.runs})
-    return text + (
+    return (
         f"{len(findings.runs)} runs, budget `{findings.budget}`, training seeds "
         f"{', '.join(map(str, seeds))}. A situation, method and seed name one run; all are listed "
         "at the end with their folders and digests. The paper does not say which situation its "

@@ -19,8 +19,8 @@ from innerattn.study.crossed.effects import MARGINS, Effect, effects
 from innerattn.study.crossed.outcome import IDLE, OUTCOMES, Outcome, outcome_of
 from innerattn.study.inventory import FinishedRun
 from innerattn.study.over_runs import OverRuns, over_runs
-from innerattn.study.plan import smoke_note
 from innerattn.study.run import Digests, StudyRun, digests, named_from, read_measured
+from innerattn.study.smoke import mark_figure, noted_csv, noted_markdown, smoke_note
 from innerattn.study.table2_text import NONE, fixed, markdown_table, p_shown, shown
 
 SCHEMA_VERSION = 1
@@ -100,9 +100,10 @@ def write_crossed(
     }
     text = json.dumps(document, indent=1, allow_nan=False)
     write_whole(out / "crossed.json", f"{text}\n".encode())
-    write_whole(out / "crossed.csv", _csv(situations).encode())
-    write_whole(out / "crossed.md", _markdown(situations, out, budget, left_out).encode())
-    figure = draw_arms([_panels(situation) for situation in situations])
+    write_whole(out / "crossed.csv", noted_csv(_csv(situations), budget).encode())
+    report = _markdown(situations, out, budget, left_out)
+    write_whole(out / "crossed.md", noted_markdown(report, budget).encode())
+    figure = mark_figure(draw_arms([_panels(situation) for situation in situations]), budget)
     for suffix in (".pdf", ".png"):
         write_figure(out / f"crossed{suffix}", figure)
     return situations
@@ -138,14 +139,12 @@ def _run(run: FinishedRun) -> CrossedRun:
 def _markdown(
     situations: Sequence[Situation], out: Path, budget: str, left_out: Sequence[str]
 ) -> str:
-    note = smoke_note(budget)
     seeds = sorted({run.seed for situation in situations for run in situation.runs})
     count = sum(len(situation.runs) for situation in situations)
     missing = ["**Not in any figure below:**\n", *(f"- {one}" for one in left_out), ""]
     said = [answer for situation in situations for answer in situation.answers]
     parts = [
         "# Does attention cause even sharing?\n",
-        *([f"> **{note[:1].upper()}{note[1:]}.**\n"] if note else []),
         f"{count} runs, budget `{budget}`, training seeds {', '.join(map(str, seeds))}: attention "
         "(inner, uniform), rescue credit (helpers, team) and the penalty of attention logits are "
         "crossed, in worlds of their own credit. With uniform weights there are no logits, so one "
