@@ -1,9 +1,9 @@
 """Puts what `innerattn reproduce` made into the documentation: text, pictures, records of runs.
 
-`python benches/reproduction.py STUDY` fills the place of STUDY's newest report: of budget `short`
+`python benches/reproduction.py STUDY` fills the places of STUDY's newest report: of budget `short`
 in `docs/reproduction.md`, of budget `paper` in `docs/paper_protocol.md`, and of the crossed design
-in `docs/crossed.md`. Small copies of its runs go to the page's folder in `docs/records`. It makes
-no figure.
+in `docs/crossed.md`. A page opens with the table of claims; the rest stands below. Small copies of
+its runs go to the page's folder in `docs/records`. It makes no figure.
 """
 
 from __future__ import annotations
@@ -52,7 +52,9 @@ def main() -> None:
         _keep_runs(account["runs"], study, DOCS / "records" / page.stem)
     except InnerattnError as error:
         sys.exit(str(error))
-    publish("report", _with_pictures(study / name, pictures), page)
+    claims, full = _with_pictures(study / name, pictures).split("\n### ", 1)
+    publish("claims", claims.strip(), page)
+    publish("report", f"### {full}", page)
 
 
 def _with_pictures(report: Path, prefix: str) -> str:

@@ -23,8 +23,12 @@ def command(name: str) -> list[str]:
 
 
 def shown(name: str) -> str:
-    """The report on the page."""
-    return page(name).split("<!-- report: begin -->")[1].split("<!-- report: end -->")[0].strip()
+    """The report on the page: the claims, with which it opens, and the rest."""
+    parts = (
+        page(name).split(f"<!-- {part}: begin -->")[1].split(f"<!-- {part}: end -->")[0].strip()
+        for part in ("claims", "report")
+    )
+    return "\n\n".join(parts)
 
 
 def made(name: str, report: str, tmp_path: Path, *arguments: str) -> str:
