@@ -8,6 +8,8 @@ import subprocess
 import sys
 import time
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -274,20 +276,54 @@ def test_several_runs_need_a_name(tiny: list[str], capsys: pytest.CaptureFixture
     assert "--run-dir .: must end in a name" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
-def test_a_request_to_end_keeps_the_weights(name: str, tiny: list[str], tmp_path: Path) -> None:
+@contextmanager
+def logged(path: Path, tiny: list[str], hangup: signal.Handlers) -> Iterator[subprocess.Popen[str]]:
+    """A long run in a process of its own, which has learnt something by now.
+
+    ``hangup`` is what the process finds set for the end of its terminal.
+    """
+    options = ["--run-dir", str(path), *tiny, "--train.env-steps", "100000000"]
+    command = [sys.executable, "-m", "innerattn", "train", *options]
+    streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    before = signal.signal(signal.SIGHUP, hangup)
+    try:
+        process = subprocess.Popen(command, **streams, text=True)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    with process:
+        try:
+            while not (path / "metrics.jsonl").exists():
+                assert process.poll() is None
+                time.sleep(0.05)
+            yield process
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
+def test_a_request_to_end_keeps_the_weights(
+    sent: signal.Signals, tiny: list[str], tmp_path: Path
+) -> None:
     path = tmp_path / "run"
-    options = [*tiny, "--train.env-steps", "100000000"]
-    command = [sys.executable, "-m", "innerattn", "train", "--run-dir", str(path), *options]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
-        while not (path / "metrics.jsonl").exists():
-            assert process.poll() is None
-            time.sleep(0.05)
-        process.send_signal(getattr(signal, name))
+    with logged(path, tiny, hangup=signal.SIG_DFL) as process:
+        process.send_signal(sent)
         _, err = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert f"what was learnt is kept in {path}" in err.decode()
+    assert f"what was learnt is kept in {path}" in err
     assert json.loads((path / "run.json").read_text())["state"] == "interrupted"
+
+
+def test_nohup_outlives_the_terminal(tiny: list[str], tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    with logged(path, tiny, hangup=signal.SIG_IGN) as process:
+        process.send_signal(signal.SIGHUP)
+        before = (path / "metrics.jsonl").stat().st_size
+        while (path / "metrics.jsonl").stat().st_size == before:
+            assert process.poll() is None
+            time.sleep(0.05)
+        process.terminate()
+        process.communicate(timeout=60)
+    assert process.returncode == 130
 
 
 def test_existing_folder_is_refused(
