@@ -74,6 +74,20 @@ def test_score_against_a_plain_loop() -> None:
     assert score.high == pytest.approx(high, abs=0.1 * (high - low))
 
 
+def test_intervals_over_episodes_hold_the_truth_as_often_as_they_say() -> None:
+    rng, draws = np.random.default_rng(5), 500
+    missed = {"mean": 0, "score": 0}
+    for seed in range(draws):
+        worlds = rng.normal(0.0, 0.5, 300)  # easy and hard ones, for all policies alike
+        played = rng.normal([[2.0], [0.2], [3.0]], 1.0, (3, 300)) + worlds
+        mean, score = mean_interval(played[0], seed), score_interval(*played, seed)
+        missed["mean"] += not mean.low <= 2.0 <= mean.high
+        missed["score"] += score is None or not score.low <= 1.8 / 2.8 <= score.high
+    error = 3 * np.sqrt(0.05 * 0.95 / draws)
+    assert missed["mean"] / draws == pytest.approx(0.05, abs=error)
+    assert missed["score"] / draws == pytest.approx(0.05, abs=error)
+
+
 def test_score_of_the_scripted_policies_is_exact() -> None:
     rng = np.random.default_rng(4)
     random, hungarian = rng.poisson([[0.2], [3.0]], (2, 200))
