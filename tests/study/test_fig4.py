@@ -61,17 +61,26 @@ def test_only_attention_that_chooses_is_drawn(courses: list[EntropyCourse]) -> N
 
 def test_the_figure_has_a_column_for_each_situation(courses: list[EntropyCourse]) -> None:
     figure = draw_entropy(fig4_lines(courses), PRINTED_NATS)
-    assert len(figure.axes) == 4
-    upper = figure.axes[:2]
+    shown = [panel for panel in figure.axes if panel.axison]
+    assert [panel.get_title() for panel in figure.axes if not panel.axison] == ["", ""]
+    upper = shown[:2]
+    assert [panel.get_title() for panel in shown[2:]] == [
+        "td-inner by robot; thin: its heads",
+        "ppo-inner by robot; thin: its heads",
+    ]
     assert [panel.get_title() for panel in upper] == ["mixed", "single"]
     assert figure.axes[0].get_ylabel() == "entropy of attention [nats]"
-    assert {panel.get_xlabel() for panel in figure.axes} == {"training [1,000 env-steps]"}
-    for panel in figure.axes:
+    assert {panel.get_xlabel() for panel in shown} == {"training [1,000 env-steps]"}
+    for panel in shown:
         levels = [line.get_ydata()[0] for line in panel.lines if len(line.get_ydata()) == 2]
         assert levels == pytest.approx([math.log(3), PRINTED_NATS])
         (right,) = panel.child_axes
         assert right.get_ylabel() in ("", "exp(entropy) [teammates]")
-    assert [len(panel.collections) for panel in upper] == [1, 0]  # a single run has no band
+    assert [len(panel.collections) for panel in shown] == [1, 0, 4, 0]  # a single run has no band
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.texts] == [
+        *("food_0", "food_1", "navigation_0", "medical_0")
+    ]
 
 
 def test_csv_and_json_hold_the_same_numbers(courses: list[EntropyCourse]) -> None:

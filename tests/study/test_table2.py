@@ -143,9 +143,16 @@ def test_text_and_csv_hold_every_seed_and_real_counts(table: Table2) -> None:
     text = table2_markdown(table)
     lines = list(csv.DictReader(io.StringIO(table2_csv(table))))
     assert len(lines) == 2 * (2 * (3 + 1) + 2 * (2 + 1) + 2 * (1 + 1))
+    (episodes,) = {row.recorded.episodes for row in table.rows}
     for line in lines:
         assert int(line["rescues_0"]) + int(line["rescues_1"]) > 0
         assert f"{line['rescues_0']} + {line['rescues_1']}" in text
+        assert (line["score"] == "") == (int(line["episodes"]) == episodes)
+        if line["share_low_90"]:
+            assert float(line["share_low"]) < float(line["share_low_90"])
+            assert float(line["share_high_90"]) < float(line["share_high"])
+            ends = (float(line[f"share_{end}_90"]) for end in ("low", "high"))
+            assert "[{}, {}]".format(*map(fixed, ends)) in text
     for block in text.split("\n\n"):
         widths = {line.count("|") for line in block.splitlines() if line.startswith("|")}
         assert len(widths) <= 1

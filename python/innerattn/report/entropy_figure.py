@@ -1,6 +1,6 @@
 """Fig. 4: the entropy of attention during training, with the band over runs; it measures nothing.
 
-Above, each method's mean over robots and heads, below the robots and heads of one method.
+Above, each method's mean over robots and heads, below the robots and heads of every method.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from innerattn.report.drawing import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -42,7 +43,7 @@ class EntropyLines:
         env_steps: (T,) [env-steps].
         mean: (3, T) mean over robots and heads, low and high end of the band; NaN for no band.
         robots: R names.
-        by_robot: (T, R) mean over runs and heads.
+        by_robot: (3, T, R) mean over heads, low and high end of the band; NaN for no band.
         by_head: (T, R, H) mean over runs.
         even_nats: ln(R - 1).
     """
@@ -59,7 +60,7 @@ class EntropyLines:
 
 
 def draw_entropy(lines: Sequence[EntropyLines], printed_nats: float) -> Figure:
-    """A column for each situation; the lower row shows the first method of each.
+    """A column for each situation, a row for all methods and one for each.
 
     Args:
         lines: at least one.
@@ -70,29 +71,31 @@ def draw_entropy(lines: Sequence[EntropyLines], printed_nats: float) -> Figure:
     situations = list(dict.fromkeys(line.situation for line in lines))
     methods = list(dict.fromkeys(line.method for line in lines))
     width = PAGE_WIDTH_IN if len(situations) > 1 else COLUMN_WIDTH_IN
-    figure = Figure(figsize=(width, 5.1), layout="constrained")
-    panels = figure.subplots(2, len(situations), sharey=True, squeeze=False)
+    figure = Figure(figsize=(width, 0.3 + 2.4 * (1 + len(methods))), layout="constrained")
+    panels = figure.subplots(1 + len(methods), len(situations), sharey=True, squeeze=False)
+    robots: dict[str, Artist] = {}
     for column, situation in enumerate(situations):
-        own = [line for line in lines if line.situation == situation]
-        upper, lower = panels[:, column]
-        for line in own:
-            _method(upper, line, *_METHODS[methods.index(line.method) % len(_METHODS)])
-        _robots(lower, own[0])
+        own = {line.method: line for line in lines if line.situation == situation}
+        upper, *lower = panels[:, column]
+        for method, panel in zip(methods, lower, strict=True):
+            if method not in own:
+                panel.set_axis_off()
+                continue
+            _method(upper, own[method], *_METHODS[methods.index(method) % len(_METHODS)])
+            robots |= _robots(panel, own[method])
+            panel.set_title(f"{method} by robot; thin: its heads", fontsize=7)
         upper.set_title(situation, fontsize=9)
-        lower.set_title(f"{own[0].method} by robot; thin: its heads", fontsize=7)
-        for panel in (upper, lower):
-            panel.set_xlabel("training [1,000 env-steps]", fontsize=8)
-            _marks(panel, own[0].even_nats, printed_nats)
-            last = column == len(situations) - 1
-            _teammates(panel, labelled=last)
-        if column == 0:
-            for panel in (upper, lower):
-                panel.set_ylabel("entropy of attention [nats]", fontsize=8)
         upper.legend(fontsize=6, loc="lower right", frameon=False)
-    handles, names = panels[1, 0].get_legend_handles_labels()
+        even = next(iter(own.values())).even_nats
+        for panel in (panel for panel in (upper, *lower) if panel.axison):
+            panel.set_xlabel("training [1,000 env-steps]", fontsize=8)
+            _marks(panel, even, printed_nats)
+            _teammates(panel, labelled=column == len(situations) - 1)
+    for panel in panels[:, 0]:
+        panel.set_ylabel("entropy of attention [nats]", fontsize=8)
     figure.legend(
-        handles,
-        names,
+        robots.values(),
+        robots.keys(),
         fontsize=7,
         ncols=round(width / 1.7),
         loc="outside lower center",
@@ -111,12 +114,18 @@ def _method(panel: Axes, line: EntropyLines, colour: str, style: str) -> None:
         panel.fill_between(steps, low, high, color=colour, alpha=0.2, linewidth=0.0)
 
 
-def _robots(panel: Axes, line: EntropyLines) -> None:
+def _robots(panel: Axes, line: EntropyLines) -> dict[str, Artist]:
+    """Draw them; their lines by name, for the legend."""
+    drawn: dict[str, Artist] = {}
     steps = line.env_steps / 1000.0
     for r, robot in enumerate(line.robots):
         colour = ROBOT_COLOURS[r % len(ROBOT_COLOURS)]
         panel.plot(steps, line.by_head[:, r], color=colour, linewidth=0.5, alpha=0.45)
-        panel.plot(steps, line.by_robot[:, r], color=colour, linewidth=1.5, label=robot)
+        mean, low, high = line.by_robot[:, :, r]
+        (drawn[robot],) = panel.plot(steps, mean, color=colour, linewidth=1.5)
+        if np.isfinite(low).any():
+            panel.fill_between(steps, low, high, color=colour, alpha=0.15, linewidth=0.0)
+    return drawn
 
 
 def _marks(panel: Axes, even_nats: float, printed_nats: float) -> None:
@@ -141,8 +150,10 @@ def _marks(panel: Axes, even_nats: float, printed_nats: float) -> None:
 
 def _teammates(panel: Axes, *, labelled: bool) -> None:
     """An axis on the right: exp(entropy), how many teammates are attended to in effect."""
+    from matplotlib.ticker import MaxNLocator
+
     axis = panel.secondary_yaxis("right", functions=(_exp, _log))
-    axis.set_yticks([1.0, 1.5, 2.0, 2.5, 3.0])
+    axis.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
     axis.tick_params(labelsize=7 if labelled else 0, length=2, labelright=labelled)
     if labelled:
         axis.set_ylabel("exp(entropy) [teammates]", fontsize=8)

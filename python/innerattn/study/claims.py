@@ -33,8 +33,9 @@ EVEN_ENTROPY = 1.0 - ENTROPY_MARGIN
 """Attention whose entropy is a larger share of ln(N - 1) than this counts as even."""
 
 RULES = f"""\
-A claim is undecided for a method with less than two runs. Intervals are Student's 95 % over runs.
-Every claim is judged by itself at 5 %; nothing is adjusted for their number.
+A claim is undecided for a method with less than two runs. Intervals are Student's 95 % over runs,
+also where they reach beyond what is possible (a share above 1, an unevenness below 0). Every claim
+is judged by itself at 5 %; nothing is adjusted for their number.
 
 - *A task is shared* evenly where the runs' mean share is (its 90 % interval lies within {MARGIN[0]}
   to {MARGIN[1]}) and no run is uneven by itself; unevenly where the mean share is (its 95 %
@@ -46,7 +47,8 @@ Every claim is judged by itself at 5 %; nothing is adjusted for their number.
   without. Runs of one seed begin alike and are measured in the same worlds, so each seed gives one
   difference; {LEAST_PAIRS} at least. Yes where the interval lies below 0; no where it lies above 0,
   or where two one-sided tests show the difference to be within ±{0.5 - MARGIN[0]:.1f}; smaller
-  differences are not ruled out by that.
+  differences are not ruled out by that. Where the distance without is itself below that, such a no
+  refutes a gain as large as the paper's, and nothing else.
 - **Entropy ends below that of even attention**: by the mean over robots, heads and the last tenth
   of training, as a share of ln(N − 1). Yes where its interval lies below {EVEN_ENTROPY:g}, no where
   it lies above.

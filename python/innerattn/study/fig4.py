@@ -141,7 +141,7 @@ def fig4_lines(courses: Sequence[EntropyCourse]) -> list[EntropyLines]:
     for course in courses:
         if not course.chooses:
             continue
-        mean, count = course.mean(), len(course.seeds)
+        mean, by_robot, count = course.mean(), course.by_robot(), len(course.seeds)
         runs = "1 run" if count == 1 else f"{count} runs, {BAND_NAMES[mean.kind]}"
         lines.append(
             EntropyLines(
@@ -151,7 +151,7 @@ def fig4_lines(courses: Sequence[EntropyCourse]) -> list[EntropyLines]:
                 env_steps=course.env_steps,
                 mean=np.stack([mean.mean, mean.low, mean.high]),
                 robots=course.robots,
-                by_robot=course.by_robot().mean,
+                by_robot=np.stack([by_robot.mean, by_robot.low, by_robot.high]),
                 by_head=course.by_head(),
                 even_nats=course.even_nats,
             )

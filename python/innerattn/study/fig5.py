@@ -114,6 +114,9 @@ class Evidence:
             "control": {role: found.to_json() for role, found in self.control.items()},
             "own_part": asdict(self.own_part) if self.own_part else None,
             "own_part_by_run": list(self.own_part_by_run),
+            "own_part_beyond_half": (
+                asdict(self.own_part_beyond_half) if self.own_part_beyond_half else None
+            ),
             "p_by_run": list(self.p_by_run),
             "control_p_by_run": list(self.control_p_by_run),
         }

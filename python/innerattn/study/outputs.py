@@ -10,6 +10,14 @@ from innerattn.study.inventory import FinishedRun
 from innerattn.study.report import PARTS, write_report
 from innerattn.study.run import StudyRun
 
+_MADE = {
+    "table2": ("table2.csv", "table2.json", "table2.md"),
+    "fig4": ("fig4.csv", "fig4.json", "fig4.pdf", "fig4.png"),
+    "fig5": tuple(f"fig5{part}.{x}" for part in ("", "_evidence") for x in ("json", "pdf", "png")),
+    "crossed": tuple(f"crossed.{kind}" for kind in ("csv", "json", "md", "pdf", "png")),
+}
+"""The files of each target but the report."""
+
 
 def make_outputs(
     target: str, runs: Sequence[FinishedRun], out: Path, budget: str, left_out: Sequence[str]
@@ -24,22 +32,24 @@ def make_outputs(
         left_out: what is to be said of each run that is not among ``runs``.
 
     Returns:
-        The files that are there now; none without runs.
+        The files that are there now; none without runs, where those of earlier runs are removed.
 
     Raises:
         RunError: runs cannot be compared, or matplotlib is not installed.
-        OSError: a file cannot be written.
+        OSError: a file cannot be written or removed.
     """
-    if not runs:
-        return []
-    if target == "crossed":
-        write_crossed(runs, out, budget, left_out)
-        return [out / f"crossed.{kind}" for kind in ("csv", "json", "md", "pdf", "png")]
     parts = PARTS if target == "all" else (target,)
-    listed = [StudyRun(*_label(run), run.folder) for run in runs]
-    write_report(listed, out, budget, parts, left_out)
-    made = (path for part in parts for path in sorted(out.glob(f"{part}*.*")))
-    return [out / "report.md", *made]
+    report = [] if target == "crossed" else [out / "report.md"]
+    files = report + [out / name for part in parts for name in _MADE[part]]
+    if not runs:
+        for path in files:
+            path.unlink(missing_ok=True)
+    elif target == "crossed":
+        write_crossed(runs, out, budget, left_out)
+    else:
+        listed = [StudyRun(*_label(run), run.folder) for run in runs]
+        write_report(listed, out, budget, parts, left_out)
+    return [path for path in files if path.exists()]
 
 
 def _label(run: FinishedRun) -> tuple[str, str, int]:

@@ -199,7 +199,7 @@ def _fig5(findings: Findings) -> str:
     if not findings.evidence:
         return text + "\nNo run has hand-overs and attention that chooses.\n"
     head = ["situation", "method", "seed", "hand-overs (episodes)", "change on the partner to be"]
-    head += ["of the robot that takes no part", "difference"]
+    head += ["of the robot that takes no part", "difference", "difference − half the change"]
     head += ["change on the partner before", "of the robot that takes no part"]
     head += ["p", "p of the robot that takes no part"]
     rows = [row for part in findings.evidence for row in _evidence_rows(part)]
@@ -224,7 +224,7 @@ def _evidence_rows(part: Evidence) -> list[list[str]]:
                 *(part.situation, part.method, str(seed)),
                 f"{part.handovers[n]} ({part.episodes[n]})",
                 *(_signed(role.change_by_run[n]) for role in (to_be, control)),
-                _signed(part.own_part_by_run[n]),
+                *(_signed(part.own_part_by_run[n]), NONE),
                 *(_signed(role.change_by_run[n]) for role in (before, before_control)),
                 *map(p_shown, p_values),
             ]
@@ -233,7 +233,8 @@ def _evidence_rows(part: Evidence) -> list[list[str]]:
         rows.append(
             [
                 *(part.situation, part.method, "mean [95 %]", f"{sum(part.handovers):,}"),
-                *(shown(to_be.change), shown(control.change), shown(part.own_part)),
+                *(shown(to_be.change), shown(control.change)),
+                *(shown(part.own_part), shown(part.own_part_beyond_half)),
                 *(shown(before.change), shown(before_control.change), NONE, NONE),
             ]
         )

@@ -18,7 +18,8 @@ NONE = "–"
 
 _CSV_COLUMNS = """
 situation method task seed episodes robot_0 robot_1 rescues_0 rescues_1 share_0 share_low share_high
-chi_squared p equivalence_p verdict printed_share_0 printed_chi_squared rescues_per_episode score
+share_low_90 share_high_90 chi_squared p equivalence_p verdict printed_share_0 printed_chi_squared
+rescues_per_episode score
 """
 
 
@@ -28,9 +29,9 @@ def table2_markdown(table: Table2) -> str:
     parts = [
         "Shares are of rescues in which the first food robot helped. Over several runs the "
         "interval is Student's 95 % with the run as the unit, of a single run it is over its "
-        f"episodes. Verdict: even where the 90 % interval lies within {low} to {high} (two "
-        "one-sided tests at 5 %), uneven where the 95 % interval lies outside, else undecided. "
-        "χ² is that of the rescues of all runs added up, as if they were independent, and rejects "
+        "episodes, as is that of 90 %. Verdict: even where the 90 % interval lies within "
+        f"{low} to {high} (two one-sided tests at 5 %), uneven where the 95 % interval lies "
+        "outside, else undecided. χ² is that of the rescues of all runs added up, as if they were independent, and rejects "
         "at 5 %; it and a mean near 0.5 can hide runs that are uneven in opposite ways, so runs "
         "are counted by their own verdict, too. The share of all rescues has the interval of a "
         "bootstrap of runs and of episodes within, which is too short for few runs; p (TOST) is "
@@ -64,7 +65,10 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def table2_csv(table: Table2) -> str:
-    """One line per situation, method, task, set of episodes and run, and one for all runs."""
+    """One line per situation, method, task, set of episodes and run, and one for all runs.
+
+    Rescues per episode and the score are those of all episodes, and in their lines only.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_CSV_COLUMNS.split())
@@ -72,10 +76,12 @@ def table2_csv(table: Table2) -> str:
     for row in table.rows:
         beside = competence[row.situation, row.method]
         for sharing in (row.recorded, row.scored):
-            for seed, run, figures in zip(row.seeds, sharing.each, beside.each, strict=True):
-                writer.writerow(_csv_line(row, str(seed), sharing, run, figures))
             means = {name: mean.mean if mean else None for name, mean in beside.mean.items()}
-            writer.writerow(_csv_line(row, "all", sharing, sharing.all, means))
+            labels = [*map(str, row.seeds), "all"]
+            runs = zip(labels, (*sharing.each, sharing.all), (*beside.each, means), strict=True)
+            for seed, run, figures in runs:
+                own = figures if sharing is row.scored else {}
+                writer.writerow(_csv_line(row, seed, sharing, run, own))
     return text.getvalue()
 
 
@@ -91,10 +97,11 @@ def _csv_line(
         *(row.situation, row.method, row.task, seed, sharing.episodes),
         *(*row.robots, *run.rescues),
         *((share.mean, share.low, share.high) if share else (None, None, None)),
+        *(run.interval_90 or (None, None)),
         *((chi.statistic, chi.p) if chi else (None, None)),
         *(run.equivalence_p, run.verdict),
         *((printed.row.shares[0], printed.row.chi_squared) if printed else (None, None)),
-        *(figures["rescues_per_episode"], figures["score"]),
+        *(figures.get("rescues_per_episode"), figures.get("score")),
     ]
 
 
@@ -135,8 +142,9 @@ def verdicts_shown(sharing: Sharing) -> str:
 
 def _sharing_table(rows: Sequence[Row], name: str, scores: dict[str, OverRuns | None]) -> str:
     head = ["method", "task", "seeds", "rescues (first + second)", "share of the first [95 %]"]
-    head += ["p (TOST)", "verdict on the mean", "runs even / uneven / undecided"]
-    head += ["share of all rescues [bootstrap]", "χ² (p)", "score [95 %]"]
+    head += ["[90 %]", "p (TOST)", "verdict on the mean", "runs even / uneven / undecided"]
+    head += ["share of all rescues [bootstrap]", "χ² (p)"]
+    head += ["score [95 %]"] if name == "scored" else []
     printed = any(row.printed for row in rows) and name == "recorded"
     head += ["printed shares, χ²", "printed χ² at n = 100"] if printed else []
     lines = []
@@ -145,10 +153,11 @@ def _sharing_table(rows: Sequence[Row], name: str, scores: dict[str, OverRuns | 
         first, second = sharing.all.rescues
         cells = [row.method, row.task, str(len(row.seeds))]
         cells += [f"{first + second} ({first} + {second})", share_shown(sharing)]
-        cells += [p_shown(sharing.all.equivalence_p), sharing.all.verdict]
+        cells += _tost(sharing.all)
         cells += [verdicts_shown(sharing)]
         cells += [shown(sharing.together.pooled_share) if sharing.together else NONE]
-        cells += [_chi_squared(sharing.all.chi_squared), shown(scores[row.method])]
+        cells += [_chi_squared(sharing.all.chi_squared)]
+        cells += [shown(scores[row.method])] if name == "scored" else []
         if printed and row.printed:
             shares, was = row.printed.row.shares, row.printed.row
             cells += [f"{shares[0]:.2f} / {shares[1]:.2f}, {was.chi_squared:.{was.decimals}f}"]
@@ -163,7 +172,8 @@ def _runs_table(rows: Sequence[Row]) -> str:
     head = ["method", "task", "seed"]
     for name in ("scored", "recorded"):
         episodes = _listed(sorted({getattr(row, name).episodes for row in rows}))
-        head += [f"{episodes} episodes: rescues", "share [95 %]", "χ² (p)", "verdict"]
+        head += [f"{episodes} episodes: rescues", "share [95 %]"]
+        head += ["[90 %]", "p (TOST)", "verdict", "χ² (p)"]
     lines = []
     for row in rows:
         for index, seed in enumerate(row.seeds):
@@ -171,7 +181,7 @@ def _runs_table(rows: Sequence[Row]) -> str:
             for sharing in (row.scored, row.recorded):
                 run = sharing.each[index]
                 cells += [f"{run.rescues[0]} + {run.rescues[1]}", shown(run.share)]
-                cells += [_chi_squared(run.chi_squared), run.verdict]
+                cells += [*_tost(run), _chi_squared(run.chi_squared)]
             lines.append(cells)
     return markdown_table(head, lines)
 
@@ -194,6 +204,13 @@ def _competence_table(parts: Sequence[Competence]) -> str:
             means = [shown(part.mean[name]) for name in COMPETENCE]
             lines.append([part.method, "mean [95 %]", *means])
     return markdown_table(head, lines)
+
+
+def _tost(found: Evenness | EvennessOfRuns) -> list[str]:
+    """The interval that decides whether work is even, the p-value and the verdict."""
+    ends = found.interval_90
+    interval = f"[{fixed(ends[0])}, {fixed(ends[1])}]" if ends else NONE
+    return [interval, p_shown(found.equivalence_p), found.verdict]
 
 
 def _chi_squared(found: ChiSquared | None) -> str:
