@@ -145,7 +145,9 @@ def test_it_is_said_where_all_seeds_were_measured_in_the_same_worlds(
 
 def test_both_attentions_are_compared_where_both_are_there(folder: Path) -> None:
     text = (folder / "report.md").read_text()
-    compared = text.split("## Learnt attention beside uniform weights")[1].split("## Fig. 4")[0]
+    compared = text.split("## Learnt attention beside uniform weights")[1].split("## Is evenness")[
+        0
+    ]
     assert compared.count("| mixed | td | score | 0, 1 |") == 1
     assert "| single |" not in compared  # has learnt attention only
 

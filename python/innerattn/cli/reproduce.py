@@ -44,7 +44,8 @@ class Reproduce(Command):
     """What is to be reproduced; all: table2, fig4 and fig5; crossed: attention, rescue credit and
     logit penalty crossed, to find what makes sharing even."""
     budget: Budget = "quick"
-    """Built-in budget: how long to train; quick is a smoke run and gives no result."""
+    """Built-in budget: how long to train; quick is a smoke run and gives no result; paper has the
+    paper's numbers with TD, and with PPO the few that it prints."""
     seeds: int = 5
     """How many seeds: 0, 1, ... up to one less."""
     out: Path | None = None

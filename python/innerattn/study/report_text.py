@@ -12,12 +12,20 @@ from innerattn.report.handover_figure import HandoverScene
 from innerattn.study.claims import RULES, Claim, entropy_claims, handover_claims
 from innerattn.study.fig4 import EntropyCourse
 from innerattn.study.fig5 import Evidence
+from innerattn.study.merit import merits
 from innerattn.study.pairs import pairs, together
 from innerattn.study.run import Digests, StudyRun, named_from
 from innerattn.study.scene import SCENE_RULE
 from innerattn.study.sharing_claims import sharing_claims
 from innerattn.study.table2 import PRINTED_SITUATION, Table2
-from innerattn.study.table2_text import NONE, markdown_table, p_shown, shown, table2_markdown
+from innerattn.study.table2_text import (
+    NONE,
+    fixed,
+    markdown_table,
+    p_shown,
+    shown,
+    table2_markdown,
+)
 
 
 @dataclass(frozen=True)
@@ -69,6 +77,7 @@ def report_markdown(findings: Findings) -> str:
         parts += ["## Table II\n", table2_markdown(findings.table)]
         compared = _compared(findings.table)
         parts += ["## Learnt attention beside uniform weights\n", compared] if compared else []
+        parts += ["## Is evenness a merit?\n", _merit(findings.table)]
     if findings.courses is not None:
         parts += ["## Fig. 4: entropy of attention during training\n", _fig4(findings.courses)]
     if findings.evidence is not None:
@@ -161,6 +170,25 @@ def _compared(table: Table2) -> str:
         "attention scores higher than one without (Agarwal et al. 2021), by a bootstrap of runs "
         "within situations, as if runs of one seed had nothing in common; intervals are too short "
         "where runs are few.\n\n" + markdown_table(head_of_all, rows_of_all)
+    )
+
+
+def _merit(table: Table2) -> str:
+    head = ["situation", "runs", "correlation of unevenness and score within methods", "p"]
+    head += ["unevenness of hungarian", "its score"]
+    rows = [
+        [
+            *(one.situation, str(one.runs)),
+            NONE if one.correlation is None else _signed(one.correlation),
+            p_shown(one.p),
+            *(NONE if value is None else fixed(value) for value in one.script),
+        ]
+        for one in merits(table.competence)
+    ]
+    return (
+        "Of a run's unevenness and its score, each less its method's mean: above 0 where uneven "
+        "runs score more. p is as if runs of one seed had nothing in common, and of each situation "
+        "by itself.\n\n" + markdown_table(head, rows)
     )
 
 

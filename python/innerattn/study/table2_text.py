@@ -31,11 +31,11 @@ def table2_markdown(table: Table2) -> str:
         "interval is Student's 95 % with the run as the unit, of a single run it is over its "
         "episodes, as is that of 90 %. Verdict: even where the 90 % interval lies within "
         f"{low} to {high} (two one-sided tests at 5 %), uneven where the 95 % interval lies "
-        "outside, else undecided. χ² is that of the rescues of all runs added up, as if they were independent, and rejects "
-        "at 5 %; it and a mean near 0.5 can hide runs that are uneven in opposite ways, so runs "
-        "are counted by their own verdict, too. The share of all rescues has the interval of a "
-        "bootstrap of runs and of episodes within, which is too short for few runs; p (TOST) is "
-        "the larger of the two one-sided p-values.\n"
+        "outside, else undecided. χ² is that of the rescues of all runs added up, as if they were "
+        "independent, and rejects at 5 %; it and a mean near 0.5 can hide runs that are uneven in "
+        "opposite ways, so runs are counted by their own verdict, too. The share of all rescues "
+        "has the interval of a bootstrap of runs and of episodes within, which is too short for "
+        "few runs; p (TOST) is the larger of the two one-sided p-values.\n"
     ]
     for situation in dict.fromkeys(row.situation for row in table.rows):
         rows = [row for row in table.rows if row.situation == situation]
