@@ -146,6 +146,19 @@ def test_a_report_alone_trains_nothing_and_names_what_is_missing(
 
 
 @pytest.mark.usefixtures("in_this_process")
+def test_the_same_command_makes_the_same_files_from_nothing(
+    tmp_path: Path, command: Command
+) -> None:
+    one, other = tmp_path / "one", tmp_path / "other"
+    for out in (one, other):
+        assert command("all", out, "td-inner,td-uniform", "--seeds", "1") == 0
+    made = account(one)["outputs"]
+    assert {"report.md", "table2.csv", "table2.json", "fig4.pdf"} <= set(made)
+    for name in made:
+        assert (one / name).read_bytes() == (other / name).read_bytes(), name
+
+
+@pytest.mark.usefixtures("in_this_process")
 def test_the_crossed_design_has_runs_and_files_of_its_own(
     tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
