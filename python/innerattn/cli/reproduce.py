@@ -41,11 +41,9 @@ class Reproduce(Command):
     """
 
     target: tyro.conf.Positional[Target]
-    """What is to be reproduced; all: table2, fig4 and fig5; crossed: attention, rescue credit and
-    logit penalty crossed, to find what makes sharing even."""
+    """What to make; all: table2, fig4 and fig5; crossed: a design on what makes sharing even."""
     budget: Budget = "quick"
-    """Built-in budget: how long to train; quick is a smoke run and gives no result; paper has the
-    paper's numbers with TD, and with PPO the few that it prints."""
+    """How long to train; quick gives no result; paper: its own numbers, for PPO the few printed."""
     seeds: int = 5
     """How many seeds: 0, 1, ... up to one less."""
     out: Path | None = None
