@@ -26,6 +26,7 @@ from innerattn.train.checkpoint import RunFolder, State, refuse_existing
 from innerattn.train.collect import Collector
 from innerattn.train.compilation import compiles
 from innerattn.train.imitate import Imitation
+from innerattn.train.interruption import heard_interruptions
 from innerattn.train.metrics import (
     Interval,
     Metrics,
@@ -84,7 +85,7 @@ def train(
     refuse_existing(path)
     keep_heap_small()
     threads = thread_count(config)
-    with torch_threads(threads), best_products() as products:
+    with torch_threads(threads), best_products() as products, heard_interruptions() as check:
         env = BatchEnv(
             config.scenario,
             config.train.num_envs,
@@ -100,7 +101,7 @@ def train(
             warm = config.train.warm_start != "none"
             imitation = Imitation(config, env, learner, collector) if warm else None
             folder = RunFolder.create(path, config, threads, compiled, products)
-            loop = _Loop(config, folder, learner, collector, env.robot_names, progress)
+            loop = _Loop(config, folder, learner, collector, env.robot_names, progress, check)
             loop.run(imitation)
     return path
 
@@ -116,6 +117,7 @@ class _Loop:
         collector: Collector,
         robot_names: tuple[str, ...],
         progress: Callable[[Progress], None] | None,
+        check_interrupted: Callable[[], None],
     ) -> None:
         self._config = config.train
         self._folder = folder
@@ -123,6 +125,7 @@ class _Loop:
         self._collector = collector
         self._robot_names = robot_names
         self._progress = progress
+        self._check_interrupted = check_interrupted
         self._file = MetricsFile(folder.path / "metrics.jsonl")
         self._interval = Interval()
         self._metrics: Metrics | None = None
@@ -155,6 +158,7 @@ class _Loop:
         done, updates, began = 0, self._learner.updates, self._interval.seconds
         every = self._config.log_every_env_steps
         while done < total:
+            self._check_interrupted()
             newest, figures = step(done / total)
             before = self._env_steps
             self._env_steps += self._config.num_envs

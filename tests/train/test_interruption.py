@@ -1,0 +1,78 @@
+"""An interruption ends training even if something has swallowed it."""
+
+from __future__ import annotations
+
+import json
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from innerattn.config import load_run_config
+from innerattn.train import Progress, train
+from innerattn.train.interruption import heard_interruptions
+
+
+@pytest.fixture(autouse=True)
+def interrupting() -> Iterator[None]:
+    """SIGINT interrupts, whatever this process was begun with."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def swallowed() -> None:
+    with suppress(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_what_was_swallowed_is_raised_when_asked_for() -> None:
+    with heard_interruptions() as check:
+        check()
+        swallowed()
+        for _ in range(2):
+            with pytest.raises(KeyboardInterrupt):
+                check()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_other_handlers_and_threads_stay_as_they_are() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with heard_interruptions() as check:
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+        signal.raise_signal(signal.SIGINT)
+        check()
+    assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    seen = []
+
+    def elsewhere() -> None:
+        with heard_interruptions():
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=elsewhere)
+    thread.start()
+    thread.join()
+    assert seen == [signal.default_int_handler]
+
+
+def test_training_ends_where_an_interruption_was_swallowed(
+    small: dict[str, object], tmp_path: Path
+) -> None:
+    steps = []
+
+    def progress(now: Progress) -> None:
+        steps.append(now.env_steps)
+        if len(steps) == 3:
+            swallowed()
+
+    config = load_run_config("mixed", "td-inner", "quick", overrides=small)
+    with pytest.raises(KeyboardInterrupt):
+        train(config, tmp_path / "run", progress=progress)
+    assert len(steps) == 3
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["state"] == "interrupted"
+    assert list((tmp_path / "run" / "checkpoints").iterdir())
