@@ -19,12 +19,12 @@ from learning_figure import draw_curves
 from page import LEARNING, publish, require, table
 from runs import Run, train_all
 
-from innerattn.evaluate.comparison import contrast
-from innerattn.evaluate.statistics import student_interval
-from innerattn.report.drawing import write_figure
-from innerattn.study.claims import LEAST_PAIRS
-from innerattn.study.pairs import MARGINS
-from innerattn.study.table2_text import shown
+from innerattn.experiments.paper.claims import LEAST_PAIRS
+from innerattn.experiments.paper.pairs import MARGINS
+from innerattn.report.plots.drawing import write_figure
+from innerattn.stats.comparison import contrast
+from innerattn.stats.intervals import student_interval
+from innerattn.stats.text import shown
 
 PRESETS = ("mixed", "double", "single")
 METHODS = {"quick": ["td-inner"], "short": ["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"]}

@@ -19,8 +19,8 @@ from typing import Any
 from page import CROSSED, PAPER_PROTOCOL, REPRODUCTION, publish
 
 from innerattn.errors import InnerattnError
-from innerattn.study.kept import keep
-from innerattn.study.run import StudyRun
+from innerattn.experiments.archive import keep
+from innerattn.experiments.run import StudyRun
 
 PLACES = {
     ("report.md", "short"): (REPRODUCTION, "reproduction"),

@@ -22,8 +22,8 @@ from typing import Any
 from page import ROBUSTNESS, machine, publish, table
 from runs import Run, train_all
 
-from innerattn.evaluate.statistics import student_interval
-from innerattn.study.run import digests
+from innerattn.experiments.run import digests
+from innerattn.stats.intervals import student_interval
 
 METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform")
 SCRIPTED = ("greedy", "hungarian", "oracle")

@@ -6,8 +6,8 @@ from scipy import stats
 
 from innerattn.config import Obstacle, Scenario, Task
 from innerattn.envs import BatchEnv
-from innerattn.scripted import View
-from innerattn.scripted.dispatch import HungarianPolicy
+from innerattn.policies import View
+from innerattn.policies.scripted.dispatch import HungarianPolicy
 
 LEAST_P = 1e-3
 WORLDS = 4000

@@ -16,9 +16,9 @@ from innerattn.evaluate import (
     read_records,
     scripted_policy,
 )
-from innerattn.evaluate.episodes import FIELDS
-from innerattn.evaluate.summary import summarise
-from innerattn.scripted.dispatch import GreedyPolicy
+from innerattn.measures.summary import summarise
+from innerattn.policies.scripted.dispatch import GreedyPolicy
+from innerattn.records.record import FIELDS
 from innerattn.train import train
 
 SETTINGS = EvaluateConfig(

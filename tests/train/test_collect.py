@@ -6,7 +6,7 @@ from torch import Tensor
 
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
-from innerattn.scripted import View, scripted_policy
+from innerattn.policies import View, scripted_policy
 from innerattn.train.collect import Collector
 
 

@@ -13,8 +13,9 @@ from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
 from innerattn.learn.types import Transitions
-from innerattn.scripted import View, scripted_policy
-from innerattn.train import Progress, load_policy, read_info, train
+from innerattn.policies import View, scripted_policy
+from innerattn.records.run_folder import read_info
+from innerattn.train import Progress, load_policy, train
 from innerattn.train.build import build_learner
 from innerattn.train.collect import Collector
 from innerattn.train.imitate import Imitation, _Memory

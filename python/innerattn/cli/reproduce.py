@@ -14,16 +14,16 @@ from rich.console import Console
 
 from innerattn.cli.options import Command, UsageError
 from innerattn.cli.progress import SeveralRuns
-from innerattn.cli.reproduce_tables import print_scores
 from innerattn.config import BUDGETS
-from innerattn.study.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
-from innerattn.study.crossed.arms import plan_crossed
-from innerattn.study.plan import SITUATIONS, TARGETS, PlannedRun, plan
-from innerattn.study.smoke import smoke_note
+from innerattn.experiments.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
+from innerattn.experiments.crossed.arms import plan_crossed
+from innerattn.experiments.plan import SITUATIONS, TARGETS, PlannedRun, plan
+from innerattn.experiments.smoke import smoke_note
+from innerattn.report.tables.experiments import print_scores
 
 if TYPE_CHECKING:
-    from innerattn.study.inventory import Found
-    from innerattn.study.lock import StudyLock
+    from innerattn.experiments.lock import StudyLock
+    from innerattn.experiments.scan import Found
 
     Target: TypeAlias = str
     Budget: TypeAlias = str
@@ -71,11 +71,11 @@ class Reproduce(Command):
         out = self.out or Path("studies") / name
         planned = self._planned(out)
 
-        from innerattn.report.drawing import check_format
-        from innerattn.study.document import write_account
-        from innerattn.study.inventory import finished_runs, take_inventory
-        from innerattn.study.lock import StudyLock
-        from innerattn.study.outputs import make_outputs
+        from innerattn.experiments.account import write_account
+        from innerattn.experiments.lock import StudyLock
+        from innerattn.experiments.scan import finished_runs, take_inventory
+        from innerattn.report.outputs import make_outputs
+        from innerattn.report.plots.drawing import check_format
 
         if self.target != "table2":
             check_format(out / "figure.png")  # before hours of training, not after
@@ -122,7 +122,7 @@ class Reproduce(Command):
         return make(methods, situations, range(self.seeds), self.budget, out)
 
     def _print_plan(self, console: Console, found: Sequence[Found], out: Path) -> None:
-        from innerattn.study.train import places, to_measure, to_train
+        from innerattn.experiments.train import places, to_measure, to_train
 
         states = Counter(one.state for one in found)
         train, measure = len(to_train(found)), len(to_measure(found))
@@ -147,7 +147,7 @@ class Reproduce(Command):
                 print(f"innerattn: {text} (move it away to have it trained)", file=sys.stderr)
 
     def _train(self, found: Sequence[Found], out: Path, lock: StudyLock) -> None:
-        from innerattn.study.train import train_missing
+        from innerattn.experiments.train import train_missing
 
         with SeveralRuns() as progress:
             train_missing(found, out, lock, changed=progress, failed=_say_why, debug=self.debug)

@@ -12,11 +12,12 @@ from pathlib import Path
 
 from innerattn.config import EvaluateConfig, Scenario, refuse_late_faults
 from innerattn.config.files import write_whole
-from innerattn.evaluate.episodes import FIELDS, Record, run_episodes
-from innerattn.evaluate.records import write_records
-from innerattn.evaluate.summary import Summary, summarise
+from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
-from innerattn.scripted import SCRIPTED, Policy, scripted_policy
+from innerattn.measures.summary import Summary, summarise
+from innerattn.policies import SCRIPTED, Policy, scripted_policy
+from innerattn.records.parquet import write_records
+from innerattn.records.record import FIELDS, Record
 from innerattn.train.build import thread_count, torch_threads
 
 ProgressCall = Callable[[int, int], None]

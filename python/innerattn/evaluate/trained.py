@@ -14,7 +14,7 @@ from innerattn.config import RunConfig, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.learn.types import Learner
-from innerattn.scripted import View
+from innerattn.policies import View
 from innerattn.train import load_policy
 
 

@@ -13,7 +13,7 @@ from torch import Tensor
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.learn.types import Learner, Transitions
-from innerattn.scripted import View, scripted_policy
+from innerattn.policies import View, scripted_policy
 from innerattn.train.collect import Collector
 
 

@@ -15,10 +15,11 @@ from innerattn.config import Scenario
 from innerattn.config.scenario import Fault
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.errors import RunError
-from innerattn.evaluate.episodes import Record, run_episodes
-from innerattn.evaluate.faults.label_shuffle import SHUFFLES
 from innerattn.evaluate.faults.severity import fault_of
-from innerattn.evaluate.faults.shift import (
+from innerattn.evaluate.play import run_episodes
+from innerattn.evaluate.trained import load_trained
+from innerattn.measures.faults.label_shuffle import SHUFFLES
+from innerattn.measures.faults.shift import (
     Pooled,
     Twins,
     areas_by_head,
@@ -27,9 +28,9 @@ from innerattn.evaluate.faults.shift import (
     pooled_robots,
     shift_of,
 )
-from innerattn.evaluate.faults.shift_figures import FaultAttention, KindShift
-from innerattn.evaluate.statistics import resampled_counts
-from innerattn.evaluate.trained import load_trained
+from innerattn.measures.faults.shift_results import FaultAttention, KindShift
+from innerattn.records.record import Record
+from innerattn.stats.intervals import resampled_counts
 from innerattn.train.build import thread_count, torch_threads
 
 EPISODES = 100

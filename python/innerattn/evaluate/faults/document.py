@@ -8,9 +8,9 @@ from dataclasses import asdict
 from typing import Any
 
 from innerattn.evaluate.faults.grid import ONSETS, Grid, Kept
-from innerattn.evaluate.faults.retention import Estimate
 from innerattn.evaluate.faults.severity import fault_of
-from innerattn.evaluate.statistics import Interval
+from innerattn.measures.faults.retention import Estimate
+from innerattn.stats.intervals import Interval
 
 SCHEMA_VERSION = 1
 

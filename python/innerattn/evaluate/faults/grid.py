@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 from innerattn.envs.batch import FAULT_KINDS
-from innerattn.evaluate.episodes import Record, run_episodes
-from innerattn.evaluate.faults.retention import Estimate, area, retention
 from innerattn.evaluate.faults.severity import fault_of
-from innerattn.evaluate.statistics import resampled_counts
-from innerattn.scripted import Policy
+from innerattn.evaluate.play import run_episodes
+from innerattn.measures.faults.retention import Estimate, area, retention
+from innerattn.policies import Policy
+from innerattn.records.record import Record
+from innerattn.stats.intervals import resampled_counts
 
 SEVERITIES = (0.25, 0.5, 0.75, 1.0)
 """From harmless (0, which needs no measuring) to the worst (1)."""
