@@ -9,7 +9,7 @@ from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.evaluate import play as episodes
 from innerattn.evaluate.play import run_episodes
-from innerattn.policies import View, scripted_policy
+from innerattn.policies import PolicyInput, scripted_policy
 from innerattn.records.record import FIELDS, Record
 
 
@@ -40,7 +40,7 @@ def test_record_against_a_plain_loop() -> None:
     events = []
     total = np.zeros((6, 4, 4))
     for t in range(12):
-        seen = View.of(env, obs)
+        seen = PolicyInput.of(env, obs)
         actions = policy.act(seen)
         for name, value in [*seen._asdict().items(), ("actions", actions)]:
             np.testing.assert_array_equal(record.steps[name][:, t], value)

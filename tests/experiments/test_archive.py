@@ -10,7 +10,7 @@ from innerattn.errors import RunError
 from innerattn.experiments.archive import keep
 from innerattn.experiments.plan import plan
 from innerattn.experiments.run import StudyRun, digests, read_measured
-from innerattn.experiments.scan import FinishedRun, take_inventory
+from innerattn.experiments.scan import FinishedRun, scan_runs
 from innerattn.records.parquet import read_records
 from innerattn.records.run_folder import read_info
 from innerattn.report.crossed import write_crossed
@@ -49,7 +49,7 @@ def test_a_study_goes_on_with_kept_runs(
     for one in planned[:2]:
         case, source = one.case, study / "runs" / one.folder.name
         keep(StudyRun(case.situation, case.method, case.seed, source), one.folder)
-    states = [one.state for one in take_inventory(planned, tmp_path)]
+    states = [one.state for one in scan_runs(planned, tmp_path)]
     assert states == ["finished", "finished", "missing", "missing"]
 
 

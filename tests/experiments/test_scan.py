@@ -12,7 +12,7 @@ from innerattn.errors import RunError
 from innerattn.experiments.failures import forget_failures, note_failure
 from innerattn.experiments.plan import PlannedRun, plan
 from innerattn.experiments.run import digests
-from innerattn.experiments.scan import Found, finished_runs, take_inventory
+from innerattn.experiments.scan import RunStatus, finished_runs, scan_runs
 
 
 @pytest.fixture
@@ -20,9 +20,9 @@ def planned(study: Path, small: dict[str, object]) -> list[PlannedRun]:
     return plan(("td-inner", "td-uniform"), ("mixed",), (0, 1), "quick", study, small)
 
 
-def find(planned: list[PlannedRun], study: Path) -> Found:
+def find(planned: list[PlannedRun], study: Path) -> RunStatus:
     """What becomes of the first run; the others are left as they are."""
-    first, *others = take_inventory(planned, study)
+    first, *others = scan_runs(planned, study)
     assert [one.state for one in others] == ["finished", "missing", "missing"]
     return first
 
@@ -34,7 +34,7 @@ def edit(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
 
 
 def test_finished_and_missing(study: Path, planned: list[PlannedRun]) -> None:
-    found = take_inventory(planned, study)
+    found = scan_runs(planned, study)
     assert [one.state for one in found] == ["finished", "finished", "missing", "missing"]
     runs = finished_runs(found)
     assert [run.case for run in runs] == [one.case for one in planned[:2]]
@@ -46,7 +46,7 @@ def test_a_run_that_did_not_end_is_unfinished(
     state: str, study: Path, planned: list[PlannedRun]
 ) -> None:
     edit(planned[0].folder / "run.json", lambda info: info.update(state=state))
-    assert find(planned, study) == Found(planned[0], "unfinished", f"its state is {state!r}")
+    assert find(planned, study) == RunStatus(planned[0], "unfinished", f"its state is {state!r}")
 
 
 @pytest.mark.parametrize("name", ["summary.json", "episodes.parquet", "rescues.parquet"])
@@ -74,7 +74,7 @@ def test_what_cannot_be_measured_again_is_left_alone(
     shutil.rmtree(folder / "checkpoints")  # a small copy of a run has no weights
     edit(folder / "run.json", lambda info: info.update(weights_sha256=digest))
     assert find(planned, study).state == "finished"
-    first = take_inventory(planned, study, whole=True)[0]
+    first = scan_runs(planned, study, whole=True)[0]
     assert (first.state, first.why) == (
         "unreadable",
         "a small copy of a run, without metrics and steps",
@@ -102,7 +102,7 @@ def test_another_configuration_is_named_with_both_values(
     file = planned[0].folder / "config.toml"
     file.write_text(file.read_text().replace("polyak = 0.02\n", "polyak = 0.03\n"))
     expected = "td.polyak = 0.03, planned 0.02"
-    assert find(planned, study) == Found(planned[0], "other_configuration", expected)
+    assert find(planned, study) == RunStatus(planned[0], "other_configuration", expected)
 
 
 def test_many_differences_are_cut_short(small: dict[str, object], study: Path) -> None:
@@ -113,7 +113,7 @@ def test_many_differences_are_cut_short(small: dict[str, object], study: Path) -
         "network.precision": "bfloat16",
     }
     planned = plan(("td-inner",), ("mixed",), (0,), "quick", study, {**small, **changes})
-    (found,) = take_inventory(planned, study)
+    (found,) = scan_runs(planned, study)
     assert found.why == (
         "network.precision = 'float32', planned 'bfloat16'; td.gamma = 0.95, planned 0.5; "
         "td.polyak = 0.02, planned 0.5; and 1 more"
@@ -127,7 +127,7 @@ def test_numbers_that_a_run_does_not_look_at_do_not_count(
     warm = {"imitation.env_steps": 300_000, "train.warm_start": "greedy"}
     for changes, state in ((inert, "finished"), (warm, "other_configuration")):
         planned = plan(("td-inner",), ("mixed",), (0,), "quick", study, {**small, **changes})
-        (found,) = take_inventory(planned, study)
+        (found,) = scan_runs(planned, study)
         assert found.state == state
 
 
@@ -167,15 +167,15 @@ def test_failures_are_known_until_they_are_forgotten(
 ) -> None:
     for one in planned:
         note_failure(study, one, f"{one.case} diverged")
-    found = take_inventory(planned, study)
+    found = scan_runs(planned, study)
     assert [one.state for one in found] == ["finished", "finished", "failed", "failed"]
     assert found[3].why == "mixed td-uniform seed 1 diverged"
     forget_failures(study, planned[1:3])
-    found = take_inventory(planned, study)
+    found = scan_runs(planned, study)
     assert [one.state for one in found] == ["finished", "finished", "missing", "failed"]
 
 
 def test_a_damaged_list_of_failures_is_one_line(study: Path, planned: list[PlannedRun]) -> None:
     (study / "failures.json").write_text("[]")
     with pytest.raises(RunError, match=r"failures\.json: not a list of failed runs; remove it$"):
-        take_inventory(planned, study)
+        scan_runs(planned, study)

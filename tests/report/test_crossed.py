@@ -25,7 +25,7 @@ from innerattn.train.weights import digest_of
 OUT = Path("study")
 METHODS = ("td-inner", "td-uniform")
 EVEN = Outcome(0.02, 0.48, 2.0, 0.7, 0.9)
-IDLE = replace(EVEN, unevenness=0.4, least_share=0.1)
+IDLE = replace(EVEN, imbalance=0.4, least_share=0.1)
 
 Outcomes = dict[Arm, dict[int, Outcome]]
 
@@ -71,7 +71,7 @@ def test_contrasts_compare_whole_means() -> None:
         assert (plus, minus) == pytest.approx((whole, -whole)), name
 
 
-@pytest.mark.parametrize("figure", ["unevenness", "score", "entropy_share"])
+@pytest.mark.parametrize("figure", ["imbalance", "score", "entropy_share"])
 def test_effects_against_plain_means(figure: str) -> None:
     outcomes = random_outcomes(3)
     mean = {
@@ -202,7 +202,7 @@ def test_runs_of_one_seed_count_once() -> None:
     assert "uniform: 1 of 10 [" in measured
     low, high = student(
         [
-            np.mean([outcomes[Arm("helpers", p)][seed].unevenness for p in (0.0, 1e-4, 1e-3)])
+            np.mean([outcomes[Arm("helpers", p)][seed].imbalance for p in (0.0, 1e-4, 1e-3)])
             for seed in range(10)
         ]
     )
@@ -244,7 +244,7 @@ def test_attention_makes_even_what_it_takes_most_unevenness_from(
     with_: float, without: float, holds: str
 ) -> None:
     outcomes = {
-        arm: scattered(replace(EVEN, unevenness=without if arm.penalty is None else with_), i)
+        arm: scattered(replace(EVEN, imbalance=without if arm.penalty is None else with_), i)
         for i, arm in enumerate(ARMS)
     }
     assert said(outcomes)[MAKES_EVEN].holds == holds
@@ -253,9 +253,9 @@ def test_attention_makes_even_what_it_takes_most_unevenness_from(
 def test_where_half_the_unevenness_may_be_gone_nothing_is_said() -> None:
     outcomes = {arm: scattered(EVEN, i) for i, arm in enumerate(ARMS)}
     for seed, uneven in enumerate([0.0, 0.3] * 5):  # a few seeds are uneven without, none with
-        outcomes[Arm("team", None)][seed] = replace(EVEN, unevenness=uneven)
+        outcomes[Arm("team", None)][seed] = replace(EVEN, imbalance=uneven)
         for penalty in (0.0, 1e-4, 1e-3):
-            outcomes[Arm("team", penalty)][seed] = replace(EVEN, unevenness=0.1)
+            outcomes[Arm("team", penalty)][seed] = replace(EVEN, imbalance=0.1)
     assert said(outcomes)[MAKES_EVEN].holds == "undecided"
 
 
@@ -273,7 +273,7 @@ def test_outcome_against_a_plain_loop(runs: list[StudyRun]) -> None:
                     helped[by_index[int(event["task"])]][robot] += 1
     distances = [abs(first / (first + second) - 0.5) for first, second in helped.values()]
     total = np.sum(list(helped.values()), axis=0)
-    assert found.unevenness == pytest.approx(np.mean(distances))
+    assert found.imbalance == pytest.approx(np.mean(distances))
     assert found.least_share == pytest.approx(min(total) / sum(total))
     assert found.rescues_per_episode == measured.summary["rescues_per_episode"]["mean"]
     shares = np.concatenate(list(measured.summary["attention_entropy_share"].values()))

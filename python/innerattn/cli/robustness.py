@@ -22,7 +22,7 @@ from innerattn.report.tables.robustness import print_robustness
 if TYPE_CHECKING:
     from innerattn.config import Scenario
     from innerattn.evaluate.bounds.figures import Bounds
-    from innerattn.evaluate.faults.grid import Grid, Kept, MakePolicy
+    from innerattn.evaluate.faults.grid import Grid, MakePolicy, Retention
     from innerattn.evaluate.trained import TrainedPolicy
     from innerattn.measures.faults.shift_results import FaultAttention
 
@@ -115,7 +115,9 @@ class Robustness(Command):
             raise UsageError(f"--faults = {unknown[0]!r}: known are all, {known}")
         return kinds
 
-    def _retention(self, kinds: tuple[str, ...]) -> tuple[Grid, dict[str, Kept], dict[str, str]]:
+    def _retention(
+        self, kinds: tuple[str, ...]
+    ) -> tuple[Grid, dict[str, Retention], dict[str, str]]:
         from innerattn.evaluate.faults.grid import Grid, play_all
         from innerattn.evaluate.trained import load_trained
         from innerattn.policies import scripted_policy
@@ -192,7 +194,7 @@ def _names(runs: Sequence[str]) -> list[str]:
 
 def _document(
     grid: Grid,
-    found: dict[str, Kept],
+    found: dict[str, Retention],
     methods: dict[str, str],
     bounds: dict[str, Bounds],
     attention: dict[str, FaultAttention],

@@ -7,7 +7,7 @@ from innerattn.evaluate.measure import Evaluation, evaluate_policy, evaluate_run
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import TrainedPolicy, load_trained
 from innerattn.measures.summary import Figures, Summary
-from innerattn.policies import SCRIPTED, Policy, View, scripted_policy
+from innerattn.policies import SCRIPTED, Policy, PolicyInput, scripted_policy
 from innerattn.records.parquet import read_records, write_records
 from innerattn.records.record import Record
 from innerattn.stats.intervals import Interval, student_interval
@@ -18,10 +18,10 @@ __all__ = [
     "Figures",
     "Interval",
     "Policy",
+    "PolicyInput",
     "Record",
     "Summary",
     "TrainedPolicy",
-    "View",
     "evaluate_policy",
     "evaluate_run",
     "load_trained",

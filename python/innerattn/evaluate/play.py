@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
-from innerattn.policies.policy import Policy, View
+from innerattn.policies.policy import Policy, PolicyInput
 from innerattn.records.record import FIELDS, Record, rescue_dtype
 
 _WORLDS_AT_ONCE = 1024
@@ -26,7 +26,7 @@ _WORLDS_AT_ONCE = 1024
 class Attentive(Protocol):
     """A policy with a critic whose attention, if it has any, can be recorded."""
 
-    def attention(self, view: View, actions: NDArray[Any]) -> NDArray[np.float32] | None:
+    def attention(self, view: PolicyInput, actions: NDArray[Any]) -> NDArray[np.float32] | None:
         """Attention weights (E, H, R, R) for these actions; None where there are none."""
 
 
@@ -88,7 +88,7 @@ def _run_batch(
     steps: dict[str, NDArray[Any]] = {}
     events = []
     for step_index in range(total_steps):
-        view = View.of(env, obs)
+        view = PolicyInput.of(env, obs)
         actions = policy.act(view)
         seen: dict[str, NDArray[Any]] = {**view._asdict(), "actions": actions}
         if "attention" in record and isinstance(policy, Attentive):

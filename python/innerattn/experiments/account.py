@@ -10,7 +10,7 @@ from typing import Any
 
 from innerattn.config.files import write_whole
 from innerattn.experiments.run import digests
-from innerattn.experiments.scan import Found
+from innerattn.experiments.scan import RunStatus
 from innerattn.experiments.scores import read_scores
 from innerattn.experiments.smoke import smoke_note
 from innerattn.records.run_folder import read_info
@@ -19,7 +19,7 @@ SCHEMA_VERSION = 1
 
 
 def write_account(
-    out: Path, target: str, budget: str, found: Sequence[Found], outputs: Sequence[Path] = ()
+    out: Path, target: str, budget: str, found: Sequence[RunStatus], outputs: Sequence[Path] = ()
 ) -> Path:
     """Write ``runs.json`` into the folder of a study; it appears whole or not at all.
 
@@ -54,7 +54,7 @@ def write_account(
     return out / "runs.json"
 
 
-def _row(out: Path, found: Found) -> dict[str, Any]:
+def _row(out: Path, found: RunStatus) -> dict[str, Any]:
     planned = found.planned
     row = {
         **asdict(planned.case),

@@ -34,7 +34,7 @@ _MOST_KEYS, _MOST_LETTERS = 3, 60
 
 
 @dataclass(frozen=True)
-class Found:
+class RunStatus:
     """What is at the place of a planned run, and why it is not a finished run, if it is not."""
 
     planned: PlannedRun
@@ -55,7 +55,7 @@ class FinishedRun:
     folder: Path
 
 
-def take_inventory(planned: Iterable[PlannedRun], out: Path, *, whole: bool = False) -> list[Found]:
+def scan_runs(planned: Iterable[PlannedRun], out: Path, *, whole: bool = False) -> list[RunStatus]:
     """What is there of each planned run of the study in ``out``.
 
     Args:
@@ -69,14 +69,14 @@ def take_inventory(planned: Iterable[PlannedRun], out: Path, *, whole: bool = Fa
     failures = read_failures(out)
     found = [_find(one, whole) for one in planned]
     return [
-        Found(one.planned, "failed", failures[name])
+        RunStatus(one.planned, "failed", failures[name])
         if one.state in TO_TRAIN and (name := one.planned.folder.name) in failures
         else one
         for one in found
     ]
 
 
-def finished_runs(found: Iterable[Found]) -> list[FinishedRun]:
+def finished_runs(found: Iterable[RunStatus]) -> list[FinishedRun]:
     """The runs that can be used."""
     return [
         FinishedRun(one.planned.case, one.planned.folder)
@@ -99,31 +99,31 @@ def differences(config: RunConfig, planned: RunConfig) -> list[str]:
     ]
 
 
-def _find(planned: PlannedRun, whole: bool) -> Found:
+def _find(planned: PlannedRun, whole: bool) -> RunStatus:
     folder = planned.folder
     if not os.path.lexists(folder):
-        return Found(planned, "missing")
+        return RunStatus(planned, "missing")
     if folder.is_symlink():
-        return Found(planned, "unreadable", "a link: must be a run folder")
+        return RunStatus(planned, "unreadable", "a link: must be a run folder")
     try:
         info = read_info(folder)
         config = read_toml(plain_file(folder / "config.toml"))
         differing = differences(config, planned.config)
         if differing:
-            return Found(planned, "other_configuration", _some(differing))
+            return RunStatus(planned, "other_configuration", _some(differing))
         if info.state != "done":
-            return Found(planned, "unfinished", f"its state is {info.state!r}")
+            return RunStatus(planned, "unfinished", f"its state is {info.state!r}")
         digests(folder)
         read_scores(folder, config)
     except NotMeasuredError as error:
         if not os.path.lexists(folder / "checkpoints"):
-            return Found(planned, "unreadable", f"kept without its weights, and {error}")
-        return Found(planned, "unmeasured", "trained, but not measured as a whole")
+            return RunStatus(planned, "unreadable", f"kept without its weights, and {error}")
+        return RunStatus(planned, "unmeasured", "trained, but not measured as a whole")
     except (InnerattnError, OSError) as error:
-        return Found(planned, "unreadable", " ".join(str(error).split()))
+        return RunStatus(planned, "unreadable", " ".join(str(error).split()))
     if whole and not os.path.lexists(folder / "checkpoints"):
-        return Found(planned, "unreadable", "a small copy of a run, without metrics and steps")
-    return Found(planned, "finished")
+        return RunStatus(planned, "unreadable", "a small copy of a run, without metrics and steps")
+    return RunStatus(planned, "finished")
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,16 +10,16 @@ from innerattn.cores import usable_cores
 from innerattn.experiments.failures import forget_failures, note_failure
 from innerattn.experiments.lock import StudyLock
 from innerattn.experiments.plan import PlannedRun
-from innerattn.experiments.scan import TO_TRAIN, Found
+from innerattn.experiments.scan import TO_TRAIN, RunStatus
 from innerattn.experiments.side_by_side import Run, refuse_what_cannot_run, train_side_by_side
 
 
-def to_train(found: Sequence[Found]) -> list[PlannedRun]:
+def to_train(found: Sequence[RunStatus]) -> list[PlannedRun]:
     """The runs that are to be trained and measured, in their order."""
     return [one.planned for one in found if one.state in TO_TRAIN]
 
 
-def to_measure(found: Sequence[Found]) -> list[PlannedRun]:
+def to_measure(found: Sequence[RunStatus]) -> list[PlannedRun]:
     """The runs that are trained and only to be measured, in their order."""
     return [one.planned for one in found if one.state == "unmeasured"]
 
@@ -30,7 +30,7 @@ def places(runs: int) -> int:
 
 
 def train_missing(
-    found: Sequence[Found],
+    found: Sequence[RunStatus],
     out: Path,
     lock: StudyLock,
     *,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from innerattn.envs import BatchEnv
 
 
-class View(NamedTuple):
+class PolicyInput(NamedTuple):
     """What a policy may look at before it acts: the robots' observations and the true state.
 
     Attributes:
@@ -40,5 +40,5 @@ class Policy(Protocol):
     def name(self) -> str:
         """What to call it in tables."""
 
-    def act(self, view: View) -> NDArray[Any]:
+    def act(self, view: PolicyInput) -> NDArray[Any]:
         """Choose actions: (E, R) integers, or (E, R, 2) float32 where actions are continuous."""

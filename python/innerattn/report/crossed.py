@@ -22,13 +22,17 @@ from innerattn.report.paper.table2 import markdown_table
 from innerattn.report.plots.arms import ArmDots, ArmPanel, draw_arms
 from innerattn.report.plots.drawing import check_format, write_figure
 from innerattn.report.smoke import mark_figure, noted_csv, noted_markdown
-from innerattn.stats.seeds import OverRuns, over_runs
+from innerattn.stats.seeds import SeedEstimate, seed_estimate
 from innerattn.stats.text import NONE, fixed, p_shown, shown
 
 SCHEMA_VERSION = 1
 
 _DRAWN = {
-    "unevenness": ("unevenness of shares", (MARGINS["unevenness"],), (0.0, 0.5)),
+    "imbalance": (
+        "workload imbalance",
+        (MARGINS["imbalance"],),
+        (0.0, 0.5),
+    ),
     "least_share": ("share of the idler robot", (IDLE,), (0.0, 0.5)),
     "score": ("score", (), None),
     "entropy_share": ("entropy / ln(N - 1)", (1.0,), (0.0, 1.0)),
@@ -168,7 +172,7 @@ def _markdown(
 
 
 def _arms_table(situation: Situation) -> str:
-    head = ["arm", "runs", "unevenness", "least share", "runs with an idle robot"]
+    head = ["arm", "runs", "imbalance", "least share", "runs with an idle robot"]
     head += ["rescues per episode", "score", "entropy / ln(N − 1)"]
     rows = []
     outcomes = situation.outcomes()
@@ -177,7 +181,7 @@ def _arms_table(situation: Situation) -> str:
         rows.append(
             [
                 *(str(arm), str(len(runs))),
-                *(shown(_mean(runs, name)) for name in ("unevenness", "least_share")),
+                *(shown(_mean(runs, name)) for name in ("imbalance", "least_share")),
                 idle_shown(outcomes, [arm]),
                 *(shown(_mean(runs, name)) for name in ("rescues_per_episode", "score")),
                 shown(_mean(runs, "entropy_share"), 3),
@@ -204,13 +208,13 @@ def _effects_table(situation: Situation) -> str:
 
 
 def _runs_table(situations: Sequence[Situation], out: Path) -> str:
-    head = ["situation", "arm", "seed", "unevenness", "least share", "score", "folder"]
+    head = ["situation", "arm", "seed", "imbalance", "least share", "score", "folder"]
     head += ["SHA-256 of the configuration", "SHA-256 of the weights"]
     rows = []
     for situation in situations:
         for run in situation.runs:
             outcome = run.outcome
-            figures = (outcome.unevenness, outcome.least_share, outcome.score)
+            figures = (outcome.imbalance, outcome.least_share, outcome.score)
             rows.append(
                 [
                     *(situation.name, str(run.arm), str(run.seed)),
@@ -291,5 +295,5 @@ def _panels(situation: Situation) -> list[ArmPanel]:
     return panels
 
 
-def _mean(runs: Sequence[Outcome], name: str) -> OverRuns | None:
-    return over_runs([getattr(run, name) for run in runs])
+def _mean(runs: Sequence[Outcome], name: str) -> SeedEstimate | None:
+    return seed_estimate([getattr(run, name) for run in runs])

@@ -28,7 +28,7 @@ BAND_NAMES: dict[BandKind, str] = {
 
 
 @dataclass(frozen=True)
-class OverRuns:
+class SeedEstimate:
     """A mean over runs and Student's 95 % interval; the run is the unit.
 
     Attributes:
@@ -45,7 +45,7 @@ class OverRuns:
 
 
 @dataclass(frozen=True)
-class Band:
+class SeedCurve:
     """A mean course over runs and what it lies between, by `BandKind`.
 
     Attributes:
@@ -68,18 +68,18 @@ class Band:
         return {"band": self.kind, **shown, "runs": self.runs.tolist()}
 
 
-def over_runs(values: Sequence[float | None]) -> OverRuns | None:
+def seed_estimate(values: Sequence[float | None]) -> SeedEstimate | None:
     """The mean over runs; None where no run has the figure."""
     found = [value for value in values if value is not None and math.isfinite(value)]
     if not found:
         return None
     if len(found) == 1:
-        return OverRuns(found[0], None, None, 1)
+        return SeedEstimate(found[0], None, None, 1)
     interval = student_interval(found)
-    return OverRuns(interval.mean, interval.low, interval.high, len(found))
+    return SeedEstimate(interval.mean, interval.low, interval.high, len(found))
 
 
-def band(values: Array) -> Band:
+def seed_curve(values: Array) -> SeedCurve:
     """The course of a figure over runs.
 
     Args:
@@ -96,7 +96,7 @@ def band(values: Array) -> Band:
     low = np.where(n > 2, mean - half, np.where(n == 2, least, np.nan))
     high = np.where(n > 2, mean + half, np.where(n == 2, most, np.nan))
     kinds: tuple[BandKind, ...] = ("none", "range", "student")
-    return Band(kinds[min(len(values), 3) - 1], mean, low, high, n)
+    return SeedCurve(kinds[min(len(values), 3) - 1], mean, low, high, n)
 
 
 def numbers(values: Array) -> Any:

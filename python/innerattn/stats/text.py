@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from innerattn.stats.intervals import Interval
-from innerattn.stats.seeds import OverRuns
+from innerattn.stats.seeds import SeedEstimate
 
 NONE = "–"
 """What stands where there is no figure."""
 
 
-def shown(value: OverRuns | Interval | None, decimals: int = 2) -> str:
+def shown(value: SeedEstimate | Interval | None, decimals: int = 2) -> str:
     """A mean with its interval, where it has one."""
     if value is None:
         return NONE

@@ -8,8 +8,8 @@ import pytest
 from innerattn.experiments.paper.claims import (
     Holds,
     entropy_claims,
-    handover_is_own,
-    handover_moves,
+    handoff_is_own,
+    handoff_moves,
 )
 from innerattn.experiments.paper.competence import COMPETENCE, Competence
 from innerattn.experiments.paper.fig4 import EntropyCourse
@@ -18,7 +18,7 @@ from innerattn.experiments.paper.sharing_claims import judged, sharing_claims
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.experiments.run import StudyRun, read_measured
 from innerattn.measures.sharing.evenness import evenness, evenness_of_runs
-from innerattn.stats.seeds import OverRuns, over_runs
+from innerattn.stats.seeds import SeedEstimate, seed_estimate
 
 EVEN, UNEVEN = (0.5, 0.51, 0.49), (0.8, 0.82, 0.79)
 
@@ -35,9 +35,9 @@ def made_row(method: str, task: str, shares: tuple[float, ...]) -> Row:
     return Row("mixed", method, task, ("food_0", "food_1"), seeds, sharing, sharing, None)
 
 
-def made_competence(method: str, unevenness: list[float]) -> Competence:
-    each = tuple(dict.fromkeys(COMPETENCE, 0.5) | {"unevenness": value} for value in unevenness)
-    nothing: dict[str, OverRuns | None] = dict.fromkeys(COMPETENCE)
+def made_competence(method: str, imbalance: list[float]) -> Competence:
+    each = tuple(dict.fromkeys(COMPETENCE, 0.5) | {"imbalance": value} for value in imbalance)
+    nothing: dict[str, SeedEstimate | None] = dict.fromkeys(COMPETENCE)
     seeds = tuple(range(len(each)))
     return Competence("mixed", method, seeds, ({},) * len(each), each, nothing)
 
@@ -99,7 +99,7 @@ def test_claims_about_sharing() -> None:
 def test_claims_about_entropy(
     begin: tuple[float, ...], end: tuple[float, ...], below: Holds, falls: Holds
 ) -> None:
-    means = [over_runs(values) for values in (begin, end, np.subtract(end, begin).tolist())]
+    means = [seed_estimate(values) for values in (begin, end, np.subtract(end, begin).tolist())]
     first, last, change = (mean for mean in means if mean is not None)
     course = EntropyCourse(
         situation="mixed",
@@ -125,16 +125,16 @@ def found(runs: list[StudyRun]) -> Evidence:
 @pytest.mark.parametrize(
     ("change", "moves"),
     [
-        (OverRuns(0.2, 0.1, 0.3, 3), "yes"),
-        (OverRuns(0.03, 0.01, 0.045, 3), "no"),
-        (OverRuns(-0.03, -0.1, 0.04, 3), "no"),
-        (OverRuns(0.1, -0.1, 0.3, 3), "undecided"),
-        (OverRuns(0.2, None, None, 1), "undecided"),
+        (SeedEstimate(0.2, 0.1, 0.3, 3), "yes"),
+        (SeedEstimate(0.03, 0.01, 0.045, 3), "no"),
+        (SeedEstimate(-0.03, -0.1, 0.04, 3), "no"),
+        (SeedEstimate(0.1, -0.1, 0.3, 3), "undecided"),
+        (SeedEstimate(0.2, None, None, 1), "undecided"),
         (None, "undecided"),
     ],
 )
-def test_whether_attention_moves(change: OverRuns | None, moves: Holds) -> None:
-    assert handover_moves(change) == moves
+def test_whether_attention_moves(change: SeedEstimate | None, moves: Holds) -> None:
+    assert handoff_moves(change) == moves
 
 
 @pytest.mark.parametrize(
@@ -151,6 +151,6 @@ def test_whether_attention_moves(change: OverRuns | None, moves: Holds) -> None:
 def test_whether_the_move_is_that_of_who_hands_over(
     found: Evidence, change: tuple[float, ...], own: tuple[float, ...], holds: Holds
 ) -> None:
-    beyond_half = over_runs(np.subtract(own, np.divide(change, 2.0)).tolist())
-    made = replace(found, own_part=over_runs(own), own_part_beyond_half=beyond_half)
-    assert handover_is_own(made) == holds
+    beyond_half = seed_estimate(np.subtract(own, np.divide(change, 2.0)).tolist())
+    made = replace(found, own_part=seed_estimate(own), own_part_beyond_half=beyond_half)
+    assert handoff_is_own(made) == holds

@@ -1,4 +1,4 @@
-"""Hand-overs of many runs: the control, means over runs by plain loops, the rule, the figures."""
+"""Handoffs of many runs: the control, means over runs by plain loops, the rule, the figures."""
 
 import json
 from dataclasses import replace
@@ -6,21 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from innerattn.experiments.paper.claims import handover_claims
+from innerattn.experiments.paper.claims import handoff_claims
 from innerattn.experiments.paper.fig5 import (
     Evidence,
-    all_handovers,
+    all_handoffs,
     evidence,
     evidence_json,
     with_bystander,
 )
 from innerattn.experiments.paper.scene import choose_scene, scene_json
 from innerattn.experiments.run import Measured, StudyRun, read_measured
-from innerattn.measures.sharing.handoff import handovers
-from innerattn.measures.sharing.handoff_attention import handover_attention
+from innerattn.measures.sharing.handoff import handoffs
+from innerattn.measures.sharing.handoff_attention import handoff_attention
 from innerattn.report.paper.fig5 import evidence_lines
 from innerattn.report.plots.aligned import draw_aligned
-from innerattn.report.plots.handoff import draw_handover
+from innerattn.report.plots.handoff import draw_handoff
 
 
 @pytest.fixture(scope="module")
@@ -36,9 +36,9 @@ def found(inner: list[Measured]) -> Evidence:
 
 
 def changes(measured: Measured, role: str, *, bystander: bool) -> list[float]:
-    """Mean weight after the first rescue minus that up to it, of each hand-over."""
+    """Mean weight after the first rescue minus that up to it, of each handoff."""
     weights, values = measured.recorded.steps["attention"], []
-    for row in all_handovers(measured.recorded):
+    for row in all_handoffs(measured.recorded):
         robot = 1 - row["robot"] if bystander else row["robot"]
         own = weights[row["episode"], :, :, robot, row[role]].astype(float).mean(1)
         lowest = max(row["start"], row["first"] - 7)
@@ -59,7 +59,7 @@ def test_changes_of_robot_and_control_against_plain_loops(
             assert parts[role].change.mean == pytest.approx(np.mean(plain))
     own = np.subtract(found.robot["to_be"].change_by_run, found.control["to_be"].change_by_run)
     assert found.own_part_by_run == pytest.approx(own)
-    assert found.handovers == tuple(len(all_handovers(m.recorded)) for m in inner)
+    assert found.handoffs == tuple(len(all_handoffs(m.recorded)) for m in inner)
     beyond = own - np.divide(found.robot["to_be"].change_by_run, 2.0)
     assert found.own_part_beyond_half is not None
     assert found.own_part_beyond_half.mean == pytest.approx(beyond.mean())
@@ -67,21 +67,21 @@ def test_changes_of_robot_and_control_against_plain_loops(
         inner, found.p_by_run, found.control_p_by_run, strict=True
     ):
         record = measured.recorded
-        own = all_handovers(record)
+        own = all_handoffs(record)
         for p, of in ((own_p, own), (control_p, with_bystander(record, own))):
-            attention = handover_attention(record, of, 0)
+            attention = handoff_attention(record, of, 0)
             assert attention is not None
             assert p == attention.p[0]
     assert found.p_by_run != found.control_p_by_run
 
 
-def test_a_run_without_handovers_does_not_count(inner: list[Measured]) -> None:
+def test_a_run_without_handoffs_does_not_count(inner: list[Measured]) -> None:
     record = inner[2].recorded
     without = replace(inner[2], recorded=replace(record, rescues=record.rescues[:0]))
     found, of_two = evidence([*inner[:2], without]), evidence(inner[:2])
     assert found is not None
     assert of_two is not None
-    assert (found.seeds, found.runs, found.handovers[2]) == ((0, 1, 2), 2, 0)
+    assert (found.seeds, found.runs, found.handoffs[2]) == ((0, 1, 2), 2, 0)
     assert found.own_part_by_run == (*of_two.own_part_by_run, None)
     assert found.p_by_run[2] is found.control_p_by_run[2] is None
     assert found.own_part == of_two.own_part
@@ -89,12 +89,12 @@ def test_a_run_without_handovers_does_not_count(inner: list[Measured]) -> None:
     assert line.runs == expected.runs
     assert line.runs.startswith("2 runs (least to largest)")
     assert (line.robot == expected.robot).all()
-    assert {claim.runs for claim in handover_claims([found])} == {2}
+    assert {claim.runs for claim in handoff_claims([found])} == {2}
 
 
 def test_the_control_takes_no_part(inner: list[Measured]) -> None:
     record = inner[0].recorded
-    own = all_handovers(record)
+    own = all_handoffs(record)
     control = with_bystander(record, own)
     assert set(own["robot"]) == {0, 1}
     assert (control["robot"] == 1 - own["robot"]).all()
@@ -110,7 +110,7 @@ def test_the_scene_follows_its_rule(inner: list[Measured]) -> None:
     scene, record = choose_scene(inner), inner[0].recorded
     assert scene is not None
     best = max(
-        handovers(record, "food_0", "task_1", "task_2").tolist(),
+        handoffs(record, "food_0", "task_1", "task_2").tolist(),
         key=lambda h: (min(h[5] - h[4] + 1, h[6] - h[5]), h[6] - h[4], -h[0]),
     )
     assert (scene.robot, scene.before, scene.after) == (0, 3, 2)
@@ -124,7 +124,7 @@ def test_the_scene_follows_its_rule(inner: list[Measured]) -> None:
 def test_the_scene_is_drawn_as_panels_a_b_and_c(inner: list[Measured]) -> None:
     scene = choose_scene(inner)
     assert scene is not None
-    figure = draw_handover(scene)
+    figure = draw_handoff(scene)
     arenas, overall, heads = figure.axes[:3], figure.axes[3], figure.axes[4:]
     assert {(panel.get_xlabel(), panel.get_ylabel()) for panel in arenas} == {("x [m]", "y [m]")}
     names = {robot.name for robot in scene.scenario.robots}
@@ -138,9 +138,9 @@ def test_the_scene_is_drawn_as_panels_a_b_and_c(inner: list[Measured]) -> None:
     assert [panel.get_title(loc="left") for panel in figure.axes] == [*"A", "", "", *"BC", ""]
 
 
-def test_all_handovers_are_drawn_with_their_control(found: Evidence) -> None:
+def test_all_handoffs_are_drawn_with_their_control(found: Evidence) -> None:
     (line,) = lines = evidence_lines([found])
-    assert line.runs == f"3 runs (95 %), {sum(found.handovers)} hand-overs"
+    assert line.runs == f"3 runs (95 %), {sum(found.handoffs)} handoffs"
     figure = draw_aligned(lines)
     (panel,) = figure.axes
     assert panel.get_xlabel() == "steps since the first rescue [0.1 s]"

@@ -10,7 +10,7 @@ from innerattn.experiments.paper.pairs import pairs, together
 
 def made(situation: str, method: str, scores: dict[int, float | None]) -> Competence:
     nothing: dict[str, float | None] = dict.fromkeys(COMPETENCE)
-    each = tuple(nothing | {"score": score, "unevenness": 0.1} for score in scores.values())
+    each = tuple(nothing | {"score": score, "imbalance": 0.1} for score in scores.values())
     return Competence(situation, method, tuple(scores), (), each, {})
 
 
@@ -20,7 +20,7 @@ UNIFORM = {4: 0.9, 2: 0.6, 1: 0.85, 3: 0.1}
 
 def test_seeds_are_compared_pairwise() -> None:
     found = pairs([made("mixed", "td-inner", {**INNER}), made("mixed", "td-uniform", {**UNIFORM})])
-    score, unevenness = found
+    score, imbalance = found
     assert (score.figure, score.seeds) == ("score", (1, 2, 4))
     ours, theirs = [0.8, 0.7, 0.95], [0.85, 0.6, 0.9]
     assert score.inner is not None
@@ -31,7 +31,7 @@ def test_seeds_are_compared_pairwise() -> None:
     assert score.found.p == pytest.approx(expected.pvalue)
     ends = expected.confidence_interval()
     assert score.found.difference.low == pytest.approx(ends.low)
-    assert unevenness.found is None  # all differences are the same
+    assert imbalance.found is None  # all differences are the same
 
 
 def test_what_has_no_counterpart_or_too_few_seeds_is_not_compared() -> None:
@@ -42,9 +42,9 @@ def test_what_has_no_counterpart_or_too_few_seeds_is_not_compared() -> None:
         made("mixed", f"ppo-{kind}", {0: 0.5, 1: score})
         for kind, score in (("inner", 0.6), ("uniform", None))
     ]
-    score, unevenness = pairs(two)
+    score, imbalance = pairs(two)
     assert (score.seeds, score.found) == ((0,), None)
-    assert (unevenness.seeds, unevenness.found) == ((0, 1), None)
+    assert (imbalance.seeds, imbalance.found) == ((0, 1), None)
     assert together(two) == []  # a single run of one has a score
 
 

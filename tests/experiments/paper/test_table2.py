@@ -108,9 +108,9 @@ def test_scripted_policies_are_played_in_the_worlds_of_the_runs(
         of_task = [np.array(helped)[recorded.rescues["task"] == task] for task in (0, 1)]
         if all(map(len, of_task)):
             uneven = np.mean([abs(each.mean() - 0.5) for each in of_task])
-            assert figures["unevenness"] == pytest.approx(uneven)
+            assert figures["imbalance"] == pytest.approx(uneven)
         else:
-            assert figures["unevenness"] is None
+            assert figures["imbalance"] is None
         assert (counts["rescued"], counts["score_episodes"]) == (len(recorded.rescues), 60)
         assert (figures["sooner"] is None) == (counts["choices"] == 0)
         rescues = {of: one["mean"] for of, one in measured.summary["scripted"].items()}
@@ -134,7 +134,7 @@ def test_small_copies_of_runs_are_enough_for_sharing_and_scores(
     of_copies = table2([ordered])
     assert [row.to_json() for row in of_copies.rows] == [row.to_json() for row in table.rows[:2]]
     for whole, copy in zip(table.competence[0].each, of_copies.competence[0].each, strict=True):
-        for name in ("rescues_per_episode", "score", "unevenness"):
+        for name in ("rescues_per_episode", "score", "imbalance"):
             assert copy[name] == whole[name]
         assert copy["sooner"] is copy["regret_s"] is copy["time_to_rescue_s"] is None
     assert of_copies.competence[1:] == table.competence[3:6]  # scripted policies are played again

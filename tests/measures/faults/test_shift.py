@@ -5,7 +5,7 @@ import pytest
 
 from innerattn.measures.faults import shift as attention_shift
 from innerattn.measures.faults.shift import (
-    Twins,
+    PairedRollouts,
     areas_by_head,
     by_head,
     pooled_kinds,
@@ -18,7 +18,7 @@ from innerattn.stats.intervals import Interval, resampled_counts
 
 def made_up(
     episodes: int, steps: int, onset: int, seed: int, jump: float = 0.0, robot: int = 1
-) -> Twins:
+) -> PairedRollouts:
     """Attention of 4 robots in 2 heads that moves by chance, and by a jump onto the failing robot.
 
     All who look at it give it `jump` more from the onset on, and their other teammates that much
@@ -38,10 +38,12 @@ def made_up(
     gain = np.where(np.arange(4) == robot, jump, -jump / 2) * others * looking[:, None]
     faulty[:, onset:] += gain
     happened = np.ones((episodes, steps), bool)
-    return Twins(robot, onset, faulty.astype(np.float32), healthy.astype(np.float32), happened)
+    return PairedRollouts(
+        robot, onset, faulty.astype(np.float32), healthy.astype(np.float32), happened
+    )
 
 
-def ended(twins: Twins, seed: int) -> Twins:
+def ended(twins: PairedRollouts, seed: int) -> PairedRollouts:
     """The same with episodes that end at some time after the onset, and nonsense from then on."""
     episodes, steps = twins.happened.shape
     lengths = np.random.default_rng(seed).integers(twins.onset + 1, steps + 1, episodes)
@@ -51,11 +53,13 @@ def ended(twins: Twins, seed: int) -> Twins:
     return twins._replace(faulty=faulty, healthy=healthy, happened=happened)
 
 
-def measured(twins: Twins, seed: int = 0) -> Shift:
+def measured(twins: PairedRollouts, seed: int = 0) -> Shift:
     return shift_of("r", 0.5, twins, resampled_counts(len(twins.faulty), seed), seed)
 
 
-def plain_means(twins: Twins, faulty: bool, first: int, last: int, heads: list[int]) -> list[float]:
+def plain_means(
+    twins: PairedRollouts, faulty: bool, first: int, last: int, heads: list[int]
+) -> list[float]:
     """By episode, the mean weight on the failing robot over steps and the robots that look."""
     weights = twins.faulty if faulty else twins.healthy
     means = []
@@ -126,7 +130,7 @@ def test_curves_against_plain_loops(monkeypatch: pytest.MonkeyPatch) -> None:
             continue
         assert step is not None
         assert moved is not None
-        part = Twins(
+        part = PairedRollouts(
             twins.robot, t, twins.faulty[goes_on], twins.healthy[goes_on], twins.happened[goes_on]
         )
         values = plain_means(part, True, t, t + 1, [0, 1])
@@ -183,7 +187,7 @@ def test_a_change_with_time_is_no_effect() -> None:
 
 def test_even_weights_do_not_move_at_all() -> None:
     even = np.broadcast_to((1 - np.eye(4)) / 3, (7, 10, 2, 4, 4)).astype(np.float32)
-    found = measured(Twins(0, 5, even, even, np.ones((7, 10), bool)))
+    found = measured(PairedRollouts(0, 5, even, even, np.ones((7, 10), bool)))
     third = float(np.float32(1 / 3))
     for interval in (found.before.mean, found.after.mean, *found.curve):
         assert interval == Interval(third, third, third)
@@ -219,4 +223,4 @@ def test_seeds() -> None:
 def test_two_robots_are_refused() -> None:
     weights = np.broadcast_to(1 - np.eye(2), (3, 4, 1, 2, 2)).astype(np.float32)
     with pytest.raises(ValueError, match="2 robots"):
-        measured(Twins(0, 2, weights, weights, np.ones((3, 4), bool)))
+        measured(PairedRollouts(0, 2, weights, weights, np.ones((3, 4), bool)))

@@ -1,4 +1,4 @@
-"""Hand-overs by hand and against a plain loop."""
+"""Handoffs by hand and against a plain loop."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from innerattn.config import Robot, Scenario, Task
-from innerattn.measures.sharing.handoff import HANDOVER, handovers
+from innerattn.measures.sharing.handoff import HANDOFF, handoffs
 from innerattn.records.record import Record, rescue_dtype
 
 # food_0, food_1, navigation_0, medical_0 are 0 to 3; task 0 needs food and medicine.
@@ -46,12 +46,12 @@ def test_by_hand() -> None:
         (6, 1, 1, 0),  # another episode
     ]  # fmt: skip
     record = record_of(rows, first_episode=3)
-    expected = np.array([(3, 0, 3, 2, 0, 4, 9), (4, 0, 3, 2, 3, 5, 8)], HANDOVER)
-    np.testing.assert_array_equal(handovers(record, "food_0", "task_1", "task_2"), expected)
-    back = np.array([(4, 0, 2, 3, 6, 8, 12)], HANDOVER)
-    np.testing.assert_array_equal(handovers(record, "food_0", "task_2", "task_1"), back)
+    expected = np.array([(3, 0, 3, 2, 0, 4, 9), (4, 0, 3, 2, 3, 5, 8)], HANDOFF)
+    np.testing.assert_array_equal(handoffs(record, "food_0", "task_1", "task_2"), expected)
+    back = np.array([(4, 0, 2, 3, 6, 8, 12)], HANDOFF)
+    np.testing.assert_array_equal(handoffs(record, "food_0", "task_2", "task_1"), back)
     for robot in ("food_1", "medical_0"):
-        assert len(handovers(record, robot, "task_1", "task_2")) == 0
+        assert len(handoffs(record, robot, "task_1", "task_2")) == 0
 
 
 @given(
@@ -72,11 +72,11 @@ def test_against_a_plain_loop(rows: list[tuple[int, int, int, int]]) -> None:
                 if (task, later) == (0, 1):
                     expected.append((episode, robot, 3, 2, start, first, second))
                 start = first + 1
-        found = handovers(record, f"food_{robot}", "task_1", "task_2")
+        found = handoffs(record, f"food_{robot}", "task_1", "task_2")
         assert found.tolist() == expected
 
 
-def test_the_same_partner_is_no_handover() -> None:
+def test_the_same_partner_is_no_handoff() -> None:
     def robot(name: str, *abilities: str) -> Robot:
         return Robot(name=name, kind="k", abilities=abilities, max_speed_mps=1.0, mass_kg=1.0)
 
@@ -92,18 +92,18 @@ def test_the_same_partner_is_no_handover() -> None:
     events["episode"], events["step"], events["task"] = [0, 0, 1, 1], [1, 2, 1, 2], [0, 1, 0, 1]
     events["helper_0"], events["helper_1"] = [1, 0, 1, 0], [0, 1, 0, 2]
     record = replace(record_of([], scenario=team), rescues=events)
-    found = handovers(record, "a", "hole", "fog")
+    found = handoffs(record, "a", "hole", "fog")
     assert found.tolist() == [(1, 0, 1, 2, 0, 1, 2)]
     with pytest.raises(ValueError, match="'deep' has 3 needs"):
-        handovers(record, "a", "hole", "deep")
+        handoffs(record, "a", "hole", "deep")
 
 
 def test_unknown_names_are_refused() -> None:
     record = record_of([])
-    assert handovers(record, "food_0", "task_1", "task_2").dtype == HANDOVER
+    assert handoffs(record, "food_0", "task_1", "task_2").dtype == HANDOFF
     with pytest.raises(ValueError, match="robot 'food_2': known are food_0, food_1"):
-        handovers(record, "food_2", "task_1", "task_2")
+        handoffs(record, "food_2", "task_1", "task_2")
     with pytest.raises(ValueError, match="task 'task_3': known are task_1, task_2"):
-        handovers(record, "food_0", "task_3", "task_2")
+        handoffs(record, "food_0", "task_3", "task_2")
     with pytest.raises(ValueError, match="both 'task_1'"):
-        handovers(record, "food_0", "task_1", "task_1")
+        handoffs(record, "food_0", "task_1", "task_1")

@@ -1,4 +1,4 @@
-"""Attention around hand-overs by hand, against plain loops, and how often it finds what is not."""
+"""Attention around handoffs by hand, against plain loops, and how often it finds what is not."""
 
 from itertools import product
 
@@ -9,8 +9,8 @@ from scipy.stats import t as student
 from innerattn.config import Scenario
 from innerattn.evaluate.play import run_episodes
 from innerattn.measures.sharing import handoff_attention as module
-from innerattn.measures.sharing.handoff import HANDOVER, handovers
-from innerattn.measures.sharing.handoff_attention import aligned_weights, handover_attention
+from innerattn.measures.sharing.handoff import HANDOFF, handoffs
+from innerattn.measures.sharing.handoff_attention import aligned_weights, handoff_attention
 from innerattn.policies import scripted_policy
 from innerattn.records.record import Record, rescue_dtype
 
@@ -42,8 +42,8 @@ def drifting(rng: np.random.Generator, episodes: int) -> np.ndarray:
     return weights / weights.sum(-1, keepdims=True)
 
 
-def random_handovers(rng: np.random.Generator, episodes: int) -> np.ndarray:
-    """Hand-overs to and fro by both food robots; those of a robot share the stage between them."""
+def random_handoffs(rng: np.random.Generator, episodes: int) -> np.ndarray:
+    """Handoffs to and fro by both food robots; those of a robot share the stage between them."""
     rows = []
     for episode, robot in product(range(episodes), (0, 1)):
         steps = np.sort(rng.choice(STEPS, rng.integers(2, 5), replace=False))
@@ -52,7 +52,7 @@ def random_handovers(rng: np.random.Generator, episodes: int) -> np.ndarray:
             partners = (3, 2) if (j + turn) % 2 else (2, 3)
             start = 0 if j == 0 else steps[j - 1] + 1
             rows.append((episode, robot, *partners, start, steps[j], steps[j + 1]))
-    return np.array(rows, HANDOVER)
+    return np.array(rows, HANDOFF)
 
 
 def test_by_hand() -> None:
@@ -61,10 +61,10 @@ def test_by_hand() -> None:
     weights[0, 3:, :, 0, 1:] = [0.2, 0.6, 0.2]  # passes from medical_0 to navigation_0 after step 2
     weights[1, 6:, 0, 0, 1:] = [0.2, 0.5, 0.3]  # here in one head only
     weights[0, 7:] = weights[1, 9:] = np.nan  # after the second rescue
-    events = np.array([(5, 0, 3, 2, 0, 2, 6), (6, 0, 3, 2, 0, 5, 8)], HANDOVER)
-    found = handover_attention(record_of(weights, 5), events, seed=0, reach=4)
+    events = np.array([(5, 0, 3, 2, 0, 2, 6), (6, 0, 3, 2, 0, 5, 8)], HANDOFF)
+    found = handoff_attention(record_of(weights, 5), events, seed=0, reach=4)
     assert found is not None
-    assert (found.handovers, found.episodes) == (2, 2)
+    assert (found.handoffs, found.episodes) == (2, 2)
     assert found.offsets.tolist() == [-3, -2, -1, 0, 1, 2, 3, 4]
     assert found.counts.tolist() == [1, 2, 2, 2, 2, 2, 2, 1]
     mean = found.to_be.weight[0]
@@ -82,7 +82,7 @@ def test_by_hand() -> None:
 
 def test_alignment_against_a_plain_loop() -> None:
     rng = np.random.default_rng(0)
-    record, events = record_of(drifting(rng, 4)), random_handovers(rng, 4)
+    record, events = record_of(drifting(rng, 4)), random_handoffs(rng, 4)
     offsets = np.arange(-5, 7)
     weights, inside = aligned_weights(record, events, offsets)
     assert weights.shape == (len(events), 12, 1 + HEADS, 3)
@@ -115,8 +115,8 @@ def changes_of(record: Record, event: np.void, teammate: int, reach: int) -> flo
 
 def test_permutation_test_against_all_exchanges() -> None:
     rng = np.random.default_rng(2)
-    record, events = record_of(drifting(rng, 6)), random_handovers(rng, 6)
-    found = handover_attention(record, events, seed=0, reach=6)
+    record, events = record_of(drifting(rng, 6)), random_handoffs(rng, 6)
+    found = handoff_attention(record, events, seed=0, reach=6)
     assert found is not None
     on_next, on_last = (
         np.array([changes_of(record, event, event[role], 6) for event in events])
@@ -138,11 +138,11 @@ def test_permutation_test_against_all_exchanges() -> None:
 
 def test_attention_that_passes_to_both_partners_alike_knows_nothing_of_them() -> None:
     rng = np.random.default_rng(7)
-    weights, events = 0.1 * drifting(rng, 30), random_handovers(rng, 30)
+    weights, events = 0.1 * drifting(rng, 30), random_handoffs(rng, 30)
     for event in events:  # from the other food robot to both partners, whichever is next
         stage = slice(event["first"] + 1, event["second"] + 1)
         weights[event["episode"], stage, :, event["robot"], 2:] += 0.3
-    found = handover_attention(record_of(weights), events, seed=0)
+    found = handoff_attention(record_of(weights), events, seed=0)
     assert found is not None
     assert np.all(found.to_be.change[1] > 0.1)
     assert found.p[0] > 0.05
@@ -150,13 +150,13 @@ def test_attention_that_passes_to_both_partners_alike_knows_nothing_of_them() ->
 
 def test_attention_that_passes_on_is_found() -> None:
     rng = np.random.default_rng(3)
-    weights, events = drifting(rng, 12), random_handovers(rng, 12)
+    weights, events = drifting(rng, 12), random_handoffs(rng, 12)
     for event in events:
         stage = slice(event["first"] + 1, event["second"] + 1)
         rows = weights[event["episode"], stage, :, event["robot"]]
         rows *= 0.5
         rows[..., event["after"]] += 0.5
-    found = handover_attention(record_of(weights), events, seed=0)
+    found = handoff_attention(record_of(weights), events, seed=0)
     assert found is not None
     assert np.all(found.p < 0.001)
     assert found.p.min() >= 1e-4  # never 0
@@ -171,8 +171,8 @@ def test_chance_is_found_as_rarely_as_it_says(
     draws = 500
     rng, rejected, missed = np.random.default_rng(4), 0, 0
     for seed in range(draws):
-        record, events = record_of(drifting(rng, episodes)), random_handovers(rng, episodes)
-        found = handover_attention(record, events, seed)
+        record, events = record_of(drifting(rng, episodes)), random_handoffs(rng, episodes)
+        found = handoff_attention(record, events, seed)
         assert found is not None
         rejected += found.p[0] <= 0.05
         _, low, high = found.to_be.change[:, 0]
@@ -184,21 +184,21 @@ def test_chance_is_found_as_rarely_as_it_says(
 
 def test_nothing_to_look_at() -> None:
     record = record_of(drifting(np.random.default_rng(0), 1))
-    assert handover_attention(record, np.zeros(0, HANDOVER), 0) is None
+    assert handoff_attention(record, np.zeros(0, HANDOFF), 0) is None
     scenario = Scenario.preset("double")
     plain = run_episodes(scripted_policy("hungarian", scenario), scenario, 20, 0)
-    events = handovers(plain, "food_0", "task_1", "task_2")
+    events = handoffs(plain, "food_0", "task_1", "task_2")
     assert len(events) > 0
-    assert handover_attention(plain, events, 0) is None
+    assert handoff_attention(plain, events, 0) is None
     with pytest.raises(ValueError, match="reach = 0"):
-        handover_attention(record, events, 0, reach=0)
+        handoff_attention(record, events, 0, reach=0)
     with pytest.raises(ValueError, match="itself"):
-        handover_attention(record, np.zeros(1, HANDOVER), 0)
+        handoff_attention(record, np.zeros(1, HANDOFF), 0)
 
 
 def test_a_robot_that_takes_no_part_is_a_control() -> None:
     rng = np.random.default_rng(6)
-    weights, events = drifting(rng, 12), random_handovers(rng, 12)
+    weights, events = drifting(rng, 12), random_handoffs(rng, 12)
     events = events[events["robot"] == 0]
     for event in events:
         weights[event["episode"], event["first"] + 1 : event["second"] + 1, :, 0] = np.eye(4)[
@@ -206,7 +206,7 @@ def test_a_robot_that_takes_no_part_is_a_control() -> None:
         ]
     control = events.copy()
     control["robot"] = 1
-    found, of_other = (handover_attention(record_of(weights), x, 0) for x in (events, control))
+    found, of_other = (handoff_attention(record_of(weights), x, 0) for x in (events, control))
     assert found is not None
     assert of_other is not None
     assert found.p[0] < 0.001
@@ -215,11 +215,11 @@ def test_a_robot_that_takes_no_part_is_a_control() -> None:
 
 def test_a_single_episode_has_no_interval_and_seeds_fix_p() -> None:
     rng = np.random.default_rng(5)
-    record, events = record_of(drifting(rng, 3)), random_handovers(rng, 3)
-    alone = handover_attention(record, events[events["episode"] == 0], 0)
+    record, events = record_of(drifting(rng, 3)), random_handoffs(rng, 3)
+    alone = handoff_attention(record, events[events["episode"] == 0], 0)
     assert alone is not None
     assert np.isnan(alone.to_be.change[1:]).all()
-    one, other = (handover_attention(record, events, 7) for _ in range(2))
+    one, other = (handoff_attention(record, events, 7) for _ in range(2))
     assert one is not None
     assert other is not None
     np.testing.assert_array_equal(one.p, other.p)
@@ -228,8 +228,8 @@ def test_a_single_episode_has_no_interval_and_seeds_fix_p() -> None:
 def test_one_teammate_has_nothing_to_move_between() -> None:
     weights = np.zeros((2, STEPS, HEADS, 2, 2))
     weights[..., 0, 1] = weights[..., 1, 0] = 1.0
-    events = np.array([(0, 0, 1, 1, 0, 2, 6), (1, 0, 1, 1, 0, 5, 8)], HANDOVER)
-    found = handover_attention(record_of(weights), events, 0)
+    events = np.array([(0, 0, 1, 1, 0, 2, 6), (1, 0, 1, 1, 0, 5, 8)], HANDOFF)
+    found = handoff_attention(record_of(weights), events, 0)
     assert found is not None
     np.testing.assert_array_equal(found.p, 1.0)
     np.testing.assert_array_equal(found.to_be.change, 0.0)

@@ -7,7 +7,7 @@ from innerattn.config import Fault, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
 from innerattn.evaluate.play import run_episodes
-from innerattn.policies import View
+from innerattn.policies import PolicyInput
 from innerattn.policies.scripted.dispatch import (
     SCRIPTED,
     GreedyPolicy,
@@ -21,14 +21,16 @@ HEALTHY = BatchEnv("mixed", 1).fault_state()
 VICTIM = np.dtype([("present", "?"), ("task", "i8"), ("x", "f4"), ("y", "f4")])
 
 
-def view(positions: list, victims: list) -> View:
+def view(positions: list, victims: list) -> PolicyInput:
     """One world at rest; a victim is (task, x, y), or None for an empty slot."""
     table = np.array([(v and (True, *v)) or (False, 0, 0, 0) for v in victims], VICTIM)[None]
     places = np.asarray([positions], np.float32)
-    return View(np.zeros((1, 4, 1), np.float32), places, np.zeros_like(places), table, HEALTHY)
+    return PolicyInput(
+        np.zeros((1, 4, 1), np.float32), places, np.zeros_like(places), table, HEALTHY
+    )
 
 
-def chosen(policy: GreedyPolicy | HungarianPolicy, seen: View) -> list[int]:
+def chosen(policy: GreedyPolicy | HungarianPolicy, seen: PolicyInput) -> list[int]:
     places = np.stack([seen.victims["x"], seen.victims["y"]], -1).astype(np.float64)
     return policy.choose(seen, places)[0].tolist()
 
@@ -63,7 +65,7 @@ def test_nobody_goes_where_nobody_is() -> None:
 
 def test_random_actions_are_even_and_seeded() -> None:
     seen = view([(0, 0)] * 4, [(0, 0, 0)])
-    seen = View(*(np.repeat(part, 5000, 0) for part in seen))
+    seen = PolicyInput(*(np.repeat(part, 5000, 0) for part in seen))
     actions = RandomPolicy(DOUBLE, seed=1).act(seen)
     assert actions.shape == (5000, 4)
     counts = np.bincount(actions.ravel(), minlength=5)
@@ -119,7 +121,7 @@ def test_a_large_team_is_served_world_by_world() -> None:
     assert many > 2 * few
 
 
-def with_fault(kind: str, value: float) -> View:
+def with_fault(kind: str, value: float) -> PolicyInput:
     """The world of `NEAR_THE_FIRST` with a fault of food_1, which hungarian sends to victim 0."""
     faults = HEALTHY.copy()
     faults[kind][:, 1] = value

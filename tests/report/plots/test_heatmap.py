@@ -7,7 +7,7 @@ import pytest
 
 from innerattn.config import Scenario
 from innerattn.errors import RunError
-from innerattn.evaluate.faults.grid import Grid, Kept
+from innerattn.evaluate.faults.grid import Grid, Retention
 from innerattn.measures.faults.retention import Estimate
 from innerattn.report.plots.drawing import check_format
 from innerattn.report.plots.heatmap import draw_heatmap, write_heatmap
@@ -15,11 +15,11 @@ from innerattn.report.plots.heatmap import draw_heatmap, write_heatmap
 GRID = Grid(Scenario(), kinds=("motor_gain", "blackout"), severities=(0.5, 1.0))
 
 
-def some_kept() -> Kept:
+def some_kept() -> Retention:
     value = np.linspace(0, 1.1, 32).reshape(2, 2, 4, 2)
     cells = Estimate(value, value[..., None])
     nothing = Estimate(np.zeros(()), np.zeros(1))
-    return Kept(nothing, cells, nothing, nothing, nothing)
+    return Retention(nothing, cells, nothing, nothing, nothing)
 
 
 def test_a_panel_for_each_robot_and_onset_with_its_numbers() -> None:

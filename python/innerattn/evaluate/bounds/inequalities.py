@@ -139,5 +139,5 @@ def violated(measured: Tensor, bound: Tensor) -> Tensor:
 
 
 def _by_head(matrix: Tensor, heads: int) -> Tensor:
-    """View (W, W) as (H, d, W)."""
+    """PolicyInput (W, W) as (H, d, W)."""
     return matrix.view(heads, -1, matrix.shape[1])

@@ -20,8 +20,8 @@ from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
 from innerattn.measures.faults.label_shuffle import SHUFFLES
 from innerattn.measures.faults.shift import (
+    PairedRollouts,
     Pooled,
-    Twins,
     areas_by_head,
     by_head,
     pooled_kinds,
@@ -134,7 +134,7 @@ def _play(run: str | Path, worlds: Scenario, episodes: int, seed: int) -> Record
     return run_episodes(policy, worlds, episodes, seed, record=("attention",), num_threads=threads)
 
 
-def twins_of(faulty: Record, healthy: Record, robot: int, onset: int) -> Twins:
+def twins_of(faulty: Record, healthy: Record, robot: int, onset: int) -> PairedRollouts:
     """The attention of two records of the same worlds, in the episodes that reach the onset.
 
     Args:
@@ -147,4 +147,4 @@ def twins_of(faulty: Record, healthy: Record, robot: int, onset: int) -> Twins:
     reached = lengths > onset
     happened = np.arange(faulty.scenario.episode_steps) < lengths[reached, None]
     with_fault, without = (record.steps["attention"][reached] for record in (faulty, healthy))
-    return Twins(robot, onset, with_fault, without, happened)
+    return PairedRollouts(robot, onset, with_fault, without, happened)

@@ -127,7 +127,7 @@ def rescues_by_step(record: Record) -> NDArray[np.int64]:
 
 
 @dataclass(frozen=True)
-class Kept:
+class Retention:
     """How much of its rescues a policy keeps.
 
     Attributes:
@@ -149,7 +149,7 @@ class Kept:
         return self.areas.mean((1, 2))
 
 
-def kept(played: Played, grid: Grid) -> Kept:
+def kept(played: Played, grid: Grid) -> Retention:
     """The retention of one policy; all policies of a grid share the resamples."""
     weights = resampled_counts(grid.episodes, grid.seed, RESAMPLES)
     steps = played.clean.shape[1]
@@ -164,7 +164,7 @@ def kept(played: Played, grid: Grid) -> Kept:
         np.stack([part.value for part in parts], 3), np.stack([part.resampled for part in parts], 3)
     )
     totals = played.clean.sum(1)
-    return Kept(
+    return Retention(
         clean=Estimate(np.asarray(totals.mean()), weights @ totals / grid.episodes),
         cells=cells,
         areas=area(cells, np.asarray(grid.severities), axis=1),
@@ -179,7 +179,7 @@ def play_all(
     *,
     num_threads: int | None = None,
     progress: ProgressCall | None = None,
-) -> dict[str, Kept]:
+) -> dict[str, Retention]:
     """Run policies through the grid, in the same worlds.
 
     Args:

@@ -12,14 +12,14 @@ from innerattn.experiments.crossed.arms import CREDITS, CROSSED, PENALTIES, SHAR
 from innerattn.experiments.crossed.effects import LEAST_SEEDS, MARGINS, Effect
 from innerattn.experiments.crossed.outcome import IDLE, Outcomes, by_seed
 from innerattn.experiments.paper.claims import EVEN_ENTROPY, Holds
-from innerattn.stats.seeds import OverRuns, over_runs
+from innerattn.stats.seeds import SeedEstimate, seed_estimate
 from innerattn.stats.text import NONE, shown
 
 LEAST_WITHOUT_IDLE = 10
 """So many seeds without an idle robot say that there is none; fewer say nothing."""
 
-LEAST_UNEVEN = MARGINS["unevenness"] / 2.0
-"""Less unevenness than this is too little to ask what takes it away."""
+LEAST_UNEVEN = MARGINS["imbalance"] / 2.0
+"""Less imbalance than this is too little to ask what takes it away."""
 
 RULES = f"""\
 The seed is the unit: runs of one seed begin with the same weights in the same worlds and are
@@ -27,14 +27,14 @@ measured in the same ones, so that they may be alike in all arms. Where several 
 together, or compared, every seed that has a run of each gives one number. Intervals are 95 %:
 Student's over seeds, Wilson's of numbers of seeds; an effect, or a mean that decides, needs
 {LEAST_SEEDS} seeds. Two means count as alike where two one-sided tests show them to be within the
-margin ({MARGINS["unevenness"]:g} of unevenness, {MARGINS["score"]:g} of the score,
+margin ({MARGINS["imbalance"]:g} of imbalance, {MARGINS["score"]:g} of the score,
 {MARGINS["entropy_share"]:g} of the entropy's share). The rules go by intervals of single effects;
 beside each p-value of an effect stands Holm's, adjusted for all main effects of the situation on
 all figures, or for all its other effects.
 
 - **Attention makes sharing even under the team's credit**, over penalties: by inner minus half of
   uniform. Yes where its interval lies below 0, so that attention takes away more than half of the
-  unevenness; no where it lies above. Only asked where there is something to take away: where
+  imbalance; no where it lies above. Only asked where there is something to take away: where
   uniform's interval lies above {LEAST_UNEVEN:g}.
 - **Attention rescues more**: yes where the interval of inner minus uniform, over credits and
   penalties, lies above 0; no where it lies below, or where the two are alike.
@@ -45,8 +45,8 @@ all figures, or for all its other effects.
   in at least {LEAST_WITHOUT_IDLE} seeds. A seed has one run with uniform weights and
   {len(PENALTIES)} with learnt attention, so the two numbers are not to be compared with each other.
 - **With the helpers' credit sharing is even with either attention**: yes where no robot is idle in
-  at least {LEAST_WITHOUT_IDLE} seeds and both intervals of the unevenness lie below
-  {MARGINS["unevenness"]:g}; no where a robot is idle or one interval lies above.
+  at least {LEAST_WITHOUT_IDLE} seeds and both intervals of the imbalance lie below
+  {MARGINS["imbalance"]:g}; no where a robot is idle or one interval lies above.
 - **Robots of a kind with the same parameters share evenly under the team's credit, too**: decided
   as the claim before, for the arm in which they have the same (learnt attention, no penalty).
 - **The largest penalty holds attention even**: yes where the interval of the entropy's share lies
@@ -77,7 +77,7 @@ def answers(situation: str, outcomes: Outcomes, effects: Sequence[Effect]) -> li
     main = {(one.figure, one.name.split(",")[0]): one for one in effects if one.main}
     asked = [
         ("attention rescues more", "score", "inner - uniform", 1.0),
-        ("the team's credit makes sharing uneven", "unevenness", "team - helpers", 1.0),
+        ("the team's credit makes sharing uneven", "imbalance", "team - helpers", 1.0),
     ]
     found = [
         Answer(claim, situation, *_of_effect(main[figure, name], sign))
@@ -108,12 +108,12 @@ def idle_seeds(outcomes: Outcomes, arms: Sequence[Arm]) -> tuple[int, int]:
     return int((least < IDLE).sum()), len(least)
 
 
-def _mean(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> OverRuns | None:
+def _mean(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> SeedEstimate | None:
     """The mean over seeds of a figure that is averaged over the arms."""
-    return over_runs(by_seed(outcomes, arms, figure).mean(axis=1).tolist())
+    return seed_estimate(by_seed(outcomes, arms, figure).mean(axis=1).tolist())
 
 
-def _ends(mean: OverRuns | None) -> tuple[float, float]:
+def _ends(mean: SeedEstimate | None) -> tuple[float, float]:
     """The interval of a mean over enough seeds; else all numbers."""
     if mean is None or mean.low is None or mean.high is None or mean.runs < LEAST_SEEDS:
         return -math.inf, math.inf
@@ -134,9 +134,9 @@ def _of_effect(effect: Effect, sign: float) -> tuple[str, Holds]:
 
 def _makes_even(situation: str, outcomes: Outcomes) -> Answer:
     groups = _by_attention("team")
-    rows = by_seed(outcomes, [arm for arms in groups.values() for arm in arms], "unevenness")
+    rows = by_seed(outcomes, [arm for arms in groups.values() for arm in arms], "imbalance")
     inner, uniform = rows[:, : len(groups["inner"])].mean(axis=1), rows[:, -1]
-    means = [over_runs(values.tolist()) for values in (inner, uniform, inner - uniform / 2.0)]
+    means = [seed_estimate(values.tolist()) for values in (inner, uniform, inner - uniform / 2.0)]
     with_, without, left = (shown(mean) for mean in means)
     holds: Holds = "undecided"
     if _ends(means[1])[0] > LEAST_UNEVEN:
@@ -181,13 +181,13 @@ def _even_if_shared(situation: str, outcomes: Outcomes) -> Answer:
 
 def _even_in_all(outcomes: Outcomes, groups: Mapping[str, Sequence[Arm]]) -> tuple[str, Holds]:
     """Whether sharing is even in all groups of arms, by their names."""
-    means = {name: _mean(outcomes, arms, "unevenness") for name, arms in groups.items()}
+    means = {name: _mean(outcomes, arms, "imbalance") for name, arms in groups.items()}
     measured = "; ".join(
         f"{name}: {shown(means[name])}, idle {idle_shown(outcomes, arms)}"
         for name, arms in groups.items()
     )
     idle = any(idle_seeds(outcomes, arms)[0] for arms in groups.values())
-    margin = MARGINS["unevenness"]
+    margin = MARGINS["imbalance"]
     ends = [_ends(mean) for mean in means.values()]
     if idle or any(low > margin for low, _ in ends):
         return measured, "no"

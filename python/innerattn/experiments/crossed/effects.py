@@ -16,7 +16,7 @@ from innerattn.experiments.paper.claims import ENTROPY_MARGIN
 from innerattn.stats.comparison import Contrast, contrast, holm
 
 MARGINS = {
-    "unevenness": pairs.MARGINS["unevenness"],
+    "imbalance": pairs.MARGINS["imbalance"],
     "score": pairs.MARGINS["score"],
     "entropy_share": ENTROPY_MARGIN,
 }

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.experiments.crossed.arms import Arm
-from innerattn.experiments.paper.workload import rescues_by_task, unevenness
+from innerattn.experiments.paper.workload import rescues_by_task, workload_imbalance
 from innerattn.experiments.run import Measured
 
 IDLE = 0.2
 """A food robot with a smaller share of the rescues than this counts as idle."""
 
 OUTCOMES = {
-    "unevenness": "distance of the first food robot's share from 0.5, a mean over tasks",
+    "imbalance": "distance of the first food robot's share from 0.5, a mean over tasks",
     "least_share": "share of all rescues by the food robot that has fewer",
     "rescues_per_episode": "rescues in an episode of the standard length",
     "score": "0 random play, 1 scripted dispatch",
@@ -29,7 +29,7 @@ OUTCOMES = {
 class Outcome:
     """Figures of one run by the names of `OUTCOMES`; None where it has none."""
 
-    unevenness: float | None
+    imbalance: float | None
     least_share: float | None
     rescues_per_episode: float
     score: float | None
@@ -49,7 +49,7 @@ def outcome_of(measured: Measured) -> Outcome:
     total = np.sum(list(rescues_by_task(measured).values()), axis=0)
     summary = measured.summary
     return Outcome(
-        unevenness=unevenness(measured),
+        imbalance=workload_imbalance(measured),
         least_share=float(total.min() / total.sum()) if total.sum() else None,
         rescues_per_episode=float(summary["rescues_per_episode"]["mean"]),
         score=None if summary["score"] is None else float(summary["score"]["mean"]),

@@ -15,7 +15,7 @@ from innerattn.experiments.paper.fig4 import PRINTED_NATS, EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION
 from innerattn.measures.sharing.evenness import MARGIN
-from innerattn.stats.seeds import OverRuns
+from innerattn.stats.seeds import SeedEstimate
 from innerattn.stats.text import NONE, shown
 
 Holds = Literal["yes", "no", "undecided"]
@@ -34,8 +34,8 @@ EVEN_ENTROPY = 1.0 - ENTROPY_MARGIN
 
 RULES = f"""\
 A claim is undecided for a method with less than two runs. Intervals are Student's 95 % over runs,
-also where they reach beyond what is possible (a share above 1, an unevenness below 0). Every claim
-is judged by itself at 5 %; nothing is adjusted for their number.
+also where they reach beyond what is possible (a share above 1, an imbalance below 0). Every claim is
+judged by itself at 5 %; nothing is adjusted for their number.
 
 - *A task is shared* evenly where the runs' mean share is (its 90 % interval lies within {MARGIN[0]}
   to {MARGIN[1]}) and no run is uneven by itself; unevenly where the mean share is (its 95 %
@@ -116,20 +116,20 @@ def entropy_claims(courses: Sequence[EntropyCourse]) -> list[Claim]:
     return claims
 
 
-def handover_claims(found: Sequence[Evidence]) -> list[Claim]:
+def handoff_claims(found: Sequence[Evidence]) -> list[Claim]:
     """Whether attention passes on with the work, and whether it is that of who hands over."""
     claims = []
     for part in found:
         change, own = part.robot["to_be"].change, part.own_part
         before, control = part.robot["before"].change, part.control["to_be"].change
-        moves = handover_moves(change)
+        moves = handoff_moves(change)
         claims += [
             _claim(
                 part,
                 "attention moves to the next partner",
                 "rises on the next, falls on the one before",
                 f"on the next {shown(change)}, on the one before {shown(before)} "
-                f"({sum(part.handovers):,} hand-overs)",
+                f"({sum(part.handoffs):,} handoffs)",
                 moves,
             ),
             _claim(
@@ -137,13 +137,13 @@ def handover_claims(found: Sequence[Evidence]) -> list[Claim]:
                 "…and does so for the robot that hands over",
                 "taken for granted",
                 f"{shown(own)} more than the robot that takes no part ({shown(control)})",
-                handover_is_own(part) if moves == "yes" else "undecided",
+                handoff_is_own(part) if moves == "yes" else "undecided",
             ),
         ]
     return claims
 
 
-def handover_moves(change: OverRuns | None) -> Holds:
+def handoff_moves(change: SeedEstimate | None) -> Holds:
     """Whether the weight on the partner-to-be rises, by `RULES`."""
     if change is None or change.low is None or change.high is None:
         return "undecided"
@@ -152,7 +152,7 @@ def handover_moves(change: OverRuns | None) -> Holds:
     return "no" if change.high < LEAST_MOVE else "undecided"
 
 
-def handover_is_own(found: Evidence) -> Holds:
+def handoff_is_own(found: Evidence) -> Holds:
     """Whether most of the rise is of the robot that hands over, by `RULES`."""
     own, beyond_half = found.own_part, found.own_part_beyond_half
     if own is None or own.low is None or beyond_half is None or beyond_half.high is None:
@@ -177,7 +177,7 @@ def _claim(
     )
 
 
-def _decided(value: OverRuns, yes_below: float) -> Holds:
+def _decided(value: SeedEstimate, yes_below: float) -> Holds:
     """Yes below, no above."""
     if value.low is None or value.high is None:
         return "undecided"
@@ -186,7 +186,7 @@ def _decided(value: OverRuns, yes_below: float) -> Holds:
     return "no" if value.low > yes_below else "undecided"
 
 
-def _falls(change: OverRuns, least: float) -> Holds:
+def _falls(change: SeedEstimate, least: float) -> Holds:
     if change.low is None or change.high is None:
         return "undecided"
     if change.high < 0.0 and change.mean <= -least:

@@ -10,18 +10,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from innerattn.evaluate.play import run_episodes
-from innerattn.experiments.paper.workload import unevenness
+from innerattn.experiments.paper.workload import workload_imbalance
 from innerattn.experiments.run import Measured
 from innerattn.measures.dispatch_quality import dispatch_quality
 from innerattn.measures.waiting import waiting
 from innerattn.policies import SCRIPTED, scripted_policy
 from innerattn.stats.intervals import Interval
-from innerattn.stats.seeds import OverRuns, over_runs
+from innerattn.stats.seeds import SeedEstimate, seed_estimate
 
 COMPETENCE = {
     "rescues_per_episode": "",
     "score": "0 random play, 1 scripted dispatch",
-    "unevenness": "distance of a share from 0.5",
+    "imbalance": "distance of a share from 0.5",
     "sooner": "share of choices",
     "sooner_by_chance": "share of choices",
     "regret_s": "s",
@@ -30,7 +30,7 @@ COMPETENCE = {
     "time_per_rescue_s": "s",
 }
 """Figures of competence and their units; the first three are of all episodes, the others of those
-recorded step by step, which with scripted policies are all, too. See `Summary`, `unevenness`,
+recorded step by step, which with scripted policies are all, too. See `Summary`, `imbalance`,
 `DispatchQuality` and `Waiting`."""
 
 _STEPS = ("positions", "velocities", "victims")
@@ -55,14 +55,14 @@ class Competence:
     seeds: tuple[int, ...]
     counts: tuple[dict[str, int], ...]
     each: tuple[dict[str, float | None], ...]
-    mean: dict[str, OverRuns | None]
+    mean: dict[str, SeedEstimate | None]
 
 
 def competence(group: Sequence[Measured]) -> Competence:
     """How well runs of one situation and method do."""
     run = group[0].run
     counts, each = zip(*(_competence_of(measured) for measured in group), strict=True)
-    mean = {name: over_runs([figures[name] for figures in each]) for name in COMPETENCE}
+    mean = {name: seed_estimate([figures[name] for figures in each]) for name in COMPETENCE}
     seeds = tuple(measured.run.seed for measured in group)
     return Competence(run.situation, run.method, seeds, counts, each, mean)
 
@@ -103,7 +103,7 @@ def _competence_of(measured: Measured) -> tuple[dict[str, int], dict[str, float 
     figures |= {
         "rescues_per_episode": float(measured.summary["rescues_per_episode"]["mean"]),
         "score": None if score is None else float(score["mean"]),
-        "unevenness": unevenness(measured),
+        "imbalance": workload_imbalance(measured),
     }
     if not measured.recorded.steps:  # a small copy of a run
         return counts, figures

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from innerattn.errors import RunError
 from innerattn.experiments.run import StudyRun, by_method
-from innerattn.stats.seeds import Array, Band, OverRuns, band, over_runs
+from innerattn.stats.seeds import Array, SeedCurve, SeedEstimate, seed_curve, seed_estimate
 
 SCHEMA_VERSION = 1
 
@@ -50,9 +50,9 @@ class EntropyCourse:
     robots: tuple[str, ...]
     env_steps: NDArray[np.int64]
     nats: Array
-    begin: OverRuns
-    end: OverRuns
-    change: OverRuns
+    begin: SeedEstimate
+    end: SeedEstimate
+    change: SeedEstimate
 
     @property
     def even_nats(self) -> float:
@@ -64,13 +64,13 @@ class EntropyCourse:
         """Whether attention is ever uneven; it never is where its weights are fixed."""
         return bool((np.abs(self.nats - self.even_nats) > _EVEN_WITHIN_NATS).any())
 
-    def mean(self) -> Band:
+    def mean(self) -> SeedCurve:
         """Over robots and heads, (T,)."""
-        return band(self.nats.mean((2, 3)))
+        return seed_curve(self.nats.mean((2, 3)))
 
-    def by_robot(self) -> Band:
+    def by_robot(self) -> SeedCurve:
         """Over heads, (T, R)."""
-        return band(self.nats.mean(3))
+        return seed_curve(self.nats.mean(3))
 
     def by_head(self) -> Array:
         """Mean over runs, (T, R, H)."""
@@ -124,7 +124,7 @@ def _course(group: Sequence[StudyRun]) -> EntropyCourse | None:
     part = max(1, len(times) // _PART)
     overall = nats.mean((2, 3))
     begin, end = overall[:, :part].mean(1), overall[:, -part:].mean(1)
-    figures = [over_runs(values.tolist()) for values in (begin, end, end - begin)]
+    figures = [seed_estimate(values.tolist()) for values in (begin, end, end - begin)]
     first, last, change = (figure for figure in figures if figure is not None)
     return EntropyCourse(
         situation=group[0].situation,

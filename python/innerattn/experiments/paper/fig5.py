@@ -1,6 +1,6 @@
-"""Fig. 5's evidence over many runs: what attention does around all hand-overs, and a control.
+"""Fig. 5's evidence over many runs: what attention does around all handoffs, and a control.
 
-A hand-over is one robot's rescue with one partner and its next with another; the hand-overs of both
+A handoff is one robot's rescue with one partner and its next with another; the handoffs of both
 robots that share an ability, in both orders of the tasks, are taken together. The control looks at
 the same moments at the other of these robots, which takes no part: what it shows as well follows
 from the victims that are there, not from who hands over.
@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 
 from innerattn.experiments.run import Measured
 from innerattn.measures.cooperation import shared_abilities
-from innerattn.measures.sharing.handoff import HANDOVER, handovers
+from innerattn.measures.sharing.handoff import HANDOFF, handoffs
 from innerattn.measures.sharing.handoff_attention import (
     Attended,
-    HandoverAttention,
-    handover_attention,
+    HandoffAttention,
+    handoff_attention,
 )
 from innerattn.records.record import Record
-from innerattn.stats.seeds import Array, Band, OverRuns, band, over_runs
+from innerattn.stats.seeds import Array, SeedCurve, SeedEstimate, seed_curve, seed_estimate
 
 SCHEMA_VERSION = 2
 
@@ -41,13 +41,13 @@ class RoleEvidence:
     """The weight on the partner in one role, meant over heads; N runs, W offsets.
 
     Attributes:
-        weight: over runs, by offset (W,); each run is a mean over its own hand-overs.
+        weight: over runs, by offset (W,); each run is a mean over its own handoffs.
         change: over runs, mean weight after the first rescue minus that up to it.
-        change_by_run: (N,) None for a run without hand-overs.
+        change_by_run: (N,) None for a run without handoffs.
     """
 
-    weight: Band
-    change: OverRuns | None
+    weight: SeedCurve
+    change: SeedEstimate | None
     change_by_run: tuple[float | None, ...]
 
     def to_json(self) -> dict[str, Any]:
@@ -61,13 +61,13 @@ class RoleEvidence:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Attention around all hand-overs of one situation and method.
+    """Attention around all handoffs of one situation and method.
 
     Attributes:
         situation: of the worlds.
         method: of training.
         seeds: of the N runs.
-        handovers: (N,) how many.
+        handoffs: (N,) how many.
         episodes: (N,) how many episodes they come from, of those recorded step by step.
         offsets: (W,) int64 steps since the first rescue's; those above 0 are after it.
         step_s: length of a step [s].
@@ -75,37 +75,37 @@ class Evidence:
         robot: by role, of the robot that hands over.
         control: by role, of the robot that takes no part, with the same partners.
         own_part: over runs, the change on the partner-to-be of the robot minus the control's.
-        own_part_by_run: (N,) None for a run without hand-overs.
+        own_part_by_run: (N,) None for a run without handoffs.
         own_part_beyond_half: over runs, that part minus half the robot's change.
-        p_by_run: (N,) of the permutation test, see `handover_attention`; None for a run without
-            hand-overs.
+        p_by_run: (N,) of the permutation test, see `handoff_attention`; None for a run without
+            handoffs.
         control_p_by_run: (N,) the same of the robot that takes no part.
     """
 
     situation: str
     method: str
     seeds: tuple[int, ...]
-    handovers: tuple[int, ...]
+    handoffs: tuple[int, ...]
     episodes: tuple[int, ...]
     offsets: NDArray[np.int64]
     step_s: float
     even: float
     robot: dict[str, RoleEvidence]
     control: dict[str, RoleEvidence]
-    own_part: OverRuns | None
+    own_part: SeedEstimate | None
     own_part_by_run: tuple[float | None, ...]
-    own_part_beyond_half: OverRuns | None
+    own_part_beyond_half: SeedEstimate | None
     p_by_run: tuple[float | None, ...]
     control_p_by_run: tuple[float | None, ...]
 
     @property
     def runs(self) -> int:
-        """How many runs have hand-overs."""
-        return sum(number > 0 for number in self.handovers)
+        """How many runs have handoffs."""
+        return sum(number > 0 for number in self.handoffs)
 
     def to_json(self) -> dict[str, Any]:
         """As a JSON object."""
-        names = ("situation", "method", "seeds", "handovers", "episodes", "step_s", "even")
+        names = ("situation", "method", "seeds", "handoffs", "episodes", "step_s", "even")
         return {
             **{name: getattr(self, name) for name in names},
             "offsets": self.offsets.tolist(),
@@ -121,19 +121,19 @@ class Evidence:
         }
 
 
-def all_handovers(record: Record) -> NDArray[np.void]:
-    """The hand-overs of all robots that share an ability, between any two tasks of two needs.
+def all_handoffs(record: Record) -> NDArray[np.void]:
+    """The handoffs of all robots that share an ability, between any two tasks of two needs.
 
     Returns:
-        (N,) `HANDOVER`, by robot, then by order of the tasks.
+        (N,) `HANDOFF`, by robot, then by order of the tasks.
     """
     tasks = [task.name for task in record.scenario.tasks if len(task.needs) == 2]
     found = [
-        handovers(record, robot, first, later)
+        handoffs(record, robot, first, later)
         for robot in alike_robots(record)
         for first, later in permutations(tasks, 2)
     ]
-    return np.concatenate([np.zeros(0, HANDOVER), *found])
+    return np.concatenate([np.zeros(0, HANDOFF), *found])
 
 
 def alike_robots(record: Record) -> tuple[str, ...]:
@@ -143,7 +143,7 @@ def alike_robots(record: Record) -> tuple[str, ...]:
 
 
 def with_bystander(record: Record, found: NDArray[np.void]) -> NDArray[np.void]:
-    """The same hand-overs with ``robot`` replaced by the next of the robots alike."""
+    """The same handoffs with ``robot`` replaced by the next of the robots alike."""
     alike = [record.robot_names.index(name) for name in alike_robots(record)]
     other = dict(zip(alike, alike[1:] + alike[:1], strict=True))
     control = found.copy()
@@ -152,21 +152,21 @@ def with_bystander(record: Record, found: NDArray[np.void]) -> NDArray[np.void]:
 
 
 def evidence(group: Sequence[Measured]) -> Evidence | None:
-    """What attention does around hand-overs in runs of one situation and method.
+    """What attention does around handoffs in runs of one situation and method.
 
     Returns:
-        None where no run has hand-overs and attention that chooses, rather than being even.
+        None where no run has handoffs and attention that chooses, rather than being even.
     """
     first = group[0].recorded
     if not any(_chooses(measured.recorded) for measured in group):
         return None
-    seen: list[HandoverAttention | None] = []
-    controls: list[HandoverAttention | None] = []
+    seen: list[HandoffAttention | None] = []
+    controls: list[HandoffAttention | None] = []
     for measured in group:
-        found = all_handovers(measured.recorded)
+        found = all_handoffs(measured.recorded)
         control = with_bystander(measured.recorded, found)
-        seen.append(handover_attention(measured.recorded, found, _SEED))
-        controls.append(handover_attention(measured.recorded, control, _SEED))
+        seen.append(handoff_attention(measured.recorded, found, _SEED))
+        controls.append(handoff_attention(measured.recorded, control, _SEED))
     known = [run for run in seen if run is not None]
     if not known:
         return None
@@ -185,16 +185,16 @@ def evidence(group: Sequence[Measured]) -> Evidence | None:
         situation=group[0].run.situation,
         method=group[0].run.method,
         seeds=tuple(measured.run.seed for measured in group),
-        handovers=tuple(run.handovers if run else 0 for run in seen),
+        handoffs=tuple(run.handoffs if run else 0 for run in seen),
         episodes=tuple(run.episodes if run else 0 for run in seen),
         offsets=known[0].offsets,
         step_s=first.scenario.dt_s,
         even=1.0 / (first.scenario.num_robots - 1),
         robot=robot,
         control=control_,
-        own_part=over_runs(own),
+        own_part=seed_estimate(own),
         own_part_by_run=own,
-        own_part_beyond_half=over_runs(beyond_half),
+        own_part_beyond_half=seed_estimate(beyond_half),
         p_by_run=tuple(float(run.p[0]) if run else None for run in seen),
         control_p_by_run=tuple(float(run.p[0]) if run else None for run in controls),
     )
@@ -212,8 +212,8 @@ def _chooses(record: Record) -> bool:
     return weights is not None and bool((weights > even + _EVEN_WITHIN).any())
 
 
-def _role(runs: Sequence[HandoverAttention | None], role: str) -> RoleEvidence:
+def _role(runs: Sequence[HandoffAttention | None], role: str) -> RoleEvidence:
     parts: list[Attended | None] = [getattr(run, role) if run else None for run in runs]
     courses: Array = np.stack([part.weight[0, :, 0] for part in parts if part])
     changes = tuple(float(part.change[0, 0]) if part else None for part in parts)
-    return RoleEvidence(band(courses), over_runs(changes), changes)
+    return RoleEvidence(seed_curve(courses), seed_estimate(changes), changes)

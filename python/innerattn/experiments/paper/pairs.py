@@ -11,9 +11,9 @@ from innerattn.measures.sharing.evenness import MARGIN
 from innerattn.stats.aggregate import improvement_interval, iqm_interval
 from innerattn.stats.comparison import Contrast, contrast
 from innerattn.stats.intervals import Interval
-from innerattn.stats.seeds import OverRuns, over_runs
+from innerattn.stats.seeds import SeedEstimate, seed_estimate
 
-MARGINS = {"score": 0.05, "unevenness": 0.5 - MARGIN[0]}
+MARGINS = {"score": 0.05, "imbalance": 0.5 - MARGIN[0]}
 """The figures that are compared, and the largest difference that counts as none."""
 
 _SEED = 0  # of the bootstraps
@@ -39,8 +39,8 @@ class Pair:
     algorithm: str
     figure: str
     seeds: tuple[int, ...]
-    inner: OverRuns | None
-    uniform: OverRuns | None
+    inner: SeedEstimate | None
+    uniform: SeedEstimate | None
     found: Contrast | None
 
 
@@ -75,8 +75,8 @@ def pairs(competence: Sequence[Competence]) -> list[Pair]:
             found.append(
                 Pair(
                     *(situation, algorithm, figure, seeds),
-                    inner=over_runs([one for one, _ in values]),
-                    uniform=over_runs([other for _, other in values]),
+                    inner=seed_estimate([one for one, _ in values]),
+                    uniform=seed_estimate([other for _, other in values]),
                     found=contrast(values, (1.0, -1.0), margin) if enough else None,
                 )
             )

@@ -1,4 +1,4 @@
-"""Which hand-over is shown as Fig. 5, by a fixed rule, so that nobody picks the prettiest."""
+"""Which handoff is shown as Fig. 5, by a fixed rule, so that nobody picks the prettiest."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from numpy.typing import NDArray
 from innerattn.config import Scenario
 from innerattn.experiments.paper.fig5 import alike_robots
 from innerattn.experiments.run import Measured
-from innerattn.measures.sharing.handoff import handovers
+from innerattn.measures.sharing.handoff import handoffs
 
 SCHEMA_VERSION = 1
 
 SCENE_RULE = (
-    "the run of lowest seed; of the first food robot's hand-overs from the first task to the "
+    "the run of lowest seed; of the first food robot's handoffs from the first task to the "
     "second with another partner, in the episodes recorded step by step, the one whose shorter "
     "stage (before and after the first rescue) is longest, then the one that is longest in all, "
     "then the first"
 )
-"""How the hand-over that is shown is chosen; it looks at no attention weight."""
+"""How the handoff that is shown is chosen; it looks at no attention weight."""
 
 
 @dataclass(frozen=True)
-class HandoverScene:
-    """One hand-over; T steps of its episode, R robots, V victim slots, H heads.
+class HandoffScene:
+    """One handoff; T steps of its episode, R robots, V victim slots, H heads.
 
     Attributes:
         scenario: the worlds.
@@ -64,21 +64,21 @@ class HandoverScene:
         return (self.start, self.first), (self.first, middle), (middle, self.second)
 
 
-def choose_scene(group: Sequence[Measured]) -> HandoverScene | None:
-    """The hand-over that is shown, by `SCENE_RULE`.
+def choose_scene(group: Sequence[Measured]) -> HandoffScene | None:
+    """The handoff that is shown, by `SCENE_RULE`.
 
     Args:
         group: runs of one situation and method, in order of seeds.
 
     Returns:
-        None where the first run has no attention, not two tasks of two needs, or no such hand-over.
+        None where the first run has no attention, not two tasks of two needs, or no such handoff.
     """
     run, record = group[0].run, group[0].recorded
     tasks = [task.name for task in record.scenario.tasks if len(task.needs) == 2]
     alike = alike_robots(record)
     if "attention" not in record.steps or len(tasks) < 2 or not alike:
         return None
-    found = handovers(record, alike[0], tasks[0], tasks[1])
+    found = handoffs(record, alike[0], tasks[0], tasks[1])
     if not len(found):
         return None
     before = found["first"] - found["start"] + 1
@@ -87,7 +87,7 @@ def choose_scene(group: Sequence[Measured]) -> HandoverScene | None:
     chosen = found[np.lexsort((np.arange(len(found)), -whole, -shorter))[0]]
     episode = int(chosen["episode"]) - record.first_episode
     robot, steps = int(chosen["robot"]), record.steps
-    return HandoverScene(
+    return HandoffScene(
         scenario=record.scenario,
         title=f"{run.situation}, {run.method}, seed {run.seed}, episode {int(chosen['episode'])}",
         robot=robot,
@@ -103,8 +103,8 @@ def choose_scene(group: Sequence[Measured]) -> HandoverScene | None:
     )
 
 
-def scene_json(scene: HandoverScene) -> dict[str, Any]:
-    """The document of ``fig5.json``: the steps of the hand-over, start to second."""
+def scene_json(scene: HandoffScene) -> dict[str, Any]:
+    """The document of ``fig5.json``: the steps of the handoff, start to second."""
     shown = slice(scene.start, scene.second + 1)
     names = [robot.name for robot in scene.scenario.robots]
     tasks = [task.name for task in scene.scenario.tasks]

@@ -9,7 +9,7 @@ from innerattn.experiments.paper.pairs import Pair, pairs
 from innerattn.experiments.paper.printed import TEXT, PrintedRow
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import Verdict
-from innerattn.stats.seeds import OverRuns
+from innerattn.stats.seeds import SeedEstimate
 from innerattn.stats.text import NONE, shown
 
 
@@ -21,7 +21,7 @@ def sharing_claims(table: Table2) -> list[Claim]:
     compared = {
         (pair.situation, f"{pair.algorithm}-inner"): pair
         for pair in pairs(table.competence)
-        if pair.figure == "unevenness"
+        if pair.figure == "imbalance"
     }
     claims = []
     for (situation, method), own in rows.items():
@@ -120,5 +120,5 @@ def _distance(printed: PrintedRow) -> str:
     return f"{abs(printed.shares[0] - 0.5):.2f}"
 
 
-def _mean(value: OverRuns | None) -> str:
+def _mean(value: SeedEstimate | None) -> str:
     return f"{value.mean:.2f}" if value else NONE

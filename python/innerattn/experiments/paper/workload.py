@@ -26,7 +26,7 @@ def rescues_by_task(measured: Measured) -> dict[str, NDArray[np.int64]]:
     return counts
 
 
-def unevenness(measured: Measured) -> float | None:
+def workload_imbalance(measured: Measured) -> float | None:
     """Distance of the first food robot's share from 0.5, a mean over tasks, 0 to 0.5.
 
     Returns:

@@ -18,7 +18,7 @@ from innerattn.stats.auc import Comparison, areas, compare
 from innerattn.stats.intervals import Interval, percentile_interval
 
 
-class Twins(NamedTuple):
+class PairedRollouts(NamedTuple):
     """Attention in the same worlds with one robot's fault and without.
 
     Attributes:
@@ -100,7 +100,7 @@ class Pooled(NamedTuple):
 
 
 def shift_of(
-    robot: str, value: float, twins: Twins, draws: NDArray[np.float64], seed: int
+    robot: str, value: float, twins: PairedRollouts, draws: NDArray[np.float64], seed: int
 ) -> Shift:
     """What one robot's fault did.
 

@@ -1,6 +1,6 @@
 """Is a task's work shared evenly by two robots? From rescues by episode, with three answers.
 
-χ² cannot show evenness, only fail to see unevenness, and takes rescues for independent; an
+χ² cannot show evenness, only fail to see imbalance, and takes rescues for independent; an
 equivalence test and an interval over whole episodes or runs can show either.
 """
 

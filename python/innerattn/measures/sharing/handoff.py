@@ -1,6 +1,6 @@
-"""Hand-overs (Fig. 5): a robot completes one task with one partner, the next with another.
+"""Handoffs (Fig. 5): a robot completes one task with one partner, the next with another.
 
-They are found in rescue events; `handover_attention` measures what attention does around them.
+They are found in rescue events; `handoff_attention` measures what attention does around them.
 """
 
 from __future__ import annotations
@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 
 from innerattn.records.record import Record
 
-HANDOVER = np.dtype(
+HANDOFF = np.dtype(
     [
         (name, np.int64)
         for name in ("episode", "robot", "before", "after", "start", "first", "second")
     ]
 )
-"""A hand-over. episode: its number; robot: who hands over; before, after: its partners in the first
+"""A handoff. episode: its number; robot: who hands over; before, after: its partners in the first
 and the second rescue; start: step after its last rescue before these, or 0; first, second: steps of
 the two rescues. Fig. 5's pre-stage is start to first, its later stages first + 1 to second."""
 
 
-def handovers(record: Record, robot: str, first_task: str, later_task: str) -> NDArray[np.void]:
-    """All hand-overs of one robot from one task to another.
+def handoffs(record: Record, robot: str, first_task: str, later_task: str) -> NDArray[np.void]:
+    """All handoffs of one robot from one task to another.
 
     Args:
         record: where to look.
@@ -31,7 +31,7 @@ def handovers(record: Record, robot: str, first_task: str, later_task: str) -> N
         later_task: name of the task of the very next rescue the robot takes part in.
 
     Returns:
-        (N,) `HANDOVER`, in the order of episodes and of time; those with the same partner in both
+        (N,) `HANDOFF`, in the order of episodes and of time; those with the same partner in both
         rescues are left out.
 
     Raises:
@@ -55,7 +55,7 @@ def handovers(record: Record, robot: str, first_task: str, later_task: str) -> N
     wanted = (events["task"][:-1] == tasks[0]) & (events["task"][1:] == tasks[1])
     partner = np.where(helpers[:, 0] == index, helpers[:, 1], helpers[:, 0])
     chosen = np.flatnonzero(same & wanted & (partner[1:] != partner[:-1]))
-    found = np.zeros(len(chosen), HANDOVER)
+    found = np.zeros(len(chosen), HANDOFF)
     earlier = np.maximum(chosen - 1, 0)
     again = (chosen > 0) & (events["episode"][earlier] == events["episode"][chosen])
     found["episode"], found["robot"] = events["episode"][chosen], index

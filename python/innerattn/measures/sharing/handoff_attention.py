@@ -1,6 +1,6 @@
-"""Does attention pass on with the work? A robot's weights on two partners around hand-overs.
+"""Does attention pass on with the work? A robot's weights on two partners around handoffs.
 
-It looks at all hand-overs together; one chosen episode, as in Fig. 5, is an illustration.
+It looks at all handoffs together; one chosen episode, as in Fig. 5, is an illustration.
 """
 
 from __future__ import annotations
@@ -34,25 +34,25 @@ class Attended:
 
 
 @dataclass(frozen=True)
-class HandoverAttention:
+class HandoffAttention:
     """Attention of the robots that hand over, aligned on the first rescue.
 
-    Only steps of a hand-over's own two stages count: none before `start`, none after `second`. The
-    95 % intervals are over episodes, since hand-overs of one episode share steps; NaN where
+    Only steps of a handoff's own two stages count: none before `start`, none after `second`. The
+    95 % intervals are over episodes, since handoffs of one episode share steps; NaN where
     less than two episodes have the offset.
 
     Attributes:
-        handovers: N.
+        handoffs: N.
         episodes: episodes they come from.
         offsets: (W,) int64 steps since the first rescue's; the action of offset 0 completes it, so
             offsets above 0 are those after it.
-        counts: (W,) int64 hand-overs with such a step.
+        counts: (W,) int64 handoffs with such a step.
         to_be: the partner of the second rescue.
         before: the partner of the first.
         p: (K,) float64 two-sided, of the change on the partner to be minus that on the one before.
     """
 
-    handovers: int
+    handoffs: int
     episodes: int
     offsets: NDArray[np.int64]
     counts: NDArray[np.int64]
@@ -61,54 +61,54 @@ class HandoverAttention:
     p: Array
 
 
-def handover_attention(
-    record: Record, handovers: NDArray[np.void], seed: int, reach: int = 8
-) -> HandoverAttention | None:
+def handoff_attention(
+    record: Record, handoffs: NDArray[np.void], seed: int, reach: int = 8
+) -> HandoffAttention | None:
     """How attention moves from one partner to the next.
 
     The p-values are of a permutation test: if attention does not know which of its two partners is
-    next, their names can be exchanged. They are or are not in each episode, for all its hand-overs,
+    next, their names can be exchanged. They are or are not in each episode, for all its handoffs,
     which are not independent; p is the share of 9,999 draws, and of what is seen, in which the
     change on the partner to be minus that on the one before is at least as large either way.
     Teammates that are no partners are left out, since attention that passes from them to both
     partners alike does not move from one to the other. A change that always goes with one
-    partner, whatever the work, is not told apart unless hand-overs in both orders are given.
+    partner, whatever the work, is not told apart unless handoffs in both orders are given.
 
     Attention may pass on because other victims need other robots, whoever goes. As a control give
-    the same hand-overs with ``robot`` replaced by one that takes no part in them.
+    the same handoffs with ``robot`` replaced by one that takes no part in them.
 
     Args:
         record: with attention.
-        handovers: (N,) `handover.HANDOVER` of this record, of any robots.
+        handoffs: (N,) `handoff.HANDOFF` of this record, of any robots.
         seed: seed of the permutations.
         reach: steps looked at on either side, W / 2.
 
     Returns:
-        None where there is no hand-over or the record has no attention.
+        None where there is no handoff or the record has no attention.
 
     Raises:
         ValueError: reach is not positive, or a robot is its own partner.
     """
     if reach < 1:
         raise ValueError(f"reach = {reach}: must be 1 or more")
-    partners = np.stack([handovers["after"], handovers["before"]])
-    if (partners == handovers["robot"]).any():
-        raise ValueError("handovers: a robot cannot be before or after itself")
-    if not len(handovers) or "attention" not in record.steps:
+    partners = np.stack([handoffs["after"], handoffs["before"]])
+    if (partners == handoffs["robot"]).any():
+        raise ValueError("handoffs: a robot cannot be before or after itself")
+    if not len(handoffs) or "attention" not in record.steps:
         return None
     offsets = np.arange(1 - reach, reach + 1)
-    weights, counted = aligned_weights(record, handovers, offsets)
-    names, episode = np.unique(handovers["episode"], return_inverse=True)
+    weights, counted = aligned_weights(record, handoffs, offsets)
+    names, episode = np.unique(handoffs["episode"], return_inverse=True)
     changes = _mean(weights, counted & (offsets > 0)) - _mean(weights, counted & (offsets <= 0))
-    roles = partners - (partners > handovers["robot"])
+    roles = partners - (partners > handoffs["robot"])
     to_be, before = (
         Attended(*_courses(weights, counted, changes, role, episode)) for role in roles
     )
     on_next, on_last = (
         np.take_along_axis(changes, role[:, None, None], -1)[..., 0] for role in roles
     )
-    return HandoverAttention(
-        handovers=len(handovers),
+    return HandoffAttention(
+        handoffs=len(handoffs),
         episodes=len(names),
         offsets=offsets,
         counts=counted.sum(0),
@@ -119,27 +119,27 @@ def handover_attention(
 
 
 def aligned_weights(
-    record: Record, handovers: NDArray[np.void], offsets: NDArray[np.int64]
+    record: Record, handoffs: NDArray[np.void], offsets: NDArray[np.int64]
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """A robot's attention around its hand-overs.
+    """A robot's attention around its handoffs.
 
     Args:
         record: with attention.
-        handovers: (N,) `handover.HANDOVER`.
+        handoffs: (N,) `handoff.HANDOFF`.
         offsets: (W,) steps since the first rescue's.
 
     Returns:
         (N, W, 1 + H, R - 1) float64 weights on teammates by index, the robot itself left out: their
-        mean over heads, then each head; NaN outside the hand-over's stages. (N, W) bool whether it
+        mean over heads, then each head; NaN outside the handoff's stages. (N, W) bool whether it
         is inside.
     """
-    step = handovers["first"][:, None] + offsets
-    inside = (step >= handovers["start"][:, None]) & (step <= handovers["second"][:, None])
+    step = handoffs["first"][:, None] + offsets
+    inside = (step >= handoffs["start"][:, None]) & (step <= handoffs["second"][:, None])
     attention = record.steps["attention"]
     robots = np.arange(attention.shape[-1])
     teammates = np.stack([np.delete(robots, robot) for robot in robots])
-    robot = handovers["robot"]
-    episode = handovers["episode"] - record.first_episode
+    robot = handoffs["robot"]
+    episode = handoffs["episode"] - record.first_episode
     shown = np.where(inside, step, 0)
     heads = attention[episode[:, None], shown, :, robot[:, None]].astype(np.float64)
     heads = np.take_along_axis(heads, teammates[robot][:, None, None], -1)
@@ -173,7 +173,7 @@ def _courses(
 
 
 def _by_episode(values: NDArray[np.generic], episode: NDArray[np.int64]) -> Array:
-    """Sums over the hand-overs of each episode."""
+    """Sums over the handoffs of each episode."""
     sums = np.zeros((episode.max() + 1, *values.shape[1:]))
     np.add.at(sums, episode, values)
     return sums

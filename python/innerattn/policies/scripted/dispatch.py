@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from innerattn.config import Scenario
 from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
 from innerattn.errors import ConfigError
-from innerattn.policies.policy import Policy, View
+from innerattn.policies.policy import Policy, PolicyInput
 from innerattn.policies.scripted.assignment import Needs, assign, can_be_rescued, pair_costs
 from innerattn.policies.scripted.steering import Steering
 
@@ -33,7 +33,7 @@ class RandomPolicy:
         self._continuous = scenario.actions == "continuous"
         self._rng = np.random.default_rng(seed)
 
-    def act(self, view: View) -> NDArray[Any]:
+    def act(self, view: PolicyInput) -> NDArray[Any]:
         """See `Policy.act`."""
         shape = view.positions.shape
         if self._continuous:
@@ -52,7 +52,7 @@ class _Dispatcher(ABC):
         self.needs = Needs(scenario)
         self.steering = Steering(scenario)
 
-    def act(self, view: View) -> NDArray[Any]:
+    def act(self, view: PolicyInput) -> NDArray[Any]:
         """See `Policy.act`; robots without a victim are drawn to the centre."""
         places = np.stack([view.victims["x"], view.victims["y"]], -1).astype(np.float64)
         chosen = self.choose(view, places)
@@ -60,11 +60,11 @@ class _Dispatcher(ABC):
         targets = np.where(chosen[..., None] >= 0, targets, 0.0)
         return self.steering.actions(view.positions, view.velocities, targets, self._faults(view))
 
-    def _faults(self, view: View) -> NDArray[np.void] | None:
+    def _faults(self, view: PolicyInput) -> NDArray[np.void] | None:
         return view.faults if self.knows_faults else None
 
     @abstractmethod
-    def choose(self, view: View, places: NDArray[np.float64]) -> NDArray[np.int64]:
+    def choose(self, view: PolicyInput, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """The victim slot that each robot goes to (E, R), -1 for none; ``places`` are (E, V, 2)."""
 
 
@@ -73,7 +73,7 @@ class GreedyPolicy(_Dispatcher):
 
     name = "greedy"
 
-    def choose(self, view: View, places: NDArray[np.float64]) -> NDArray[np.int64]:
+    def choose(self, view: PolicyInput, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """See `_Dispatcher.choose`."""
         helpful = self.needs.permitted(view.victims["present"], view.victims["task"]).any(-1)
         way = places[:, None] - view.positions[:, :, None]
@@ -86,7 +86,7 @@ class HungarianPolicy(_Dispatcher):
 
     name = "hungarian"
 
-    def choose(self, view: View, places: NDArray[np.float64]) -> NDArray[np.int64]:
+    def choose(self, view: PolicyInput, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """See `_Dispatcher.choose`."""
         permitted = self.needs.permitted(view.victims["present"], view.victims["task"])
         faults = self._faults(view)

@@ -11,7 +11,7 @@ import numpy as np
 
 from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.report.plots.entropy import EntropyLines
-from innerattn.stats.seeds import BAND_NAMES, Band
+from innerattn.stats.seeds import BAND_NAMES, SeedCurve
 
 
 def fig4_csv(courses: Sequence[EntropyCourse]) -> str:
@@ -24,7 +24,7 @@ def fig4_csv(courses: Sequence[EntropyCourse]) -> str:
     for course in courses:
         mean, by_robot = course.mean(), course.by_robot()
         for t, env_steps in enumerate(course.env_steps.tolist()):
-            rows: list[tuple[str, Band, tuple[int, ...]]] = [("all", mean, (t,))]
+            rows: list[tuple[str, SeedCurve, tuple[int, ...]]] = [("all", mean, (t,))]
             rows += [(robot, by_robot, (t, r)) for r, robot in enumerate(course.robots)]
             for robot, found, at in rows:
                 ends = [float(found.mean[at]), float(found.low[at]), float(found.high[at])]

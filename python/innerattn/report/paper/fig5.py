@@ -25,7 +25,7 @@ def evidence_lines(found: Sequence[Evidence]) -> list[AlignedLines]:
             AlignedLines(
                 situation=part.situation,
                 method=part.method,
-                runs=f"{runs}, {sum(part.handovers):,} hand-overs",
+                runs=f"{runs}, {sum(part.handoffs):,} handoffs",
                 offsets=part.offsets,
                 step_s=part.step_s,
                 even=part.even,

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from innerattn.experiments.paper.claims import RULES, Claim, entropy_claims, handover_claims
+from innerattn.experiments.paper.claims import RULES, Claim, entropy_claims, handoff_claims
 from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence
-from innerattn.experiments.paper.merit import merits
+from innerattn.experiments.paper.imbalance_score import imbalance_score_correlations
 from innerattn.experiments.paper.pairs import pairs, together
-from innerattn.experiments.paper.scene import SCENE_RULE, HandoverScene
+from innerattn.experiments.paper.scene import SCENE_RULE, HandoffScene
 from innerattn.experiments.paper.sharing_claims import sharing_claims
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION, Table2
 from innerattn.experiments.run import Digests, StudyRun, named_from
@@ -34,8 +34,8 @@ class Findings:
         worlds: seed of the worlds that each run was measured in.
         table: Table II.
         courses: Fig. 4.
-        scene: the hand-over that is shown as Fig. 5; None, too, where there is none to show.
-        evidence: Fig. 5 over all hand-overs.
+        scene: the handoff that is shown as Fig. 5; None, too, where there is none to show.
+        evidence: Fig. 5 over all handoffs.
         left_out: runs that were planned and are in none of the figures, each with the reason.
     """
 
@@ -47,7 +47,7 @@ class Findings:
     worlds: tuple[int, ...]
     table: Table2 | None
     courses: tuple[EntropyCourse, ...] | None
-    scene: HandoverScene | None
+    scene: HandoffScene | None
     evidence: tuple[Evidence, ...] | None
     left_out: tuple[str, ...] = ()
 
@@ -56,7 +56,7 @@ class Findings:
         return [
             *(sharing_claims(self.table) if self.table else []),
             *entropy_claims(self.courses or ()),
-            *handover_claims(self.evidence or ()),
+            *handoff_claims(self.evidence or ()),
         ]
 
 
@@ -167,8 +167,8 @@ def _compared(table: Table2) -> str:
 
 
 def _merit(table: Table2) -> str:
-    head = ["situation", "runs", "correlation of unevenness and score within methods", "p"]
-    head += ["unevenness of hungarian", "its score"]
+    head = ["situation", "runs", "correlation of imbalance and score within methods", "p"]
+    head += ["imbalance of hungarian", "its score"]
     rows = [
         [
             *(one.situation, str(one.runs)),
@@ -176,10 +176,10 @@ def _merit(table: Table2) -> str:
             p_shown(one.p),
             *(NONE if value is None else fixed(value) for value in one.script),
         ]
-        for one in merits(table.competence)
+        for one in imbalance_score_correlations(table.competence)
     ]
     return (
-        "Of a run's unevenness and its score, each less its method's mean: above 0 where uneven "
+        "Of a run's imbalance and its score, each less its method's mean: above 0 where uneven "
         "runs score more. p is as if runs of one seed had nothing in common, and of each situation "
         "by itself.\n\n" + markdown_table(head, rows)
     )
@@ -211,21 +211,21 @@ def _fig4(courses: Sequence[EntropyCourse]) -> str:
 
 def _fig5(findings: Findings) -> str:
     if findings.scene is None:
-        text = "There is no hand-over to show.\n"
+        text = "There is no handoff to show.\n"
     else:
         text = (
-            f"![One hand-over](fig5.png)\n\nOne hand-over ({findings.scene.title}) as an "
+            f"![One handoff](fig5.png)\n\nOne handoff ({findings.scene.title}) as an "
             f"illustration. It was chosen by rule: {SCENE_RULE}.\n"
         )
     if not findings.evidence:
-        return text + "\nNo run has hand-overs and attention that chooses.\n"
-    head = ["situation", "method", "seed", "hand-overs (episodes)", "change on the partner to be"]
+        return text + "\nNo run has handoffs and attention that chooses.\n"
+    head = ["situation", "method", "seed", "handoffs (episodes)", "change on the partner to be"]
     head += ["of the robot that takes no part", "difference", "difference − half the change"]
     head += ["change on the partner before", "of the robot that takes no part"]
     head += ["p", "p of the robot that takes no part"]
     rows = [row for part in findings.evidence for row in _evidence_rows(part)]
     return text + (
-        "\n![All hand-overs](fig5_evidence.png)\n\nAll hand-overs of both food robots in both "
+        "\n![All handoffs](fig5_evidence.png)\n\nAll handoffs of both food robots in both "
         "orders of the tasks. Weights are means over heads; a change is the mean after the first "
         "rescue minus that up to it; p is of a permutation test of the change on the partner to "
         "be minus that on the one before, which exchanges the two in some episodes. The control "
@@ -243,7 +243,7 @@ def _evidence_rows(part: Evidence) -> list[list[str]]:
         rows.append(
             [
                 *(part.situation, part.method, str(seed)),
-                f"{part.handovers[n]} ({part.episodes[n]})",
+                f"{part.handoffs[n]} ({part.episodes[n]})",
                 *(_signed(role.change_by_run[n]) for role in (to_be, control)),
                 *(_signed(part.own_part_by_run[n]), NONE),
                 *(_signed(role.change_by_run[n]) for role in (before, before_control)),
@@ -253,7 +253,7 @@ def _evidence_rows(part: Evidence) -> list[list[str]]:
     if len(part.seeds) > 1:
         rows.append(
             [
-                *(part.situation, part.method, "mean [95 %]", f"{sum(part.handovers):,}"),
+                *(part.situation, part.method, "mean [95 %]", f"{sum(part.handoffs):,}"),
                 *(shown(to_be.change), shown(control.change)),
                 *(shown(part.own_part), shown(part.own_part_beyond_half)),
                 *(shown(before.change), shown(before_control.change), NONE, NONE),

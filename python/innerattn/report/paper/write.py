@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from innerattn.config.files import write_whole
 from innerattn.experiments.paper.fig4 import PRINTED_NATS, fig4, fig4_json
 from innerattn.experiments.paper.fig5 import evidence, evidence_json
-from innerattn.experiments.paper.scene import HandoverScene, choose_scene, scene_json
+from innerattn.experiments.paper.scene import HandoffScene, choose_scene, scene_json
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION, table2
 from innerattn.experiments.run import (
     Measured,
@@ -28,7 +28,7 @@ from innerattn.report.paper.table2 import table2_csv, table2_markdown
 from innerattn.report.plots.aligned import draw_aligned
 from innerattn.report.plots.drawing import check_format, write_figure
 from innerattn.report.plots.entropy import draw_entropy
-from innerattn.report.plots.handoff import draw_handover
+from innerattn.report.plots.handoff import draw_handoff
 from innerattn.report.smoke import mark_figure, noted_csv, noted_markdown
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def write_report(
     """Write ``report.md`` and the files of the parts into ``folder``, which is made if needed.
 
     The same runs give the same bytes. The files are table2.json, .md and .csv; fig4.json, .csv,
-    .pdf and .png; fig5.json, .pdf and .png, which show one hand-over; and fig5_evidence.json, .pdf
+    .pdf and .png; fig5.json, .pdf and .png, which show one handoff; and fig5_evidence.json, .pdf
     and .png. A figure that has nothing to show is not drawn, and removed where it was drawn before.
     Small copies of runs (`kept.keep`) are enough for the table; what needs their steps is left out.
 
@@ -104,8 +104,8 @@ def write_report(
     return findings
 
 
-def _scene(groups: Sequence[Sequence[Measured]]) -> HandoverScene | None:
-    """A hand-over of TD with inner attention in the mixed situation, or of what comes nearest."""
+def _scene(groups: Sequence[Sequence[Measured]]) -> HandoffScene | None:
+    """A handoff of TD with inner attention in the mixed situation, or of what comes nearest."""
 
     def distance(group: Sequence[Measured]) -> tuple[bool, bool]:
         run = group[0].run
@@ -136,7 +136,7 @@ def _write_parts(findings: Findings, folder: Path) -> None:
             _write_json(folder / "fig5.json", scene_json(findings.scene), budget)
         else:
             (folder / "fig5.json").unlink(missing_ok=True)
-        _draw(folder / "fig5", draw_handover(findings.scene) if findings.scene else None, budget)
+        _draw(folder / "fig5", draw_handoff(findings.scene) if findings.scene else None, budget)
 
 
 def _write_json(path: Path, document: dict[str, Any], budget: str) -> None:

@@ -1,4 +1,4 @@
-"""Fig. 5's evidence: attention around all hand-overs, of who hands over and of who does not."""
+"""Fig. 5's evidence: attention around all handoffs, of who hands over and of who does not."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class AlignedLines:
-    """What is drawn of all hand-overs of one situation and method; W offsets.
+    """What is drawn of all handoffs of one situation and method; W offsets.
 
     Attributes:
         situation: of the worlds.
         method: of training.
-        runs: what they are over: numbers of runs and hand-overs, and what the bands are.
+        runs: what they are over: numbers of runs and handoffs, and what the bands are.
         offsets: (W,) steps since the first rescue's.
         step_s: length of a step [s].
         even: weight of even attention.

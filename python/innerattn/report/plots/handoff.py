@@ -1,4 +1,4 @@
-"""Fig. 5: one hand-over as it went; it chooses and measures nothing."""
+"""Fig. 5: one handoff as it went; it chooses and measures nothing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.experiments.paper.scene import HandoverScene
+from innerattn.experiments.paper.scene import HandoffScene
 from innerattn.report.plots.drawing import BLACK, PAGE_WIDTH_IN, ROBOT_COLOURS, VERMILION
 from innerattn.report.plots.names import place_names
 
@@ -27,7 +27,7 @@ _GAP_PT = 3.0  # between a name and what it names
 _STAGES = ("(i) before", "(ii) between", "(iii) after")
 
 
-def draw_handover(scene: HandoverScene) -> Figure:
+def draw_handoff(scene: HandoffScene) -> Figure:
     """Panels A (positions in three stages), B (weights, mean over heads) and C (each head)."""
     from matplotlib.figure import Figure
 
@@ -79,7 +79,7 @@ def draw_handover(scene: HandoverScene) -> Figure:
     return figure
 
 
-def _arena(panel: Axes, scene: HandoverScene, stage: tuple[int, int]) -> _Names:
+def _arena(panel: Axes, scene: HandoffScene, stage: tuple[int, int]) -> _Names:
     """Draw a stage; its names are yet to be placed."""
     from matplotlib.patches import Circle, Rectangle
     from matplotlib.patheffects import withStroke
@@ -126,7 +126,7 @@ def _arena(panel: Axes, scene: HandoverScene, stage: tuple[int, int]) -> _Names:
     return robots, victims
 
 
-def _present(scene: HandoverScene, now: int) -> NDArray[np.void]:
+def _present(scene: HandoffScene, now: int) -> NDArray[np.void]:
     """The victims that are there at a step."""
     victims: NDArray[np.void] = scene.victims[now]
     there: NDArray[np.void] = victims[victims["present"].astype(bool)]
@@ -134,7 +134,7 @@ def _present(scene: HandoverScene, now: int) -> NDArray[np.void]:
 
 
 def _place(
-    panel: Axes, names: _Names, scene: HandoverScene, stage: tuple[int, int], point_px: float
+    panel: Axes, names: _Names, scene: HandoffScene, stage: tuple[int, int], point_px: float
 ) -> None:
     """Put the names where they cover no robot, victim or trail, as far as that can be."""
     from matplotlib.transforms import Bbox
@@ -161,8 +161,8 @@ def _place(
     place_names(beside, arena, marks)
 
 
-def _weights(panel: Axes, scene: HandoverScene, weights: NDArray[np.float32]) -> None:
-    """Weights (T, R) on the teammates over the steps of the hand-over."""
+def _weights(panel: Axes, scene: HandoffScene, weights: NDArray[np.float32]) -> None:
+    """Weights (T, R) on the teammates over the steps of the handoff."""
     from matplotlib.ticker import MaxNLocator
 
     steps = np.arange(scene.start, scene.second + 1)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from innerattn.evaluate.faults.grid import ONSETS, Grid, Kept
+from innerattn.evaluate.faults.grid import ONSETS, Grid, Retention
 from innerattn.report.plots.drawing import check_format, write_figure
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _INK_CHANGES_AT = 0.45  # dark ink on light cells and light ink on dark ones
 
 
-def draw_heatmap(name: str, kept: Kept, grid: Grid) -> Figure:
+def draw_heatmap(name: str, kept: Retention, grid: Grid) -> Figure:
     """Retention by kind (rows) and severity (columns), a panel for each robot and onset.
 
     Args:
@@ -54,7 +54,7 @@ def draw_heatmap(name: str, kept: Kept, grid: Grid) -> Figure:
     return figure
 
 
-def write_heatmap(path: Path, name: str, kept: Kept, grid: Grid) -> None:
+def write_heatmap(path: Path, name: str, kept: Retention, grid: Grid) -> None:
     """Draw a heat map into a file, whole or not at all.
 
     Raises:

@@ -12,7 +12,7 @@ from rich.table import Table
 from innerattn.report.tables.evaluation import plus_minus
 
 if TYPE_CHECKING:
-    from innerattn.experiments.scan import Found
+    from innerattn.experiments.scan import RunStatus
     from innerattn.experiments.scores import Scores
 
 _KEY = """\
@@ -21,7 +21,7 @@ _KEY = """\
 """
 
 
-def print_scores(console: Console, found: Sequence[Found]) -> None:
+def print_scores(console: Console, found: Sequence[RunStatus]) -> None:
     """Print what the finished runs scored, over seeds.
 
     Args:

@@ -15,7 +15,7 @@ from innerattn.report.tables.evaluation import plus_minus
 if TYPE_CHECKING:
     from innerattn.evaluate import Interval
     from innerattn.evaluate.bounds.figures import Bounds
-    from innerattn.evaluate.faults.grid import Grid, Kept
+    from innerattn.evaluate.faults.grid import Grid, Retention
     from innerattn.measures.faults.shift_results import FaultAttention
 
 _KEY = """\
@@ -41,7 +41,7 @@ _MOST_WITH_INTERVALS = 4  # policies that 80 columns hold with their intervals
 def print_robustness(
     console: Console,
     grid: Grid,
-    found: Mapping[str, Kept],
+    found: Mapping[str, Retention],
     bounds: Mapping[str, Bounds],
     attention: Mapping[str, FaultAttention],
 ) -> None:
@@ -80,7 +80,7 @@ def print_robustness(
             _print_attention(console, name, attention[name])
 
 
-def _by_kind(grid: Grid, found: Mapping[str, Kept], heads: Sequence[str]) -> Table:
+def _by_kind(grid: Grid, found: Mapping[str, Retention], heads: Sequence[str]) -> Table:
     show = plus_minus if len(found) <= _MOST_WITH_INTERVALS else _mean
     table = _table("kept", *heads)
     means = {name: kept.by_kind() for name, kept in found.items()}
@@ -94,7 +94,7 @@ def _by_kind(grid: Grid, found: Mapping[str, Kept], heads: Sequence[str]) -> Tab
     return table
 
 
-def _by_severity(grid: Grid, kept: Kept) -> Table:
+def _by_severity(grid: Grid, kept: Retention) -> Table:
     from innerattn.evaluate.faults.document import worst_robot
 
     table = _table("severity", *(f"{severity:g}" for severity in grid.severities))
@@ -107,7 +107,7 @@ def _by_severity(grid: Grid, kept: Kept) -> Table:
     return table
 
 
-def _after_onset(grid: Grid, kept: Kept) -> Table:
+def _after_onset(grid: Grid, kept: Retention) -> Table:
     steps = grid.scenario.episode_steps
     half = grid.middle + (steps - grid.middle) // 2
     table = _table(

@@ -7,17 +7,17 @@ import pytest
 import statsmodels.api as sm
 
 from innerattn.experiments.paper.competence import COMPETENCE, Competence
-from innerattn.experiments.paper.merit import merits
-from innerattn.stats.seeds import over_runs
+from innerattn.experiments.paper.imbalance_score import imbalance_score_correlations
+from innerattn.stats.seeds import seed_estimate
 
 
-def made(method: str, unevenness: list[float], scores: list[float | None]) -> Competence:
+def made(method: str, imbalance: list[float], scores: list[float | None]) -> Competence:
     nothing: dict[str, float | None] = dict.fromkeys(COMPETENCE)
     each = tuple(
-        nothing | {"unevenness": one, "score": other}
-        for one, other in zip(unevenness, scores, strict=True)
+        nothing | {"imbalance": one, "score": other}
+        for one, other in zip(imbalance, scores, strict=True)
     )
-    mean = {name: over_runs([figures[name] for figures in each]) for name in COMPETENCE}
+    mean = {name: seed_estimate([figures[name] for figures in each]) for name in COMPETENCE}
     return Competence("double", method, tuple(range(len(each))), (), each, mean)
 
 
@@ -28,7 +28,7 @@ def test_correlation_is_that_of_a_regression_with_a_mean_for_each_method() -> No
         made(name, list(x), list(y))
         for name, (x, y) in zip(("td-inner", "td-uniform", "ppo-inner"), groups, strict=True)
     ]
-    (found,) = merits([*parts, made("hungarian", [0.01, 0.03], [1.0, 1.0])])
+    (found,) = imbalance_score_correlations([*parts, made("hungarian", [0.01, 0.03], [1.0, 1.0])])
     dummies = np.repeat(np.eye(3), [5, 4, 6], axis=0)
     x, y = np.concatenate([g[0] for g in groups]), np.concatenate([g[1] for g in groups])
     fitted = sm.OLS(y, np.column_stack([x, dummies])).fit()
@@ -41,17 +41,23 @@ def test_correlation_is_that_of_a_regression_with_a_mean_for_each_method() -> No
 
 
 def test_what_cannot_be_judged_has_no_correlation() -> None:
-    (few,) = merits([made("td-inner", [0.1, 0.2], [0.5, 0.6])])
+    (few,) = imbalance_score_correlations([made("td-inner", [0.1, 0.2], [0.5, 0.6])])
     assert (few.runs, few.correlation, few.p, few.script) == (2, None, None, (None, None))
-    (alike,) = merits([made("td-inner", [0.1] * 5, [0.5, 0.6, 0.7, 0.8, 0.9])])
+    (alike,) = imbalance_score_correlations(
+        [made("td-inner", [0.1] * 5, [0.5, 0.6, 0.7, 0.8, 0.9])]
+    )
     assert (alike.runs, alike.correlation) == (5, None)
-    (missing,) = merits([made("td-inner", [0.1, 0.2, 0.3, 0.4], [0.5, None, 0.7, 0.8])])
+    (missing,) = imbalance_score_correlations(
+        [made("td-inner", [0.1, 0.2, 0.3, 0.4], [0.5, None, 0.7, 0.8])]
+    )
     assert (missing.runs, missing.correlation) == (3, pytest.approx(1.0))
-    assert merits([made("hungarian", [0.1, 0.2], [1.0, 1.0])]) == []
+    assert imbalance_score_correlations([made("hungarian", [0.1, 0.2], [1.0, 1.0])]) == []
 
 
 def test_even_runs_that_score_less_are_seen_as_such() -> None:
-    (found,) = merits([made("td-inner", [0.0, 0.1, 0.2, 0.3], [0.6, 0.7, 0.8, 0.91])])
+    (found,) = imbalance_score_correlations(
+        [made("td-inner", [0.0, 0.1, 0.2, 0.3], [0.6, 0.7, 0.8, 0.91])]
+    )
     assert found.correlation is not None
     assert found.correlation > 0.99
     assert found.p is not None

@@ -11,22 +11,22 @@ from scipy.stats import t as student
 
 from innerattn.experiments.paper.competence import Competence
 from innerattn.policies import SCRIPTED
-from innerattn.stats.seeds import Array, OverRuns
+from innerattn.stats.seeds import Array, SeedEstimate
 
 _SCRIPT = "hungarian"
 
 
 @dataclass(frozen=True)
-class Merit:
-    """How unevenness goes with the score in one situation.
+class ImbalanceScoreCorrelation:
+    """How imbalance goes with the score in one situation.
 
     Attributes:
         situation: of the worlds.
         runs: those of methods with several runs.
-        correlation: Pearson's, of unevenness and score, each less its method's mean; positive where
+        correlation: Pearson's, of imbalance and score, each less its method's mean; positive where
             uneven runs score more. None where either does not vary, or runs are too few to judge.
         p: two-sided, of no correlation, as if runs of one seed had nothing in common.
-        script: unevenness and score of the scripted assignment in the same worlds; None where it
+        script: imbalance and score of the scripted assignment in the same worlds; None where it
             has none.
     """
 
@@ -37,7 +37,9 @@ class Merit:
     script: tuple[float | None, float | None]
 
 
-def merits(competence: Sequence[Competence]) -> list[Merit]:
+def imbalance_score_correlations(
+    competence: Sequence[Competence],
+) -> list[ImbalanceScoreCorrelation]:
     """Of every situation with trained runs."""
     trained = [part for part in competence if part.method not in SCRIPTED]
     return [
@@ -46,23 +48,23 @@ def merits(competence: Sequence[Competence]) -> list[Merit]:
     ]
 
 
-def _merit(situation: str, parts: Sequence[Competence]) -> Merit:
+def _merit(situation: str, parts: Sequence[Competence]) -> ImbalanceScoreCorrelation:
     groups = []
     for part in parts:
         pairs = [
-            (figures["unevenness"], figures["score"])
+            (figures["imbalance"], figures["score"])
             for figures in part.each
-            if figures["unevenness"] is not None and figures["score"] is not None
+            if figures["imbalance"] is not None and figures["score"] is not None
         ]
         if part.method not in SCRIPTED and len(pairs) > 1:
             groups.append(np.array(pairs, np.float64))
     runs = sum(map(len, groups))
     script = next((part.mean for part in parts if part.method == _SCRIPT), {})
-    beside = (_mean(script.get("unevenness")), _mean(script.get("score")))
-    return Merit(situation, runs, *_correlation(groups, runs), beside)
+    beside = (_mean(script.get("imbalance")), _mean(script.get("score")))
+    return ImbalanceScoreCorrelation(situation, runs, *_correlation(groups, runs), beside)
 
 
-def _mean(value: OverRuns | None) -> float | None:
+def _mean(value: SeedEstimate | None) -> float | None:
     return value.mean if value else None
 
 
