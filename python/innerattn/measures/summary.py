@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -55,6 +55,8 @@ class Summary:
         attention_entropy: by robot and head [nats]; empty where there is no attention.
         attention_entropy_share: the same as a share of ln(R - 1); None below three robots.
         warm_start: the scripted policy that training began by imitating, or "none".
+        measures: by policy, what else was measured at the scenario's own length, by name; of the
+            method over ``episodes``, of scripted policies over all scored episodes.
     """
 
     policy: str
@@ -69,6 +71,7 @@ class Summary:
     attention_entropy: dict[str, list[float]]
     attention_entropy_share: dict[str, list[float | None]]
     warm_start: str = "none"
+    measures: dict[str, dict[str, float | None]] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """The document that `evaluate --json` and a run folder's summary.json hold."""
@@ -91,6 +94,7 @@ class Summary:
             "cooperation_rates": self.cooperation_rates,
             "attention_entropy": self.attention_entropy,
             "attention_entropy_share": self.attention_entropy_share,
+            "measures": self.measures,
         }
 
 
@@ -100,6 +104,7 @@ def summarise(
     standard: Mapping[str, Sequence[Record]],
     long: Mapping[str, Sequence[Record]],
     warm_start: str = "none",
+    measures: Mapping[str, Mapping[str, float | None]] | None = None,
 ) -> Summary:
     """The figures of one policy.
 
@@ -110,6 +115,7 @@ def summarise(
             scripted policies, all over the same worlds.
         long: the same for the second length.
         warm_start: the scripted policy that training began by imitating, or "none".
+        measures: as in `Summary`.
     """
     scenario, names = recorded.scenario, recorded.robot_names
     entropy = entropy_of(recorded)
@@ -126,6 +132,7 @@ def summarise(
         attention_entropy=_rows(names, entropy),
         attention_entropy_share=_shares(names, entropy),
         warm_start=warm_start,
+        measures={name: dict(values) for name, values in (measures or {}).items()},
     )
 
 

@@ -34,8 +34,8 @@ EVEN_ENTROPY = 1.0 - ENTROPY_MARGIN
 
 RULES = f"""\
 A claim is undecided for a method with less than two runs. Intervals are Student's 95 % over runs,
-also where they reach beyond what is possible (a share above 1, an imbalance below 0). Every claim is
-judged by itself at 5 %; nothing is adjusted for their number.
+also where they reach beyond what is possible (a share above 1, an imbalance below 0). Every claim
+is judged by itself at 5 %; nothing is adjusted for their number.
 
 - *A task is shared* evenly where the runs' mean share is (its 90 % interval lies within {MARGIN[0]}
   to {MARGIN[1]}) and no run is uneven by itself; unevenly where the mean share is (its 95 %

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.errors import RunError
-from innerattn.experiments.run import StudyRun, by_method
+from innerattn.experiments.run import FinishedRun, by_method
 from innerattn.stats.seeds import Array, SeedCurve, SeedEstimate, seed_curve, seed_estimate
 
 SCHEMA_VERSION = 1
@@ -89,7 +89,7 @@ class EntropyCourse:
         }
 
 
-def fig4(runs: Sequence[StudyRun]) -> list[EntropyCourse]:
+def fig4(runs: Sequence[FinishedRun]) -> list[EntropyCourse]:
     """Entropy courses of all methods with attention.
 
     Returns:
@@ -112,7 +112,7 @@ def fig4_json(courses: Sequence[EntropyCourse]) -> dict[str, Any]:
     }
 
 
-def _course(group: Sequence[StudyRun]) -> EntropyCourse | None:
+def _course(group: Sequence[FinishedRun]) -> EntropyCourse | None:
     tables = [_entropies(run) for run in group]
     if not all(tables):
         return None
@@ -139,7 +139,7 @@ def _course(group: Sequence[StudyRun]) -> EntropyCourse | None:
     )
 
 
-def _entropies(run: StudyRun) -> dict[int, dict[str, list[float]]]:
+def _entropies(run: FinishedRun) -> dict[int, dict[str, list[float]]]:
     """Entropy by env-steps, robot and head; empty where the method has none."""
     path = run.folder / "metrics.jsonl"
     try:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.experiments.run import Measured
+from innerattn.experiments.run import FinishedRun
 from innerattn.measures.cooperation import shared_abilities
 from innerattn.measures.sharing.handoff import HANDOFF, handoffs
 from innerattn.measures.sharing.handoff_attention import (
@@ -151,7 +151,7 @@ def with_bystander(record: Record, found: NDArray[np.void]) -> NDArray[np.void]:
     return control
 
 
-def evidence(group: Sequence[Measured]) -> Evidence | None:
+def evidence(group: Sequence[FinishedRun]) -> Evidence | None:
     """What attention does around handoffs in runs of one situation and method.
 
     Returns:
@@ -182,9 +182,9 @@ def evidence(group: Sequence[Measured]) -> Evidence | None:
         for part in (1.0, 0.5)
     )
     return Evidence(
-        situation=group[0].run.situation,
-        method=group[0].run.method,
-        seeds=tuple(measured.run.seed for measured in group),
+        situation=group[0].situation,
+        method=group[0].method,
+        seeds=tuple(measured.seed for measured in group),
         handoffs=tuple(run.handoffs if run else 0 for run in seen),
         episodes=tuple(run.episodes if run else 0 for run in seen),
         offsets=known[0].offsets,
