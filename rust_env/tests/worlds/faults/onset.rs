@@ -5,8 +5,8 @@ use innerattn_env::error::Error;
 use innerattn_env::fault::{Fault, HEALTHY, Kind, NUM_KINDS};
 use innerattn_env::scenario::Scenario;
 
+use super::{EAST, STAY, alone, team};
 use crate::common::{Table, fault, options};
-use crate::{EAST, STAY, alone, team};
 
 #[test]
 fn faults_begin_and_end_at_their_steps() {
@@ -18,7 +18,7 @@ fn faults_begin_and_end_at_their_steps() {
     let mut seen = vec![];
     for _ in 0..10 {
         let world = table.batch.worlds().next().expect("a world");
-        seen.push(world.condition.levels(0)[Kind::MotorGain as usize]);
+        seen.push(world.faults.levels(0)[Kind::MotorGain as usize]);
         table.step(&[STAY]);
     }
     assert_eq!(seen, [1.0, 1.0, 1.0, 0.5, 0.5, 0.25, 0.25, 0.5, 0.5, 0.5]);
@@ -38,7 +38,7 @@ fn random_onsets_come_at_their_rate_and_again() {
     let (mut healthy, mut onsets, mut before) = (0_u32, 0_u32, vec![false; envs]);
     let mut lengths = vec![0_u32; envs];
     for step in 0..99 {
-        let now: Vec<bool> = table.batch.worlds().map(|world| world.condition.unavailable() == 1).collect();
+        let now: Vec<bool> = table.batch.worlds().map(|world| world.faults.unavailable() == 1).collect();
         for ((before, now), length) in before.iter().zip(&now).zip(&mut lengths) {
             assert!(step >= 10 || !now);
             assert!(*now || [0, 5].contains(length), "it lasted {length} steps");
@@ -91,7 +91,7 @@ fn the_callers_faults_hold_until_the_episode_ends() {
     let mut table = Table::new(scenario, options);
     let gain = |table: &Table, env: usize| {
         let world = table.batch.worlds().nth(env).expect("a world");
-        world.condition.levels(0)[Kind::MotorGain as usize]
+        world.faults.levels(0)[Kind::MotorGain as usize]
     };
     table.step(&[EAST; 8]);
     let mut levels = [HEALTHY; 8];

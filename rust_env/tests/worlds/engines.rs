@@ -1,15 +1,14 @@
 //! Both engines against the truth: the same period at 96 substeps of rapier. `discs` may stand in for
 //! `rapier` because it is nearer to the truth, over a hundred thousand contacts.
 
-mod common;
-
-use common::{chance, mixed_team, some_obstacles};
 use innerattn_env::geometry::Vec2;
 use innerattn_env::physics::{Physics, Workspace};
 use innerattn_env::robot::Body;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Engine, Scenario};
 use innerattn_env::world::World;
+
+use crate::common::{chance, mixed_team, some_obstacles};
 
 /// Robots in contact in each kind of scene.
 const CONTACTS: usize = 34_000;
@@ -91,9 +90,11 @@ fn moved(physics: &Physics, workspace: &mut Workspace, world: &World, velocities
 /// by discs, and in truth.
 fn compare(name: &str, scenario: &Scenario) {
     let rules = Rules::new(Scenario { engine: Engine::Discs, ..scenario.clone() }).expect("a valid scenario");
-    let fine = Scenario { substeps: 96, ..scenario.clone() };
-    let rapier = |scenario: &Scenario| Physics::new(scenario, &rules.team, &rules.solids);
-    let (coarse, fine) = (rapier(scenario), rapier(&fine));
+    let rapier = |substeps| {
+        let scenario = Scenario { substeps, engine: Engine::Rapier, ..scenario.clone() };
+        Rules::new(scenario).expect("a valid scenario").physics
+    };
+    let (coarse, fine) = (rapier(scenario.substeps), rapier(96));
     let (mut workspace, mut chance) = (Workspace::default(), chance(11));
     let (mut of_rapier, mut of_discs) = (Errors::default(), Errors::default());
     let mut episode = 0;

@@ -1,14 +1,13 @@
 //! Contacts are true: they keep momentum and gain no energy, mass counts, what passes by is left alone
 //! and what is hit moves on as it does in the same scene at sixteen times the substeps.
 
-mod common;
-
-use common::{ENGINES, chance, mixed_team};
 use innerattn_env::geometry::Vec2;
 use innerattn_env::physics::Workspace;
 use innerattn_env::rng::Stream;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Engine, Scenario};
+
+use crate::common::{ENGINES, chance, mixed_team};
 
 /// A team in motion, for periods in which nobody drives.
 struct Scene {

@@ -4,8 +4,8 @@ use innerattn_env::fault::{Fault, Kind};
 use innerattn_env::geometry::Vec2;
 use innerattn_env::scenario::Scenario;
 
+use super::{EAST, STAY, alone, column, place, row, team};
 use crate::common::{ENGINES, Table, fault, options};
-use crate::{EAST, STAY, alone, column, place, row, team};
 
 fn speed(table: &Table, robot: usize) -> f32 {
     table.batch.worlds().next().expect("a world").velocities[robot].norm()

@@ -2,18 +2,16 @@
 
 #![allow(clippy::float_cmp)] // what is compared is the same to the bit, or a level as it was set
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod motion;
 mod onset;
 mod properties;
 mod senses;
 
-use common::Table;
 use innerattn_env::fault::Fault;
 use innerattn_env::geometry::Vec2;
 use innerattn_env::scenario::{Robot, Scenario};
+
+use crate::common::Table;
 
 const EAST: [f32; 2] = [1.0, 0.0];
 const STAY: [f32; 2] = [0.0, 0.0];

@@ -1,11 +1,12 @@
 //! The rescue rule against its plain reading: of all ways to give each need a robot of its own, the
 //! one whose first need has the nearest robot (ties by index), then its second, and so on.
 
-use innerattn_env::geometry::Vec2;
-use innerattn_env::robot::{Body, bodies};
-use innerattn_env::scenario::{Robot, Scenario, Task};
-use innerattn_env::task::Needs;
 use proptest::prelude::*;
+
+use super::Needs;
+use crate::geometry::Vec2;
+use crate::robot::{Body, bodies};
+use crate::scenario::{Robot, Scenario, Task};
 
 const ABILITIES: [&str; 3] = ["a", "b", "c"];
 

@@ -1,12 +1,13 @@
 //! What the integration tests share: a batch with the buffers that its steps write, teams and scenes.
-#![allow(dead_code)] // each test file uses a part
+#![allow(dead_code)] // each test program uses a part
 
 use innerattn_env::batch::{Autoreset, Batch, Options, StepBuffers};
 use innerattn_env::error::Result;
 use innerattn_env::fault::{Fault, KINDS, Kind};
-use innerattn_env::reward::NUM_COMPONENTS;
+use innerattn_env::reward::{COMPONENTS, NUM_COMPONENTS};
 use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
+use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Actions, Engine, Obstacle, Robot, Scenario, Shape};
 use innerattn_env::task::Rescue;
 
@@ -32,7 +33,7 @@ pub struct Table {
 
 impl Table {
     pub fn new(scenario: Scenario, options: Options) -> Self {
-        let batch = Batch::new(scenario, options).expect("a valid scenario");
+        let batch = Batch::new(Rules::new(scenario).expect("a valid scenario"), options).expect("a batch");
         let rows = options.num_envs * batch.rules().team.len();
         let width = batch.rules().layout.width();
         let mut table = Self {
@@ -72,6 +73,12 @@ impl Table {
             Actions::Continuous => self.try_step(Commands::Continuous(actions.as_flattened())),
         };
         result.expect("valid actions");
+    }
+
+    /// Whether the robot of a row (env × R + robot) paid for a contact in the last step.
+    pub fn touched(&self, row: usize) -> bool {
+        let contact = COMPONENTS.iter().position(|component| component.name == "contact");
+        self.components[row * NUM_COMPONENTS + contact.expect("a component")] < 0.0
     }
 
     /// Everything that worlds `from..to` showed in the last step, as bits.

@@ -2,8 +2,8 @@
 
 use innerattn_env::fault::{Fault, Kind};
 
+use super::{EAST, STAY, column, row, team};
 use crate::common::{Table, chance, fault, options, random_drive};
-use crate::{EAST, STAY, column, row, team};
 
 #[test]
 fn frozen_sensors_repeat_what_they_saw_to_the_bit() {

@@ -2,14 +2,13 @@
 //! another robot, and overlaps stay small beside a radius. Half a million env-steps for each engine;
 //! twenty times as many with `INNERATTN_SLOW=1`.
 
-mod common;
-
-use common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles};
 use innerattn_env::batch::Options;
 use innerattn_env::geometry::{Solid, Vec2};
 use innerattn_env::rng::Stream;
 use innerattn_env::scenario::{Actions, Engine, Scenario};
 use innerattn_env::world::World;
+
+use crate::common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles};
 
 const ENVS: usize = 250;
 /// Largest overlap at a period's end as a share of the smaller radius: of all, and at the 99.9th percentile.

@@ -3,20 +3,31 @@
 //! nothing else in the world; strikes and noise depend on seed, env, episode, step and robot alone, so
 //! that two severities of a fault meet the same draws.
 
-use std::iter::zip;
-
 use serde::{Deserialize, Serialize};
 
-use crate::fault::{HEALTHY, Kind, Levels};
+use crate::fault::{Drive, Effect, HEALTHY, Kind, Levels, NUM_KINDS, SPECS};
 use crate::geometry::Vec2;
 use crate::observe::Senses;
 use crate::rng::{Purpose, Stream};
 use crate::rules::Rules;
 
-/// Kinds whose value is the share of steps that they strike.
-const STRIKING: [Kind; 4] = [Kind::FrozenSensor, Kind::Blackout, Kind::Unavailable, Kind::LostCommunication];
+/// For each kind, how many of those before it strike: its number among them, if it does.
+const STRIKES_BEFORE: [usize; NUM_KINDS] = {
+    let mut before = [0; NUM_KINDS];
+    let mut kind = 1;
+    while kind < NUM_KINDS {
+        before[kind] = before[kind - 1] + matches!(SPECS[kind - 1].effect, Effect::Strike) as usize;
+        kind += 1;
+    }
+    before
+};
+/// Number of kinds that strike in a share of the control steps.
+const NUM_STRIKES: usize =
+    STRIKES_BEFORE[NUM_KINDS - 1] + matches!(SPECS[NUM_KINDS - 1].effect, Effect::Strike) as usize;
+/// Words of random numbers for an error of position and one of velocity, of two axes each.
+const ERROR_WORDS: usize = 4;
 /// Words of random numbers that each robot has for itself in each step.
-const WORDS_PER_ROBOT: u64 = 4;
+const WORDS_PER_ROBOT: u64 = if NUM_STRIKES > ERROR_WORDS { NUM_STRIKES as u64 } else { ERROR_WORDS as u64 };
 
 /// The moment that strikes and noise are drawn for.
 #[derive(Debug, Clone, Copy)]
@@ -45,18 +56,9 @@ struct Span {
     until: u32,
 }
 
-/// Robots that are struck in this step, as bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-struct Struck {
-    frozen: u64,
-    dark: u64,
-    unavailable: u64,
-    deaf: u64,
-}
-
 /// The faults of one world's team.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Condition {
+pub struct FaultState {
     /// Words drawn from the stream of onsets.
     words: u64,
     /// Step at which the scenario's faults begin or end next.
@@ -69,19 +71,20 @@ pub struct Condition {
     levels: Vec<Levels>,
     /// Whether some robot is struck in some steps only.
     intermittent: bool,
-    struck: Struck,
+    /// Robots that are struck in this step, as bits, for each kind that strikes.
+    struck: [u64; NUM_STRIKES],
     /// Rows that robots with frozen sensors see.
-    held: Vec<(u8, Vec<f32>)>,
+    frozen: Vec<(u8, Vec<f32>)>,
 }
 
-impl Condition {
+impl FaultState {
     /// Starts an episode: the scenario's faults, drawn anew.
     pub fn begin(&mut self, rules: &Rules, now: Moment) {
         self.words = 0;
         self.set = false;
         self.next_change = 0;
         self.spans.clear();
-        self.heal();
+        self.clear();
         if rules.faults.is_empty() {
             self.next_change = u32::MAX;
             return;
@@ -99,19 +102,19 @@ impl Condition {
             self.change(rules, now);
         }
         if self.intermittent {
-            self.strike(now);
+            self.sample(now);
         }
     }
 
     /// Puts `levels` (one for each robot) in place of the scenario's faults until the episode ends.
     pub fn set(&mut self, levels: &[Levels], now: Moment) {
         self.set = true;
-        self.take(levels.to_vec(), now);
+        self.put(levels.to_vec(), now);
     }
 
     /// Whether nothing is wrong with anyone.
     #[must_use]
-    pub fn well(&self) -> bool {
+    pub fn is_healthy(&self) -> bool {
         self.levels.is_empty()
     }
 
@@ -124,25 +127,35 @@ impl Condition {
     /// Robots that neither drive nor help now, as bits.
     #[must_use]
     pub fn unavailable(&self) -> u64 {
-        self.struck.unavailable
+        self.struck(Kind::Unavailable)
+    }
+
+    /// Whether a fault of a kind that strikes strikes this robot now.
+    #[must_use]
+    pub fn is_struck(&self, kind: Kind, robot: usize) -> bool {
+        self.struck(kind) >> robot & 1 == 1
     }
 
     /// What becomes of a command: the drive, and the share of the speed cap that is left.
     #[must_use]
-    pub fn driven(&self, robot: usize, drive: Vec2) -> (Vec2, f32) {
-        let Some(levels) = self.levels.get(robot) else { return (drive, 1.0) };
-        let cap = levels[Kind::SpeedLimit as usize];
-        if self.struck.unavailable >> robot & 1 == 1 {
-            return (Vec2::zeros(), cap);
+    pub fn drive(&self, robot: usize, command: Vec2) -> (Vec2, f32) {
+        let Some(levels) = self.levels.get(robot) else { return (command, 1.0) };
+        let mut drive = Drive::default();
+        for (spec, level) in SPECS.iter().zip(levels) {
+            if let Effect::Drive(change) = spec.effect {
+                change(&mut drive, *level);
+            }
         }
-        let bias = levels[Kind::HeadingBias as usize];
-        let turned = if bias == 0.0 {
-            drive
+        if self.is_struck(Kind::Unavailable, robot) {
+            return (Vec2::zeros(), drive.speed);
+        }
+        let turned = if drive.turn == 0.0 {
+            command
         } else {
-            let (sin, cos) = bias.sin_cos();
-            Vec2::new(cos * drive.x - sin * drive.y, sin * drive.x + cos * drive.y)
+            let (sin, cos) = drive.turn.sin_cos();
+            Vec2::new(cos * command.x - sin * command.y, sin * command.x + cos * command.y)
         };
-        (turned * levels[Kind::MotorGain as usize], cap)
+        (turned * drive.force, drive.speed)
     }
 
     /// What is wrong with the senses of `robot`.
@@ -153,8 +166,8 @@ impl Condition {
         let mut senses = Senses {
             position_error: Vec2::zeros(),
             velocity_error: Vec2::zeros(),
-            deaf: self.struck.deaf >> robot & 1 == 1,
-            unavailable: self.struck.unavailable,
+            deaf: self.is_struck(Kind::LostCommunication, robot),
+            unavailable: self.unavailable(),
             levels: &self.levels,
         };
         if far > 0.0 || fast > 0.0 {
@@ -165,26 +178,21 @@ impl Condition {
         senses
     }
 
-    /// Whether a robot sees nothing now.
-    #[must_use]
-    pub fn dark(&self, robot: usize) -> bool {
-        self.struck.dark >> robot & 1 == 1
-    }
-
     /// Whether some robot's sensors are frozen now or in some steps.
     #[must_use]
-    pub fn freezes(&self) -> bool {
+    pub fn has_frozen_sensors(&self) -> bool {
         self.levels.iter().any(freezing)
     }
 
-    /// Takes the present rows (R × D) of frozen robots, but for those that go on seeing an older one.
-    pub fn hold(&mut self, rows: &[f32]) {
-        let Self { levels, held, struck, .. } = self;
+    /// Keeps the present rows (R × D) of frozen robots, but for those that go on seeing an older one.
+    pub fn freeze(&mut self, rows: &[f32]) {
+        let struck = self.struck(Kind::FrozenSensor);
+        let Self { levels, frozen, .. } = self;
         for (robot, row) in rows.chunks_exact(rows.len() / levels.len()).enumerate() {
-            let known = held.iter().position(|(other, _)| usize::from(*other) == robot);
+            let known = frozen.iter().position(|(other, _)| usize::from(*other) == robot);
             match known {
-                Some(index) if struck.frozen >> robot & 1 == 0 => held[index].1.copy_from_slice(row),
-                None if freezing(&levels[robot]) => held.push((robot as u8, row.to_vec())),
+                Some(index) if struck >> robot & 1 == 0 => frozen[index].1.copy_from_slice(row),
+                None if freezing(&levels[robot]) => frozen.push((robot as u8, row.to_vec())),
                 _ => {}
             }
         }
@@ -192,8 +200,8 @@ impl Condition {
 
     /// What a robot with frozen sensors sees.
     #[must_use]
-    pub fn held(&self, robot: usize) -> Option<&[f32]> {
-        let row = self.held.iter().find(|(other, _)| usize::from(*other) == robot)?;
+    pub fn frozen_row(&self, robot: usize) -> Option<&[f32]> {
+        let row = self.frozen.iter().find(|(other, _)| usize::from(*other) == robot)?;
         Some(&row.1)
     }
 
@@ -205,15 +213,22 @@ impl Condition {
         (self.levels.is_empty() || self.levels.len() == robots)
             && self.levels.iter().flatten().all(|level| level.is_finite())
             && self.spans.len() == rules.faults.len()
-            && self.held.iter().all(|(robot, held)| usize::from(*robot) < robots && held.len() == row)
-            && self.held.iter().flat_map(|(_, held)| held).all(|number| number.is_finite())
+            && self.frozen.iter().all(|(robot, seen)| usize::from(*robot) < robots && seen.len() == row)
+            && self.frozen.iter().flat_map(|(_, seen)| seen).all(|number| number.is_finite())
     }
 
-    fn heal(&mut self) {
+    /// Makes everyone healthy.
+    fn clear(&mut self) {
         self.levels.clear();
-        self.held.clear();
+        self.frozen.clear();
         self.intermittent = false;
-        self.struck = Struck::default();
+        self.struck = [0; NUM_STRIKES];
+    }
+
+    /// Robots that a fault of this kind, one that strikes, strikes now, as bits.
+    fn struck(&self, kind: Kind) -> u64 {
+        debug_assert!(matches!(kind.spec().effect, Effect::Strike), "{}", kind.name());
+        self.struck[STRIKES_BEFORE[kind as usize]]
     }
 
     /// When a fault begins that may begin at `earliest`, and when it ends.
@@ -247,42 +262,50 @@ impl Condition {
             } else if now.step < span.until {
                 self.next_change = self.next_change.min(span.until);
                 let level = &mut levels[fault.robot][fault.kind as usize];
-                *level = fault.kind.combined(*level, fault.value);
+                *level = (fault.kind.spec().combine)(*level, fault.value);
             }
         }
-        self.take(levels, now);
+        self.put(levels, now);
     }
 
-    fn take(&mut self, levels: Vec<Levels>, now: Moment) {
+    /// Puts levels into effect, one for each robot.
+    fn put(&mut self, levels: Vec<Levels>, now: Moment) {
         if levels.iter().all(|levels| *levels == HEALTHY) {
-            self.heal();
+            self.clear();
             return;
         }
-        let shares = levels.iter().flat_map(|levels| STRIKING.map(|kind| levels[kind as usize]));
-        self.intermittent = shares.into_iter().any(|share| 0.0 < share && share < 1.0);
-        self.held.retain(|(robot, _)| freezing(&levels[usize::from(*robot)]));
+        self.intermittent = levels.iter().any(strikes_sometimes);
+        self.frozen.retain(|(robot, _)| freezing(&levels[usize::from(*robot)]));
         self.levels = levels;
-        self.strike(now);
+        self.sample(now);
     }
 
     /// Draws who is struck in this step.
-    fn strike(&mut self, now: Moment) {
+    fn sample(&mut self, now: Moment) {
         let robots = self.levels.len();
-        self.struck = Struck::default();
+        self.struck = [0; NUM_STRIKES];
         for (robot, levels) in self.levels.iter().enumerate() {
-            let share = STRIKING.map(|kind| levels[kind as usize]);
-            let mut draws = [0.0; STRIKING.len()];
-            if share.iter().any(|share| 0.0 < *share && *share < 1.0) {
+            let mut draws = [0.0; NUM_STRIKES];
+            if strikes_sometimes(levels) {
                 let mut stream = now.stream(Purpose::FaultStrikes, robot, robots);
                 draws = draws.map(|_| stream.unit());
             }
-            let Struck { frozen, dark, unavailable, deaf } = &mut self.struck;
-            for (mask, (draw, share)) in [frozen, dark, unavailable, deaf].into_iter().zip(zip(draws, share))
-            {
-                *mask |= u64::from(draw < share) << robot;
+            for ((struck, draw), share) in self.struck.iter_mut().zip(draws).zip(shares(levels)) {
+                *struck |= u64::from(draw < share) << robot;
             }
         }
     }
+}
+
+/// The shares of steps that a robot's faults strike, by kind that strikes.
+fn shares(levels: &Levels) -> impl Iterator<Item = f32> {
+    let strikes = SPECS.iter().zip(levels).filter(|(spec, _)| matches!(spec.effect, Effect::Strike));
+    strikes.map(|(_, share)| *share)
+}
+
+/// Whether some fault of a robot strikes in some steps only.
+fn strikes_sometimes(levels: &Levels) -> bool {
+    shares(levels).any(|share| 0.0 < share && share < 1.0)
 }
 
 /// Whether sensors at these levels are frozen in all or some steps.
@@ -314,24 +337,24 @@ mod tests {
             duration_steps: None,
         };
         let rules = Rules::new(Scenario { faults: vec![frozen], ..Scenario::default() }).expect("a scenario");
-        let mut good = Condition::default();
+        let mut good = FaultState::default();
         good.begin(&rules, Moment { seed: 1, stream: 0, episode: 0, step: 0 });
-        good.hold(&vec![0.5; rules.team.len() * rules.layout.width()]);
+        good.freeze(&vec![0.5; rules.team.len() * rules.layout.width()]);
         assert!(good.fits(&rules));
-        assert_eq!(good.held.len(), 1);
-        let spoilt: [fn(&mut Condition); 7] = [
-            |condition| condition.levels.truncate(3),
-            |condition| condition.levels[2][0] = f32::NAN,
-            |condition| condition.spans.clear(),
-            |condition| condition.spans.push(condition.spans[0]),
-            |condition| condition.held[0].0 = 4,
-            |condition| condition.held[0].1.truncate(5),
-            |condition| condition.held[0].1[3] = f32::INFINITY,
+        assert_eq!(good.frozen.len(), 1);
+        let spoilt: [fn(&mut FaultState); 7] = [
+            |faults| faults.levels.truncate(3),
+            |faults| faults.levels[2][0] = f32::NAN,
+            |faults| faults.spans.clear(),
+            |faults| faults.spans.push(faults.spans[0]),
+            |faults| faults.frozen[0].0 = 4,
+            |faults| faults.frozen[0].1.truncate(5),
+            |faults| faults.frozen[0].1[3] = f32::INFINITY,
         ];
         for (number, spoil) in spoilt.into_iter().enumerate() {
-            let mut condition = good.clone();
-            spoil(&mut condition);
-            assert!(!condition.fits(&rules), "{number}");
+            let mut faults = good.clone();
+            spoil(&mut faults);
+            assert!(!faults.fits(&rules), "{number}");
         }
     }
 }

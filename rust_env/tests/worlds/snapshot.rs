@@ -1,12 +1,11 @@
 //! A snapshot is the whole state: a batch restored from it goes on bit for bit, and bytes that are not
 //! exactly a snapshot of this batch are refused without a trace.
 
-mod common;
-
-use common::{Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles};
 use innerattn_env::batch::{Autoreset, Options};
 use innerattn_env::scenario::{Scenario, Situation};
 use proptest::prelude::*;
+
+use crate::common::{Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles};
 
 const ENVS: usize = 6;
 
@@ -69,7 +68,7 @@ fn an_ended_world_stays_ended() {
     second.batch.restore(&first.batch.snapshot()).expect("its own image");
     assert!(second.batch.worlds().all(|world| world.over));
     // A batch that begins episodes by itself could not go on from there.
-    let mut other = Table::new(scenario, common::options(ENVS, 1));
+    let mut other = Table::new(scenario, crate::common::options(ENVS, 1));
     assert_refused(&mut other, &first.batch.snapshot(), "an image of ended worlds");
 }
 

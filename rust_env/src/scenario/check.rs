@@ -1,4 +1,4 @@
-//! Checks of a scenario's values; each names the key, the value and what is allowed.
+//! Checks of single values of a scenario; each names the key, the value and what is allowed.
 
 use std::fmt::Display;
 

@@ -5,7 +5,7 @@ use innerattn_env::robot::Commands;
 use innerattn_env::scenario::{Robot, Scenario};
 use proptest::prelude::*;
 
-use crate::STAY;
+use super::STAY;
 use crate::common::{Table, chance, coming_and_going, fault, options, random_drive};
 
 /// What a batch of healthy or faulty worlds shows over many steps, a row of bits for each step.

@@ -1,13 +1,12 @@
 //! Speed caps bind and hold, and whoever touches nothing moves as the equation of motion says.
 
-mod common;
-
 use std::iter::zip;
 
-use common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles};
 use innerattn_env::geometry::Vec2;
 use innerattn_env::scenario::{Actions, Scenario};
 use innerattn_env::world::World;
+
+use crate::common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles};
 
 const ENVS: usize = 64;
 
@@ -74,7 +73,7 @@ fn caps_hold_and_what_touches_nothing_flies_as_it_should() {
                 }
                 for (robot, body) in team.iter().enumerate() {
                     let row = env * team.len() + robot;
-                    if table.components[4 * row + 2] < 0.0 {
+                    if table.touched(row) {
                         touched += 1;
                         continue;
                     }
