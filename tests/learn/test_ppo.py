@@ -8,8 +8,7 @@ import torch
 from reference import Adam, PlainNetwork, PlainTD, clip_factor, pick, policy, values
 from torch import Tensor
 
-from innerattn.config import NetworkConfig
-from innerattn.config.run import PPOConfig
+from innerattn.config import NetworkConfig, PPOConfig
 from innerattn.learn import PPO, Team, Transitions, ppo
 
 CPU = torch.device("cpu")

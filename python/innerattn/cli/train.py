@@ -17,15 +17,17 @@ from innerattn.cli.progress import Evaluating, SeveralRuns, Training
 from innerattn.cli.seeds import parse_seeds
 from innerattn.cli.tables import print_seeds, print_summary
 from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
-from innerattn.config.run import Method, WarmStart
+from innerattn.config.registry import methods
+from innerattn.config.sections import WarmStart
 from innerattn.cores import usable_cores
 from innerattn.study.several import Run, refuse_what_cannot_run, train_side_by_side
 
 if TYPE_CHECKING:
     Preset: TypeAlias = str
     Budget: TypeAlias = str
+    Method: TypeAlias = str
 else:
-    Preset, Budget = Literal[SCENARIOS], Literal[BUDGETS]
+    Preset, Budget, Method = Literal[SCENARIOS], Literal[BUDGETS], Literal[tuple(methods())]
 
 
 @dataclass(kw_only=True)

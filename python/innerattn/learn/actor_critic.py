@@ -6,7 +6,7 @@ It acts, reports attention, saves and loads; when and how to update is each lear
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.func import functional_call
 
-from innerattn.config.run import NetworkConfig
+from innerattn.config import NetworkConfig
 from innerattn.learn import losses
 from innerattn.learn.descent import (
     Descent,
@@ -25,7 +25,7 @@ from innerattn.learn.descent import (
 )
 from innerattn.learn.networks import draw_networks
 from innerattn.learn.types import Team
-from innerattn.nn import CriticOutput, EntityColumns, action_noise, sample_actions
+from innerattn.nn import CriticOutput, action_noise, sample_actions
 
 
 class ActorCritic:
@@ -51,15 +51,12 @@ class ActorCritic:
         seed: int,
         device: torch.device,
         dtype: torch.dtype = torch.float32,
-        availability_column: int | None = None,
         critic_outputs: int | None = None,
-        entities: EntityColumns | None = None,
-        kinds: Sequence[str] | None = None,
     ) -> None:
         """Build networks and optimisers.
 
         Args:
-            team: Sizes of the team.
+            team: What is known of the team.
             network: Sizes and kind of the networks.
             learning_rate: Step size of both Adams at the start.
             final_learning_rate_share: Share of it that is left at the end of training.
@@ -67,22 +64,19 @@ class ActorCritic:
             seed: Seed of the initial weights and of every draw.
             device: Where the networks live.
             dtype: Floating-point type of the networks.
-            availability_column: Column of a robot's observation that says whether it is available
-                (above 0.5); needed only where `network.mask_unavailable` is set.
             critic_outputs: Values that the critic gives for each robot; None: one for each action.
-            entities: As in `draw_networks`.
-            kinds: As in `draw_networks`.
 
         Raises:
             ValueError: `network.mask_unavailable` is set without a column of the observation, or as
                 in `draw_networks`.
         """
-        if network.mask_unavailable and availability_column not in range(team.obs_width):
+        column = team.availability_column
+        if network.mask_unavailable and column not in range(team.obs_width):
             raise ValueError(
-                f"availability_column = {availability_column}: network.mask_unavailable needs a "
+                f"availability_column = {column}: network.mask_unavailable needs a "
                 f"column in 0..{team.obs_width - 1}"
             )
-        self._availability_column = availability_column if network.mask_unavailable else None
+        self._availability_column = column if network.mask_unavailable else None
         self._device, self._dtype = device, dtype
         self._bfloat16 = network.precision == "bfloat16"
         self._learning_rate, self._final_share = learning_rate, final_learning_rate_share
@@ -93,7 +87,7 @@ class ActorCritic:
         self._noise = torch.Generator(device).manual_seed(noise_seed)
         # Drawn on the CPU in float32 and then moved: a seed gives the same weights everywhere.
         weights = torch.Generator().manual_seed(weights_seed)
-        actor, critic = draw_networks(team, network, weights, critic_outputs, entities, kinds)
+        actor, critic = draw_networks(team, network, weights, critic_outputs)
         self.actor, self.critic = actor.to(device, dtype), critic.to(device, dtype)
         self.actor_frozen = False
         self._actor_descent = Descent(self.actor, learning_rate, weight_decay=0.0)

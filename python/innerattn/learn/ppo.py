@@ -6,19 +6,18 @@ Sources: Schulman et al. 2017; the baseline of Iqbal & Sha 2019, section 3.3.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from innerattn.config.run import NetworkConfig, PPOConfig
+from innerattn.config import NetworkConfig, PPOConfig
 from innerattn.learn import losses
 from innerattn.learn.actor_critic import ActorCritic
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
 from innerattn.learn.descent import Network
 from innerattn.learn.types import Team, Transitions
-from innerattn.nn import EntityColumns, sample_actions
+from innerattn.nn import sample_actions
 
 _METRICS = (
     "critic_loss",
@@ -54,9 +53,6 @@ class PPO(ActorCritic):
         seed: int,
         device: torch.device,
         dtype: torch.dtype = torch.float32,
-        availability_column: int | None = None,
-        entities: EntityColumns | None = None,
-        kinds: Sequence[str] | None = None,
     ) -> None:
         """Build networks and optimisers; arguments as in `ActorCritic`, numbers in ``ppo``.
 
@@ -72,9 +68,6 @@ class PPO(ActorCritic):
             seed=seed,
             device=device,
             dtype=dtype,
-            availability_column=availability_column,
-            entities=entities,
-            kinds=kinds,
             critic_outputs=None if ppo.advantage == "counterfactual" else 1,
         )
         self._config = ppo

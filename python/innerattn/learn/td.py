@@ -7,18 +7,17 @@ the paper and Iqbal & Sha 2019, sections 3.1-3.3 ("MAAC").
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 
 import torch
 from torch import Tensor, nn
 
-from innerattn.config.run import NetworkConfig, TDConfig
+from innerattn.config import NetworkConfig, TDConfig
 from innerattn.learn import losses
 from innerattn.learn.actor_critic import ActorCritic
 from innerattn.learn.descent import Network, values_of
 from innerattn.learn.replay import Replay
 from innerattn.learn.types import Team, Transitions
-from innerattn.nn import EntityColumns, sample_actions
+from innerattn.nn import sample_actions
 
 _TARGETS = {"consistent": losses.consistent_target, "maac": losses.maac_target}
 _POLICY_LOSSES = {
@@ -53,22 +52,16 @@ class TD(ActorCritic):
         seed: int,
         device: torch.device,
         dtype: torch.dtype = torch.float32,
-        availability_column: int | None = None,
-        entities: EntityColumns | None = None,
-        kinds: Sequence[str] | None = None,
     ) -> None:
         """Build networks, optimisers and replay.
 
         Args:
-            team: Sizes of the team.
+            team: What is known of the team.
             network: Sizes and kind of the networks.
             td: Numbers of the algorithm.
             seed: Seed of the initial weights and of every draw.
             device: Where networks and replay live.
             dtype: Floating-point type of the networks.
-            availability_column: As in `ActorCritic`.
-            entities: As in `ActorCritic`.
-            kinds: As in `ActorCritic`.
 
         Raises:
             ValueError: As in `ActorCritic`.
@@ -82,9 +75,6 @@ class TD(ActorCritic):
             seed=seed,
             device=device,
             dtype=dtype,
-            availability_column=availability_column,
-            entities=entities,
-            kinds=kinds,
         )
         self._config = td
         self._step = self._update_all

@@ -49,16 +49,18 @@ def visible_teammates(like: Tensor, available: Tensor | None) -> Tensor:
     return others if available is None else others & available.unsqueeze(1)
 
 
-class _TeammateAttention(nn.Module):
-    """The parameters that both kinds of attention hold; all are shared by the robots.
+class TeammateAttention(nn.Module):
+    """Base of all attentions: from encodings of the team to what each robot makes of its teammates.
+
+    The critic's optimiser takes parameters of an attention for shared by the robots.
 
     Attributes:
-        query: (W, W), rows h*d..(h+1)*d belong to head h; likewise `key` and `value`.
-        value_bias: (W,).
+        width: W.
+        heads: H.
     """
 
     def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
-        """Draw the parameters.
+        """Check the sizes; a subclass draws its parameters.
 
         Args:
             width: W, width of the encodings and of the mixed values.
@@ -71,7 +73,31 @@ class _TeammateAttention(nn.Module):
         super().__init__()
         if width % heads:
             raise ValueError(f"width = {width}: must be a multiple of the {heads} attention heads")
-        self.heads = heads
+        del generator
+        self.width, self.heads = width, heads
+
+    def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
+        """Attend to teammates.
+
+        Args:
+            own: (R, B, W) state-only encodings, the source of queries.
+            others: (R, B, W) state-action encodings, the source of keys and values.
+            available: (B, R) bool; no robot attends to an unavailable one. None: all are available.
+        """
+        raise NotImplementedError
+
+
+class _SharedMatrices(TeammateAttention):
+    """The parameters of inner and uniform attention.
+
+    Attributes:
+        query: (W, W), rows h*d..(h+1)*d belong to head h; likewise `key` and `value`.
+        value_bias: (W,).
+    """
+
+    def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
+        """Draw the parameters; arguments as in `TeammateAttention`."""
+        super().__init__(width, heads, generator)
         self.query = uniform_parameter((width, width), width, generator)
         self.key = uniform_parameter((width, width), width, generator)
         self.value = uniform_parameter((width, width), width, generator)
@@ -81,17 +107,11 @@ class _TeammateAttention(nn.Module):
         return functional.leaky_relu_(functional.linear(others, self.value, self.value_bias))
 
 
-class InnerAttention(_TeammateAttention):
+class InnerAttention(_SharedMatrices):
     """Learnt attention: alpha_ij = softmax over j != i of q_i . k_j / sqrt(d), per head."""
 
     def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
-        """Attend to teammates.
-
-        Args:
-            own: (R, B, W) state-only encodings, the source of queries.
-            others: (R, B, W) state-action encodings, the source of keys and values.
-            available: (B, R) bool; an unavailable robot is attended to by none. None: all are.
-        """
+        """Attend to teammates; arguments as in `TeammateAttention.forward`."""
         if torch.compiler.is_compiling():
             return self._fused(own, others, available)
         robots, batch, width = own.shape
@@ -141,7 +161,7 @@ class InnerAttention(_TeammateAttention):
         return x.view(robots, batch * self.heads, width // self.heads).transpose(0, 1)
 
 
-class UniformAttention(_TeammateAttention):
+class UniformAttention(_SharedMatrices):
     """The baseline: alpha_ij = 1/(N-1) for every teammate seen; query and key go unused."""
 
     def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
@@ -151,7 +171,7 @@ class UniformAttention(_TeammateAttention):
         self.key.requires_grad_(False)
 
     def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
-        """Average over teammates; arguments as in `InnerAttention.forward`."""
+        """Average over teammates; arguments as in `TeammateAttention.forward`."""
         values = self._values(others)
         visible = visible_teammates(own, available)
         weights = visible.to(values.dtype)
