@@ -62,7 +62,7 @@ def learn(learner: ActorCritic, robots: int) -> list[dict[str, float]]:
     found = []
     for step in range(2 * STEPS):
         learner.observe(transitions(robots, step), torch.zeros(ENVS, dtype=torch.bool))
-        learner.reach(step / (2 * STEPS))
+        learner.set_progress(step / (2 * STEPS))
         metrics = learner.learn()
         found += [] if metrics is None else [metrics]
     return found

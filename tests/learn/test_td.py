@@ -221,7 +221,7 @@ def test_the_step_size_falls_evenly(share: float, rate: float) -> None:
     numbers = {"learning_rate": 0.01, "final_learning_rate_share": 0.2}
     learner = make(2, numbers=numbers)
     before = learner.state()
-    learner.reach(share)
+    learner.set_progress(share)
     learner.update(transitions(2, seed=1))
     after = learner.state()
     moved = (after["critic.output.bias"] - before["critic.output.bias"]).abs()

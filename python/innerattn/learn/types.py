@@ -94,7 +94,7 @@ class Learner(Protocol):
             The cross-entropy before the step, its mean over robots [nats].
         """
 
-    def reach(self, share: float) -> None:
+    def set_progress(self, share: float) -> None:
         """Take note of how far training is; whatever changes over a run follows it.
 
         Args:
