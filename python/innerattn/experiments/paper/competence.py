@@ -15,8 +15,8 @@ from innerattn.experiments.run import Measured
 from innerattn.measures.dispatch_quality import dispatch_quality
 from innerattn.measures.waiting import waiting
 from innerattn.policies import SCRIPTED, scripted_policy
-from innerattn.stats.intervals import Interval
-from innerattn.stats.seeds import SeedEstimate, seed_estimate
+from innerattn.stats import Estimate
+from innerattn.stats.seeds import seed_estimate
 
 COMPETENCE = {
     "rescues_per_episode": "",
@@ -55,7 +55,7 @@ class Competence:
     seeds: tuple[int, ...]
     counts: tuple[dict[str, int], ...]
     each: tuple[dict[str, float | None], ...]
-    mean: dict[str, SeedEstimate | None]
+    mean: dict[str, Estimate | None]
 
 
 def competence(group: Sequence[Measured]) -> Competence:
@@ -119,5 +119,5 @@ def _competence_of(measured: Measured) -> tuple[dict[str, int], dict[str, float 
     }
 
 
-def _mean(interval: Interval | None) -> float | None:
+def _mean(interval: Estimate | None) -> float | None:
     return None if interval is None else interval.mean
