@@ -19,17 +19,17 @@ from learning_figure import draw_curves
 from page import LEARNING, publish, require, table
 from runs import Run, train_all
 
-from innerattn.evaluate.comparison import contrast
-from innerattn.evaluate.statistics import student_interval
-from innerattn.report.drawing import write_figure
-from innerattn.study.claims import LEAST_PAIRS
-from innerattn.study.pairs import MARGINS
-from innerattn.study.table2_text import shown
+from innerattn.experiments.paper.claims import LEAST_PAIRS
+from innerattn.experiments.paper.pairs import MARGINS
+from innerattn.report.plots.drawing import write_figure
+from innerattn.stats.comparison import contrast
+from innerattn.stats.intervals import student_interval
+from innerattn.stats.text import shown
 
 PRESETS = ("mixed", "double", "single")
 METHODS = {"quick": ["td-inner"], "short": ["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"]}
 SEEDS = {"quick": [0, 1, 2], "short": [0, 1, 2, 3, 4]}
-Found = dict[tuple[str, str], list[dict[str, Any]]]
+RunStatus = dict[tuple[str, str], list[dict[str, Any]]]
 """Summaries of the runs of each method and preset, one per seed."""
 
 
@@ -64,7 +64,7 @@ def row(found: list[dict[str, Any]]) -> list[str]:
     ]
 
 
-def attention_table(found: Found) -> str:
+def attention_table(found: RunStatus) -> str:
     """Scores with learnt attention minus those with uniform weights, seed by seed."""
     head = ["learnt - uniform attention"]
     for length in (25, 100):
@@ -115,7 +115,7 @@ def main() -> None:
         ]
         trained = iter(train_all(wanted, given.runs, given.workers))
         folders = {case: [next(trained) for _ in seeds] for case in cases}
-        found: Found = {case: [_summary(run) for run in runs] for case, runs in folders.items()}
+        found: RunStatus = {case: [_summary(run) for run in runs] for case, runs in folders.items()}
         rows = [[f"{method}, {preset}", *row(found[method, preset])] for method, preset in cases]
         listed = ", ".join(map(str, seeds))
         head = [f"{budget}, seed{'s' if len(seeds) > 1 else ''} {listed}", "rescues, 25 steps"]

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from innerattn.report.drawing import (
+from innerattn.report.plots.drawing import (
     BLACK,
     BLUE,
     COLUMN_WIDTH_IN,
@@ -21,7 +21,7 @@ from innerattn.report.drawing import (
     PURPLE,
     SKY,
 )
-from innerattn.study.over_runs import band
+from innerattn.stats.seeds import band
 
 PARTS = 40
 """Points of a curve: means over so many equal parts of a run."""

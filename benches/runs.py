@@ -1,6 +1,6 @@
 """Runs that benches measure: trained where they are missing, one core each, side by side.
 
-Without a warm start and options they are those of a study (`innerattn.study.plan`), also by name.
+Without a warm start and options they are those of a study (`experiments.plan`), also by name.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from pathlib import Path
 
 from innerattn.config import RunConfig, load_run_config, read_toml
 from innerattn.cores import usable_cores
-from innerattn.study.inventory import differences
-from innerattn.study.plan import of_seed
-from innerattn.study.several import Run as Training
-from innerattn.study.several import train_side_by_side
+from innerattn.experiments.plan import of_seed
+from innerattn.experiments.scan import differences
+from innerattn.experiments.side_by_side import Run as Training
+from innerattn.experiments.side_by_side import train_side_by_side
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from matplotlib.image import imsave
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.envs.render import draw_world
-from innerattn.scripted import View, scripted_policy
+from innerattn.policies import View, scripted_policy
 
 IMAGES = Path(__file__).parent / "images"
 SEED = 99

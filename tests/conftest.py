@@ -1,15 +1,22 @@
-"""A finished run, trained once by the command itself, for tests of more than one room."""
+"""Finished runs for tests of more than one room: trained by the command itself, or made up."""
 
 import shutil
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parent / "support"))
+
+from made_run import made_run
+
 from innerattn.cli.main import main
 from innerattn.errors import InnerattnError
-from innerattn.study.plan import plan
-from innerattn.study.several import Run
+from innerattn.experiments.crossed.arms import plan_crossed
+from innerattn.experiments.plan import plan
+from innerattn.experiments.run import FinishedRun, read_run
+from innerattn.experiments.side_by_side import Run
 
 
 @pytest.fixture(scope="session")
@@ -89,7 +96,7 @@ def train_in_turn(
 @pytest.fixture
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trains the runs of a study one after the other, in this process."""
-    monkeypatch.setattr("innerattn.study.train.train_side_by_side", train_in_turn)
+    monkeypatch.setattr("innerattn.experiments.train.train_side_by_side", train_in_turn)
 
 
 @pytest.fixture(scope="session")
@@ -106,3 +113,29 @@ def finished_study(tmp_path_factory: pytest.TempPathFactory, small: dict[str, ob
 def study(tmp_path: Path, finished_study: Path) -> Path:
     """A copy of the finished study, to be changed at will."""
     return Path(shutil.copytree(finished_study, tmp_path / "study"))
+
+
+@pytest.fixture(scope="session")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[FinishedRun]:
+    """Three runs with and two without inner attention, and one of another situation."""
+    folder = tmp_path_factory.mktemp("runs")
+    return [
+        *(made_run(folder, "mixed", "td-inner", seed) for seed in (2, 0, 1)),
+        *(made_run(folder, "mixed", "td-uniform", seed) for seed in (0, 1)),
+        made_run(folder, "single", "ppo-inner", 0),
+    ]
+
+
+@pytest.fixture(scope="session")
+def crossed_study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[FinishedRun]]:
+    """Runs of all arms in mixed, two of each, in a study's folder."""
+    out = tmp_path_factory.mktemp("crossed")
+    found = []
+    planned = plan_crossed(("td-inner", "td-uniform"), ("mixed",), range(2), "quick", out)
+    for number, one in enumerate(planned):  # no two runs alike
+        case = one.case
+        made = made_run(out / "made", "mixed", case.method, case.seed, chance=number)
+        one.folder.parent.mkdir(exist_ok=True)
+        made.folder.rename(one.folder)
+        found.append(read_run(one.case, one.folder))
+    return out, found

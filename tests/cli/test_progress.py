@@ -9,7 +9,7 @@ from rich.console import Console
 
 from innerattn.cli.progress import Evaluating, SeveralRuns, Training
 from innerattn.config import RunConfig
-from innerattn.study.several import Run
+from innerattn.experiments.side_by_side import Run
 from innerattn.train import Progress
 
 

@@ -15,10 +15,10 @@ import pytest
 from innerattn.cli import reproduce
 from innerattn.cli.main import main
 from innerattn.errors import RunError
-from innerattn.study.crossed.arms import plan_crossed
-from innerattn.study.lock import StudyLock
-from innerattn.study.plan import plan
-from innerattn.study.several import Run
+from innerattn.experiments.crossed.arms import plan_crossed
+from innerattn.experiments.lock import StudyLock
+from innerattn.experiments.plan import plan
+from innerattn.experiments.side_by_side import Run
 from innerattn.train.weights import read_weights
 
 Command = Callable[..., int]
@@ -244,7 +244,7 @@ def test_ctrl_c_keeps_what_is_finished(
         assert [run.folder.name for run in runs] == ["mixed-td-inner-quick-s1"]
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("innerattn.study.train.train_side_by_side", press_ctrl_c)
+    monkeypatch.setattr("innerattn.experiments.train.train_side_by_side", press_ctrl_c)
     assert command("fig5", study, "td-inner", "--seeds", "2") == 130
     err = capsys.readouterr().err.splitlines()
     assert err[0].startswith("innerattn: 1 of 2 runs are finished and kept")
@@ -257,7 +257,7 @@ import sys
 from functools import partial
 from innerattn.cli import reproduce
 from innerattn.cli.main import main
-from innerattn.study.plan import plan
+from innerattn.experiments.plan import plan
 if __name__ == "__main__":
     reproduce.plan = partial(plan, overrides={overrides!r})
     main(["reproduce", "fig4", "--seeds", "1", "--out", sys.argv[1], "--methods",
@@ -289,7 +289,7 @@ def test_a_killed_study_goes_on(
         asked.extend(run.folder for run in runs)
         assert not left.exists()
 
-    monkeypatch.setattr("innerattn.study.train.train_side_by_side", note)
+    monkeypatch.setattr("innerattn.experiments.train.train_side_by_side", note)
     values = {"train.env_steps": 10_000_000}
     assert command("fig4", study, "td-inner,td-uniform", "--seeds", "1", **values) == 1
     assert asked == [left]

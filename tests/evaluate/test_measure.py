@@ -1,6 +1,7 @@
 """Whole evaluations of a short run and of a scripted policy."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,11 @@ from innerattn.evaluate import (
     read_records,
     scripted_policy,
 )
-from innerattn.evaluate.episodes import FIELDS
-from innerattn.evaluate.summary import summarise
-from innerattn.scripted.dispatch import GreedyPolicy
+from innerattn.measures.competence import competence_of
+from innerattn.measures.sharing.imbalance import workload_imbalance
+from innerattn.measures.summary import summarise
+from innerattn.policies.scripted.dispatch import GreedyPolicy
+from innerattn.records.record import FIELDS
 from innerattn.train import train
 
 SETTINGS = EvaluateConfig(
@@ -72,7 +75,12 @@ def test_evaluation_of_a_run(run: Path, tmp_path: Path) -> None:
     for record in records:
         group = by_length[record.scenario.episode_steps]
         group.setdefault(record.policy, []).append(record)
-    assert summarise("short", records[0], by_length[25], by_length[40]) == summary
+    # Scripted policies' steps are measured and not kept.
+    found = summarise("short", records[0], by_length[25], by_length[40])
+    assert replace(found, measures=summary.measures) == summary
+    expected = {**competence_of(records[0]), "imbalance": workload_imbalance(records[:2])}
+    assert summary.measures["td-inner"] == expected
+    assert list(summary.measures) == ["td-inner", "random", "greedy", "hungarian"]
 
 
 def test_the_same_evaluation_twice_is_the_same(run: Path) -> None:

@@ -14,8 +14,8 @@ import torch
 from innerattn.config import RunConfig, read_toml
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
-from innerattn.train import RunFolder, checkpoint, load_policy, read_info, train
-from innerattn.train.checkpoint import newest_weights
+from innerattn.records.run_folder import newest_weights, read_info
+from innerattn.train import RunFolder, checkpoint, load_policy, train
 from innerattn.train.weights import digest_of
 
 Configure = Callable[..., RunConfig]

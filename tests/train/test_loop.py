@@ -12,7 +12,8 @@ from innerattn.config import RunConfig, load_run_config
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError, RunError
 from innerattn.learn.types import Learner
-from innerattn.train import Progress, load_policy, loop, read_info, train
+from innerattn.records.run_folder import read_info
+from innerattn.train import Progress, load_policy, loop, train
 from innerattn.train.build import build_learner, thread_count
 
 Configure = Callable[..., RunConfig]

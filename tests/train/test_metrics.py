@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from innerattn.errors import RunError
+from innerattn.measures.attention import attention_entropy
 from innerattn.train.collect import Tally
-from innerattn.train.metrics import Interval, MetricsFile, attention_entropy
+from innerattn.train.metrics import Interval, MetricsFile
 
 
 def plain_entropy(weights: np.ndarray) -> list[list[float]]:

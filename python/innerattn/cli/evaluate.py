@@ -12,10 +12,10 @@ from rich.console import Console
 
 from innerattn.cli.options import Command, check_target
 from innerattn.cli.progress import Evaluating
-from innerattn.cli.tables import print_summary
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
+from innerattn.report.tables.evaluation import print_summary
 
 if TYPE_CHECKING:
     from innerattn.evaluate import Evaluation
@@ -75,7 +75,7 @@ class Evaluate(Command):
 
     def _measure(self) -> Evaluation:
         from innerattn.evaluate import SCRIPTED, evaluate_policy, evaluate_run, scripted_policy
-        from innerattn.train.checkpoint import read_config
+        from innerattn.records.run_folder import read_config
 
         if self.policy in SCRIPTED:
             scenario = self._worlds(Scenario.preset("mixed"))

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 if TYPE_CHECKING:
-    from innerattn.study.several import Run
+    from innerattn.experiments.side_by_side import Run
     from innerattn.train import Progress as TrainProgress
 
 _PLAIN_EVERY_S = 10.0

@@ -14,16 +14,16 @@ from rich.console import Console
 
 from innerattn.cli.options import Command, UsageError
 from innerattn.cli.progress import SeveralRuns
-from innerattn.cli.reproduce_tables import print_scores
 from innerattn.config import BUDGETS
-from innerattn.study.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
-from innerattn.study.crossed.arms import plan_crossed
-from innerattn.study.plan import SITUATIONS, TARGETS, PlannedRun, plan
-from innerattn.study.smoke import smoke_note
+from innerattn.experiments.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
+from innerattn.experiments.crossed.arms import plan_crossed
+from innerattn.experiments.plan import SITUATIONS, TARGETS, PlannedRun, plan
+from innerattn.experiments.smoke import smoke_note
+from innerattn.report.tables.experiments import print_scores
 
 if TYPE_CHECKING:
-    from innerattn.study.inventory import Found
-    from innerattn.study.lock import StudyLock
+    from innerattn.experiments.lock import StudyLock
+    from innerattn.experiments.scan import RunStatus
 
     Target: TypeAlias = str
     Budget: TypeAlias = str
@@ -71,28 +71,29 @@ class Reproduce(Command):
         out = self.out or Path("studies") / name
         planned = self._planned(out)
 
-        from innerattn.report.drawing import check_format
-        from innerattn.study.document import write_account
-        from innerattn.study.inventory import finished_runs, take_inventory
-        from innerattn.study.lock import StudyLock
-        from innerattn.study.outputs import make_outputs
+        from innerattn.experiments.account import write_account
+        from innerattn.experiments.lock import StudyLock
+        from innerattn.experiments.scan import finished_runs, scan_runs
+        from innerattn.report.outputs import make_outputs
+        from innerattn.report.plots.drawing import check_format
 
         if self.target != "table2":
             check_format(out / "figure.png")  # before hours of training, not after
         whole = self.target not in ("table2", "crossed")
         console = Console(markup=False, highlight=False)
         with StudyLock.take(out) as lock:
-            found = take_inventory(planned, out, whole=whole)
+            found = scan_runs(planned, out, whole=whole)
             self._print_plan(console, found, out)
             try:
                 if not self.report_only:
                     self._train(found, out, lock)
             except KeyboardInterrupt:
-                found = take_inventory(planned, out, whole=whole)
+                found = scan_runs(planned, out, whole=whole)
                 write_account(out, self.target, self.budget, found)
                 _say_what_is_kept(found)
                 raise
-            found = take_inventory(planned, out, whole=whole)
+            if not self.report_only:
+                found = scan_runs(planned, out, whole=whole)
             write_account(out, self.target, self.budget, found)
             note = smoke_note(self.budget)
             unusable = [one for one in found if one.state != "finished"]
@@ -121,8 +122,8 @@ class Reproduce(Command):
         make = plan_crossed if crossed else plan
         return make(methods, situations, range(self.seeds), self.budget, out)
 
-    def _print_plan(self, console: Console, found: Sequence[Found], out: Path) -> None:
-        from innerattn.study.train import places, to_measure, to_train
+    def _print_plan(self, console: Console, found: Sequence[RunStatus], out: Path) -> None:
+        from innerattn.experiments.train import places, to_measure, to_train
 
         states = Counter(one.state for one in found)
         train, measure = len(to_train(found)), len(to_measure(found))
@@ -146,8 +147,8 @@ class Reproduce(Command):
                 text = f"left out: {one.planned.folder}: {_reason(one)}"
                 print(f"innerattn: {text} (move it away to have it trained)", file=sys.stderr)
 
-    def _train(self, found: Sequence[Found], out: Path, lock: StudyLock) -> None:
-        from innerattn.study.train import train_missing
+    def _train(self, found: Sequence[RunStatus], out: Path, lock: StudyLock) -> None:
+        from innerattn.experiments.train import train_missing
 
         with SeveralRuns() as progress:
             train_missing(found, out, lock, changed=progress, failed=_say_why, debug=self.debug)
@@ -168,7 +169,7 @@ def _seeds(count: int) -> str:
     return "1 seed" if count == 1 else f"{count} seeds"
 
 
-def _reason(found: Found) -> str:
+def _reason(found: RunStatus) -> str:
     return f"{found.state.replace('_', ' ')}: {found.why}" if found.why else found.state
 
 
@@ -176,7 +177,7 @@ def _say_why(planned: PlannedRun, reason: str) -> None:
     print(f"innerattn: error: {planned.case}: {reason}", file=sys.stderr)
 
 
-def _say_what_is_kept(found: Sequence[Found]) -> None:
+def _say_what_is_kept(found: Sequence[RunStatus]) -> None:
     done = sum(one.state == "finished" for one in found)
     text = f"{done} of {len(found)} runs are finished and kept; the same command goes on with them"
     print(f"innerattn: {text}", file=sys.stderr)

@@ -15,16 +15,16 @@ from rich.console import Console
 
 from innerattn.cli.options import Command, UsageError, check_target
 from innerattn.cli.progress import CheckingBounds, Evaluating, WatchingAttention
-from innerattn.cli.robustness_tables import print_robustness
 from innerattn.config.files import write_whole
 from innerattn.envs.batch import FAULT_KINDS
+from innerattn.report.tables.robustness import print_robustness
 
 if TYPE_CHECKING:
     from innerattn.config import Scenario
     from innerattn.evaluate.bounds.figures import Bounds
-    from innerattn.evaluate.faults.grid import Grid, Kept, MakePolicy
-    from innerattn.evaluate.faults.shift_figures import FaultAttention
+    from innerattn.evaluate.faults.grid import Grid, MakePolicy, Retention
     from innerattn.evaluate.trained import TrainedPolicy
+    from innerattn.measures.faults.shift_results import FaultAttention
 
 _SCRIPTED = ("greedy", "hungarian", "oracle")
 _MOST = 1_000_000  # episodes, and steps of one
@@ -62,7 +62,7 @@ class Robustness(Command):
         """
         kinds = self._check()
         if self.plot is not None:
-            from innerattn.report.drawing import check_format
+            from innerattn.report.plots.drawing import check_format
 
             check_format(self.plot)
         grid, found, methods = self._retention(kinds)
@@ -84,7 +84,7 @@ class Robustness(Command):
             else:
                 write_whole(self.json, f"{document}\n".encode())
         if self.plot is not None:
-            from innerattn.report.heatmap import write_heatmap
+            from innerattn.report.plots.heatmap import write_heatmap
 
             first = next(iter(found))
             write_heatmap(self.plot, first, found[first], grid)
@@ -115,12 +115,14 @@ class Robustness(Command):
             raise UsageError(f"--faults = {unknown[0]!r}: known are all, {known}")
         return kinds
 
-    def _retention(self, kinds: tuple[str, ...]) -> tuple[Grid, dict[str, Kept], dict[str, str]]:
+    def _retention(
+        self, kinds: tuple[str, ...]
+    ) -> tuple[Grid, dict[str, Retention], dict[str, str]]:
         from innerattn.evaluate.faults.grid import Grid, play_all
         from innerattn.evaluate.trained import load_trained
-        from innerattn.scripted import scripted_policy
+        from innerattn.policies import scripted_policy
+        from innerattn.records.run_folder import read_config
         from innerattn.train.build import thread_count, torch_threads
-        from innerattn.train.checkpoint import read_config
 
         config = read_config(self.runs[0])
         steps = self.episode_steps or 2 * config.scenario.episode_steps
@@ -192,7 +194,7 @@ def _names(runs: Sequence[str]) -> list[str]:
 
 def _document(
     grid: Grid,
-    found: dict[str, Kept],
+    found: dict[str, Retention],
     methods: dict[str, str],
     bounds: dict[str, Bounds],
     attention: dict[str, FaultAttention],

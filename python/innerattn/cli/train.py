@@ -15,12 +15,12 @@ from rich.console import Console
 from innerattn.cli.options import Command, UsageError, changed, run_options
 from innerattn.cli.progress import Evaluating, SeveralRuns, Training
 from innerattn.cli.seeds import parse_seeds
-from innerattn.cli.tables import print_seeds, print_summary
 from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
 from innerattn.config.registry import methods
 from innerattn.config.sections import WarmStart
 from innerattn.cores import usable_cores
-from innerattn.study.several import Run, refuse_what_cannot_run, train_side_by_side
+from innerattn.experiments.side_by_side import Run, refuse_what_cannot_run, train_side_by_side
+from innerattn.report.tables.evaluation import print_seeds, print_summary
 
 if TYPE_CHECKING:
     Preset: TypeAlias = str
@@ -188,7 +188,7 @@ def _say_what_is_kept(folders: Sequence[Path]) -> None:
 
 
 def _say_if_nothing_was_learnt(folders: Sequence[Path]) -> None:
-    from innerattn.train import read_info
+    from innerattn.records.run_folder import read_info
 
     for folder in folders:
         info = read_info(folder)

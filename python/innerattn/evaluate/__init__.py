@@ -3,13 +3,14 @@
 It trains nothing and prints nothing.
 """
 
-from innerattn.evaluate.episodes import Record, run_episodes
 from innerattn.evaluate.measure import Evaluation, evaluate_policy, evaluate_run
-from innerattn.evaluate.records import read_records, write_records
-from innerattn.evaluate.statistics import Interval, student_interval
-from innerattn.evaluate.summary import Figures, Summary
+from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import TrainedPolicy, load_trained
-from innerattn.scripted import SCRIPTED, Policy, View, scripted_policy
+from innerattn.measures.summary import Figures, Summary
+from innerattn.policies import SCRIPTED, Policy, PolicyInput, scripted_policy
+from innerattn.records.parquet import read_records, write_records
+from innerattn.records.record import Record
+from innerattn.stats.intervals import Interval, student_interval
 
 __all__ = [
     "SCRIPTED",
@@ -17,10 +18,10 @@ __all__ = [
     "Figures",
     "Interval",
     "Policy",
+    "PolicyInput",
     "Record",
     "Summary",
     "TrainedPolicy",
-    "View",
     "evaluate_policy",
     "evaluate_run",
     "load_trained",

@@ -6,17 +6,20 @@ What the figures mean is computed in `summary`, from the records alone.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from innerattn.config import EvaluateConfig, Scenario, refuse_late_faults
 from innerattn.config.files import write_whole
-from innerattn.evaluate.episodes import FIELDS, Record, run_episodes
-from innerattn.evaluate.records import write_records
-from innerattn.evaluate.summary import Summary, summarise
+from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
-from innerattn.scripted import SCRIPTED, Policy, scripted_policy
+from innerattn.measures.competence import STEPS, competence_of
+from innerattn.measures.sharing.imbalance import workload_imbalance
+from innerattn.measures.summary import Summary, summarise
+from innerattn.policies import SCRIPTED, Policy, scripted_policy
+from innerattn.records.parquet import write_records
+from innerattn.records.record import FIELDS, Record
 from innerattn.train.build import thread_count, torch_threads
 
 ProgressCall = Callable[[int, int], None]
@@ -90,7 +93,7 @@ def evaluate_policy(
     def run(
         chosen: Policy, worlds: Scenario, episodes: int, first: int, record: tuple[str, ...]
     ) -> Record:
-        return run_episodes(
+        played = run_episodes(
             chosen,
             worlds,
             episodes,
@@ -100,6 +103,7 @@ def evaluate_policy(
             num_threads=num_threads,
             progress=count,
         )
+        return played if worlds is scenario else replace(played, length="long")
 
     long_worlds = scenario.replace(episode_steps=settings.long_episode_steps)
     recorded = run(policy, scenario, settings.episodes, 0, FIELDS)
@@ -107,14 +111,22 @@ def evaluate_policy(
     if scored > settings.episodes:
         rest = run(policy, scenario, scored - settings.episodes, settings.episodes, ())
         standard[policy.name].append(rest)
+    measures = {policy.name: _measured(recorded, standard[policy.name])}
     for name in names:
         chosen = policy if name == policy.name else scripted_policy(name, scenario, settings.seed)
         if chosen is not policy:
-            standard[name] = [run(chosen, scenario, scored, 0, ())]
+            played = run(chosen, scenario, scored, 0, STEPS)
+            measures[name] = _measured(played, [played])
+            standard[name] = [replace(played, steps={})]
         long[name] = [run(chosen, long_worlds, settings.long_episodes, 0, ())]
     parts = [record for group in (standard, long) for all_ in group.values() for record in all_]
-    summary = summarise(label or policy.name, recorded, standard, long, warm_start)
+    summary = summarise(label or policy.name, recorded, standard, long, warm_start, measures)
     return Evaluation(summary, tuple(parts))
+
+
+def _measured(recorded: Record, standard: Sequence[Record]) -> dict[str, float | None]:
+    """What is measured of a policy's episodes; imbalance is of all of the standard length."""
+    return {**competence_of(recorded), "imbalance": workload_imbalance(standard)}
 
 
 def evaluate_run(

@@ -14,7 +14,7 @@ from innerattn.config import RunConfig, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.learn.types import Learner
-from innerattn.scripted import View
+from innerattn.policies import PolicyInput
 from innerattn.train import load_policy
 
 
@@ -27,12 +27,12 @@ class TrainedPolicy:
         self._learner = learner
         self._greedy = greedy
 
-    def act(self, view: View) -> NDArray[Any]:
+    def act(self, view: PolicyInput) -> NDArray[Any]:
         """See `Policy.act`."""
         actions = self._learner.act(torch.tensor(view.obs), greedy=self._greedy)
         return np.asarray(actions.numpy())
 
-    def attention(self, view: View, actions: NDArray[Any]) -> NDArray[np.float32] | None:
+    def attention(self, view: PolicyInput, actions: NDArray[Any]) -> NDArray[np.float32] | None:
         """See `Attentive.attention`."""
         weights = self._learner.attention(torch.tensor(view.obs), torch.tensor(actions))
         return None if weights is None else np.asarray(weights.numpy())

@@ -9,54 +9,26 @@ from __future__ import annotations
 import json
 import os
 import platform
-import re
 import shutil
 import subprocess
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Literal, get_args
 
 from torch import Tensor
 
-from innerattn.config import RunConfig, read_toml, write_toml
+from innerattn.config import RunConfig, write_toml
 from innerattn.config.files import write_whole
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.learn.types import Learner
+from innerattn.records.run_folder import SCHEMA_VERSION, RunInfo, State, newest_weights, read_config
 from innerattn.train.build import build_learner
 from innerattn.train.weights import digest_of, read_weights, write_weights
 
-SCHEMA_VERSION = 1
-State = Literal["running", "done", "interrupted"]
-
 _PACKAGES = ("innerattn", "torch", "numpy")
-
-
-@dataclass(frozen=True)
-class RunInfo:
-    """How a run was made and how far it came; the contents of ``run.json``.
-
-    ``weights_sha256`` is the digest of its newest weights, see `innerattn.train.weights.digest_of`;
-    runs made before it was written down have none.
-    """
-
-    schema_version: int
-    versions: dict[str, str]
-    seed: int
-    commit: str | None
-    threads: int
-    device: str
-    state: State
-    env_steps: int
-    updates: int
-    seconds: float
-    compiled: bool = False
-    products: str = "default"
-    warm_start: str = "none"
-    weights_sha256: str | None = None
 
 
 class RunFolder:
@@ -163,41 +135,6 @@ def refuse_existing(path: Path) -> None:
         raise RunError(f"{path}: exists already; choose another run folder or remove it")
 
 
-def read_info(run: str | Path) -> RunInfo:
-    """What ``run.json`` says.
-
-    Raises:
-        RunError: there is no such folder, or it was not made by training.
-    """
-    path = Path(run)
-    if not path.is_dir():
-        raise RunError(f"{path}: no such run folder")
-    try:
-        info = RunInfo(**json.loads(plain_file(path / "run.json").read_text("utf-8")))
-    except (OSError, ValueError, TypeError, RecursionError) as error:
-        raise RunError(f"{path / 'run.json'}: not the record of a run") from error
-    if info.schema_version != SCHEMA_VERSION:
-        raise RunError(
-            f"{path / 'run.json'}: schema version {info.schema_version}, "
-            f"only {SCHEMA_VERSION} is known"
-        )
-    if info.state not in get_args(State):
-        raise RunError(f"{path / 'run.json'}: state {info.state!r} is not one of {get_args(State)}")
-    return info
-
-
-def read_config(run: str | Path) -> RunConfig:
-    """The configuration of a run.
-
-    Raises:
-        RunError: no run folder, none of ours, or its ``config.toml`` is no plain file.
-        ConfigError: that is not valid.
-    """
-    path = Path(run)
-    read_info(path)
-    return read_toml(plain_file(path / "config.toml"))
-
-
 def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learner]:
     """The configuration of a run and a learner with its newest weights.
 
@@ -221,48 +158,6 @@ def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learne
     except ValueError as error:
         raise RunError(f"{weights}: {error}") from error
     return config, learner
-
-
-def _is_copy(run: Path) -> bool:
-    """Whether a run was kept in small, with the digest of its weights instead of these."""
-    try:
-        known = read_info(run).weights_sha256 is not None
-        return known and not os.path.lexists(run / "checkpoints")
-    except RunError:
-        return False
-
-
-def newest_weights(run: Path) -> Path:
-    """The weights file that ``checkpoints/latest`` names; a name is a plain number.
-
-    Raises:
-        RunError: there is none (yet, or in a small copy of a run), or what is there was not made by
-            training.
-    """
-    checkpoints = run / "checkpoints"
-    latest = checkpoints / "latest"
-    if checkpoints.is_symlink() or not checkpoints.is_dir() or not os.path.lexists(latest):
-        without = "was kept without its weights" if _is_copy(run) else "holds no checkpoint yet"
-        raise RunError(f"{run}: {without}")
-    try:
-        name = plain_file(latest).read_text("ascii").strip()
-    except ValueError:
-        name = ""
-    folder = checkpoints / name
-    if not re.fullmatch(r"[0-9]{1,18}", name) or folder.is_symlink() or not folder.is_dir():
-        raise RunError(f"{latest}: must name a folder beside it by its number")
-    return folder / "weights.safetensors"
-
-
-def plain_file(path: Path) -> Path:
-    """``path``, which is a file and no link.
-
-    Raises:
-        RunError: it is not.
-    """
-    if path.is_symlink() or not path.is_file():
-        raise RunError(f"{path}: missing, or not a plain file")
-    return path
 
 
 def _write_info(folder: Path, info: RunInfo) -> None:

@@ -16,25 +16,21 @@ import torch
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.learn.types import Learner, Transitions
+from innerattn.measures.attention import attention_entropy
+from innerattn.records.run_folder import State
 from innerattn.train.build import (
     build_learner,
     keep_heap_small,
     thread_count,
     torch_threads,
 )
-from innerattn.train.checkpoint import RunFolder, State, refuse_existing
+from innerattn.train.checkpoint import RunFolder, refuse_existing
 from innerattn.train.collect import Collector
 from innerattn.train.compilation import compiles
 from innerattn.train.imitate import Imitation
 from innerattn.train.interruption import heard_interruptions
 from innerattn.train.matmul_backend import best_matmul_backend
-from innerattn.train.metrics import (
-    Interval,
-    Metrics,
-    MetricsFile,
-    attention_entropy,
-    refuse_divergence,
-)
+from innerattn.train.metrics import Interval, Metrics, MetricsFile, refuse_divergence
 
 Stage = Literal["imitating", "training"]
 Step = Callable[[float], tuple[Transitions, Mapping[str, float] | None]]

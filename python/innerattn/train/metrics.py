@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import errno
 import json
-import math
 import os
 import time
 from collections.abc import Iterator, Mapping
@@ -91,22 +90,6 @@ class Interval:
         self._seconds, self._env_steps, self._updates = seconds, env_steps, updates
         self._losses = {}
         return line
-
-
-def attention_entropy(weights: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Mean entropy of attention by robot and head, in nats.
-
-    Args:
-        weights: (..., H, R, R) attention weights; row i holds robot i's over its teammates.
-
-    Returns:
-        (R, H) float64; 0 for a robot alone, ln(R - 1) for a robot that attends evenly.
-    """
-    *batch, heads, robots, _ = weights.shape
-    # float32 softmax of far-apart logits gives exact zeros, whose share of the entropy is 0.
-    w = weights.reshape(math.prod(batch), heads, robots, robots).astype(np.float64)
-    terms = w * np.log(np.where(w > 0.0, w, 1.0))
-    return np.asarray(-terms.sum(-1).mean(0).T + 0.0)
 
 
 def refuse_divergence(figures: Mapping[str, Any], env_steps: int) -> None:

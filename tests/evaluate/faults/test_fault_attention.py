@@ -9,12 +9,13 @@ from fresh_run import config_of_team, make_run, run_config
 
 from innerattn.config import Scenario
 from innerattn.errors import RunError
-from innerattn.evaluate.episodes import Record, run_episodes
 from innerattn.evaluate.faults.attention import fault_attention_of_run, twins_of
 from innerattn.evaluate.faults.severity import fault_of
-from innerattn.evaluate.faults.shift_figures import FaultAttention
-from innerattn.evaluate.statistics import Interval
+from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
+from innerattn.measures.faults.shift_results import FaultAttention
+from innerattn.records.record import Record
+from innerattn.stats.intervals import Interval
 
 SOME = ("motor_gain", "blackout")
 

@@ -7,10 +7,10 @@ import pytest
 
 from innerattn.config import Scenario
 from innerattn.envs.batch import FAULT_KINDS
-from innerattn.evaluate.episodes import run_episodes
 from innerattn.evaluate.faults.document import robustness_document, worst_robot
 from innerattn.evaluate.faults.grid import Grid, kept, play, play_all, rescues_by_step
-from innerattn.scripted import scripted_policy
+from innerattn.evaluate.play import run_episodes
+from innerattn.policies import scripted_policy
 
 WORLDS = Scenario.preset("double").replace(episode_steps=20, rescue_radius_m=0.3)
 SMALL = Grid(WORLDS, kinds=("unavailable", "blackout"), severities=(0.5, 1.0), episodes=12, seed=4)

@@ -1,7 +1,7 @@
 """How far attention may move when one robot's input moves: the two sides of every inequality.
 
 Pure functions of tensors. A logit is S_ij = q_i . k_j / sqrt(d), what the softmax takes. Robot j,
-the first dimension, is the one that is changed. The proofs are in docs/robustness.md.
+the first dimension, is the one that is changed. The proofs are in docs/attention-bound.md.
 """
 
 from __future__ import annotations
@@ -139,5 +139,5 @@ def violated(measured: Tensor, bound: Tensor) -> Tensor:
 
 
 def _by_head(matrix: Tensor, heads: int) -> Tensor:
-    """View (W, W) as (H, d, W)."""
+    """PolicyInput (W, W) as (H, d, W)."""
     return matrix.view(heads, -1, matrix.shape[1])

@@ -1,7 +1,7 @@
 """The robustness bounds of eqs. 6-10, held against trained networks in states of their own play.
 
-The inequalities and their proofs are in docs/robustness.md. It measures networks; what the team
-achieves with a faulty robot is not measured here.
+The inequalities and their proofs are in docs/attention-bound.md. It measures networks; what the
+team achieves with a faulty robot is not measured here.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from innerattn.evaluate.bounds.figures import Attention, Bounds, Level, level_of
 from innerattn.evaluate.bounds.inequalities import head_norms
 from innerattn.evaluate.bounds.perturbation import random_directions, rms_norm
 from innerattn.evaluate.bounds.response import States
-from innerattn.evaluate.episodes import run_episodes
+from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import TrainedPolicy
 from innerattn.learn.actor_critic import ActorCritic
 from innerattn.learn.types import Learner

@@ -15,21 +15,22 @@ from innerattn.config import Scenario
 from innerattn.config.scenario import Fault
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.errors import RunError
-from innerattn.evaluate.episodes import Record, run_episodes
-from innerattn.evaluate.faults.label_shuffle import SHUFFLES
 from innerattn.evaluate.faults.severity import fault_of
-from innerattn.evaluate.faults.shift import (
+from innerattn.evaluate.play import run_episodes
+from innerattn.evaluate.trained import load_trained
+from innerattn.measures.faults.label_shuffle import SHUFFLES
+from innerattn.measures.faults.shift import (
+    PairedRollouts,
     Pooled,
-    Twins,
     areas_by_head,
     by_head,
     pooled_kinds,
     pooled_robots,
     shift_of,
 )
-from innerattn.evaluate.faults.shift_figures import FaultAttention, KindShift
-from innerattn.evaluate.statistics import resampled_counts
-from innerattn.evaluate.trained import load_trained
+from innerattn.measures.faults.shift_results import FaultAttention, KindShift
+from innerattn.records.record import Record
+from innerattn.stats.intervals import resampled_counts
 from innerattn.train.build import thread_count, torch_threads
 
 EPISODES = 100
@@ -133,7 +134,7 @@ def _play(run: str | Path, worlds: Scenario, episodes: int, seed: int) -> Record
     return run_episodes(policy, worlds, episodes, seed, record=("attention",), num_threads=threads)
 
 
-def twins_of(faulty: Record, healthy: Record, robot: int, onset: int) -> Twins:
+def twins_of(faulty: Record, healthy: Record, robot: int, onset: int) -> PairedRollouts:
     """The attention of two records of the same worlds, in the episodes that reach the onset.
 
     Args:
@@ -146,4 +147,4 @@ def twins_of(faulty: Record, healthy: Record, robot: int, onset: int) -> Twins:
     reached = lengths > onset
     happened = np.arange(faulty.scenario.episode_steps) < lengths[reached, None]
     with_fault, without = (record.steps["attention"][reached] for record in (faulty, healthy))
-    return Twins(robot, onset, with_fault, without, happened)
+    return PairedRollouts(robot, onset, with_fault, without, happened)

@@ -7,15 +7,15 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from innerattn.evaluate.faults.grid import ONSETS, Grid, Kept
-from innerattn.evaluate.faults.retention import Estimate
+from innerattn.evaluate.faults.grid import ONSETS, Grid, Retention
 from innerattn.evaluate.faults.severity import fault_of
-from innerattn.evaluate.statistics import Interval
+from innerattn.measures.faults.retention import Estimate
+from innerattn.stats.intervals import Interval
 
 SCHEMA_VERSION = 1
 
 
-def robustness_document(grid: Grid, found: Mapping[str, Kept], runs: Mapping[str, str]) -> Any:
+def robustness_document(grid: Grid, found: Mapping[str, Retention], runs: Mapping[str, str]) -> Any:
     """What `robustness --json` holds about retention.
 
     Args:
@@ -49,7 +49,7 @@ def robustness_document(grid: Grid, found: Mapping[str, Kept], runs: Mapping[str
     }
 
 
-def worst_robot(grid: Grid, kept: Kept, kind: int, onset: int = 0) -> tuple[str, Interval]:
+def worst_robot(grid: Grid, kept: Retention, kind: int, onset: int = 0) -> tuple[str, Interval]:
     """The robot whose fault of a kind, at the last severity, costs most; and what is kept then."""
     row = kept.cells[kind, -1, :, onset]
     robot = int(row.value.argmin())
@@ -62,7 +62,7 @@ def number(interval: Interval) -> dict[str, float] | None:
     return numbers if all(map(math.isfinite, numbers.values())) else None
 
 
-def _policy(grid: Grid, kept: Kept) -> dict[str, Any]:
+def _policy(grid: Grid, kept: Retention) -> dict[str, Any]:
     return {
         "rescues_per_episode": number(kept.clean.interval()),
         "by_kind": _by_kind(grid, kept.by_kind()),

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 from innerattn.envs.batch import FAULT_KINDS
-from innerattn.evaluate.episodes import Record, run_episodes
-from innerattn.evaluate.faults.retention import Estimate, area, retention
 from innerattn.evaluate.faults.severity import fault_of
-from innerattn.evaluate.statistics import resampled_counts
-from innerattn.scripted import Policy
+from innerattn.evaluate.play import run_episodes
+from innerattn.measures.faults.retention import Estimate, area, retention
+from innerattn.policies import Policy
+from innerattn.records.record import Record
+from innerattn.stats.intervals import resampled_counts
 
 SEVERITIES = (0.25, 0.5, 0.75, 1.0)
 """From harmless (0, which needs no measuring) to the worst (1)."""
@@ -126,7 +127,7 @@ def rescues_by_step(record: Record) -> NDArray[np.int64]:
 
 
 @dataclass(frozen=True)
-class Kept:
+class Retention:
     """How much of its rescues a policy keeps.
 
     Attributes:
@@ -148,7 +149,7 @@ class Kept:
         return self.areas.mean((1, 2))
 
 
-def kept(played: Played, grid: Grid) -> Kept:
+def kept(played: Played, grid: Grid) -> Retention:
     """The retention of one policy; all policies of a grid share the resamples."""
     weights = resampled_counts(grid.episodes, grid.seed, RESAMPLES)
     steps = played.clean.shape[1]
@@ -163,7 +164,7 @@ def kept(played: Played, grid: Grid) -> Kept:
         np.stack([part.value for part in parts], 3), np.stack([part.resampled for part in parts], 3)
     )
     totals = played.clean.sum(1)
-    return Kept(
+    return Retention(
         clean=Estimate(np.asarray(totals.mean()), weights @ totals / grid.episodes),
         cells=cells,
         areas=area(cells, np.asarray(grid.severities), axis=1),
@@ -178,7 +179,7 @@ def play_all(
     *,
     num_threads: int | None = None,
     progress: ProgressCall | None = None,
-) -> dict[str, Kept]:
+) -> dict[str, Retention]:
     """Run policies through the grid, in the same worlds.
 
     Args:

@@ -1,0 +1,164 @@
+"""Runs a policy for whole episodes and records what happened; it measures nothing.
+
+Every episode has a world of its own, fixed by seed and number, so two policies that are run with
+the same seed meet the same starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from contextlib import closing
+from dataclasses import replace
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.config import Scenario
+from innerattn.envs import BatchEnv
+from innerattn.policies.policy import Policy, PolicyInput
+from innerattn.records.record import FIELDS, Record, rescue_dtype
+
+_WORLDS_AT_ONCE = 1024
+
+
+@runtime_checkable
+class Attentive(Protocol):
+    """A policy with a critic whose attention, if it has any, can be recorded."""
+
+    def attention(self, view: PolicyInput, actions: NDArray[Any]) -> NDArray[np.float32] | None:
+        """Attention weights (E, H, R, R) for these actions; None where there are none."""
+
+
+def run_episodes(
+    policy: Policy,
+    scenario: Scenario,
+    episodes: int,
+    seed: int,
+    *,
+    first_episode: int = 0,
+    record: Collection[str] = (),
+    num_threads: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Record:
+    """Run a policy for a number of episodes.
+
+    Args:
+        policy: what drives the robots.
+        scenario: the worlds; `episode_steps` is the length.
+        episodes: how many.
+        seed: seed of the worlds; with ``first_episode`` it fixes the starts.
+        first_episode: number of the first episode.
+        record: which of `FIELDS` to keep for every step; attention is kept only if the policy has
+            it.
+        num_threads: threads that step the worlds; none: all cores.
+        progress: called with the number of episodes each time some are done.
+
+    Returns:
+        The record.
+
+    Raises:
+        ValueError: less than one episode, or an unknown field to record.
+    """
+    if episodes < 1:
+        raise ValueError(f"episodes = {episodes}: must be at least 1")
+    unknown = set(record) - set(FIELDS)
+    if unknown:
+        raise ValueError(f"record = {sorted(unknown)}: known are {', '.join(FIELDS)}")
+    parts = []
+    for start in range(first_episode, first_episode + episodes, _WORLDS_AT_ONCE):
+        count = min(_WORLDS_AT_ONCE, first_episode + episodes - start)
+        env = BatchEnv(scenario, count, seed=seed, num_threads=num_threads, first_env=start)
+        with closing(env):
+            parts.append(_run_batch(policy, env, seed, start, record))
+        if progress is not None:
+            progress(count)
+    return _joined(parts)
+
+
+def _run_batch(
+    policy: Policy, env: BatchEnv, seed: int, first_episode: int, record: Collection[str]
+) -> Record:
+    """One episode of every world of ``env``; what happens after its end is not counted."""
+    total_steps = env.scenario.episode_steps
+    obs = env.reset()
+    running = np.ones(env.num_envs, bool)
+    lengths = np.zeros(env.num_envs, np.int64)
+    rewards_total = np.zeros((env.num_envs, env.num_robots, len(env.reward_component_names)))
+    steps: dict[str, NDArray[Any]] = {}
+    events = []
+    for step_index in range(total_steps):
+        view = PolicyInput.of(env, obs)
+        actions = policy.act(view)
+        seen: dict[str, NDArray[Any]] = {**view._asdict(), "actions": actions}
+        if "attention" in record and isinstance(policy, Attentive):
+            weights = policy.attention(view, actions)
+            seen |= {} if weights is None else {"attention": weights}
+        for name in seen.keys() & set(record):
+            _keep(steps, name, step_index, total_steps, seen[name], running)
+        step = env.step(actions)
+        rewards = env.reward_components()
+        if "rewards" in record:
+            _keep(steps, "rewards", step_index, total_steps, rewards, running)
+        rewards_total[running] += rewards[running]
+        lengths[running] += 1
+        if len(step.rescues):
+            events.append(step.rescues[running[step.rescues["env"]]].copy())
+        obs = step.obs
+        running &= ~(step.terminated | step.truncated)
+        if not running.any():
+            break
+    return Record(
+        policy=policy.name,
+        scenario=env.scenario,
+        robot_names=env.robot_names,
+        seed=seed,
+        first_episode=first_episode,
+        lengths=lengths,
+        rescues=_events(events, env.scenario, first_episode),
+        reward_names=tuple(env.reward_component_names),
+        rewards_total=rewards_total,
+        steps={name: steps[name] for name in FIELDS if name in steps},
+    )
+
+
+def _keep(
+    steps: dict[str, NDArray[Any]],
+    name: str,
+    index: int,
+    total: int,
+    values: NDArray[Any],
+    running: NDArray[np.bool_],
+) -> None:
+    """Put ``values`` (E, ...) at step ``index`` of the episodes that go on."""
+    if name not in steps:
+        steps[name] = np.zeros((len(values), total, *values.shape[1:]), values.dtype)
+    steps[name][running, index] = values[running]
+
+
+def _events(
+    found: list[NDArray[np.void]], scenario: Scenario, first_episode: int
+) -> NDArray[np.void]:
+    """The environment's events of all steps, in the order of episodes, then of time."""
+    dtype = rescue_dtype(scenario)
+    events = np.zeros(sum(map(len, found)), dtype)
+    if found:
+        raw = np.concatenate(found)
+        for name in dtype.names or ():
+            events[name] = raw["env" if name == "episode" else name]
+        events["episode"] += first_episode
+    return events[np.argsort(events["episode"], kind="stable")]
+
+
+def _joined(parts: list[Record]) -> Record:
+    if len(parts) == 1:
+        return parts[0]
+    return replace(
+        parts[0],
+        lengths=np.concatenate([part.lengths for part in parts]),
+        rescues=np.concatenate([part.rescues for part in parts]),
+        rewards_total=np.concatenate([part.rewards_total for part in parts]),
+        steps={
+            name: np.concatenate([part.steps[name] for part in parts]) for name in parts[0].steps
+        },
+    )

@@ -1,0 +1,105 @@
+"""The arms of the crossed design, and the runs that they need; it looks at no folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from innerattn.config import load_run_config
+from innerattn.experiments.plan import Case, PlannedRun, of_seed
+
+Credit = Literal["helpers", "team"]
+
+SITUATIONS = ("single", "mixed")
+"""The built-in scenarios that arms are compared in, unless told otherwise."""
+CREDITS: tuple[Credit, ...] = ("helpers", "team")
+"""Who is paid for a rescue: `scenario.rescue_credit`."""
+PENALTIES = (0.0, 1e-4, 1e-3)
+"""Values of `td.attention_logit_penalty`."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One way to train.
+
+    Attributes:
+        credit: who is paid for a rescue.
+        penalty: of attention logits; None with uniform weights, which have no logits, so that one
+            arm stands for all penalties.
+        shared: robots of a kind have the same parameters.
+    """
+
+    credit: Credit
+    penalty: float | None
+    shared: bool = False
+
+    @property
+    def method(self) -> str:
+        """The value of `train.method`."""
+        return "td-uniform" if self.penalty is None else "td-inner"
+
+    @property
+    def variant(self) -> str:
+        """What is not said by the method, as a word."""
+        word = self.credit if self.penalty is None else f"{self.credit}-penalty-{self.penalty:g}"
+        return f"{word}-shared" if self.shared else word
+
+    def __str__(self) -> str:
+        """How tables name it."""
+        penalty = "" if self.penalty is None else f", penalty {self.penalty:g}"
+        return f"{self.method}, {self.credit}{penalty}{', shared by kind' if self.shared else ''}"
+
+    def overrides(self) -> dict[str, object]:
+        """Values by dotted key that make the arm what it is."""
+        penalty = 0.0 if self.penalty is None else self.penalty
+        return {
+            "scenario.rescue_credit": self.credit,
+            "td.attention_logit_penalty": penalty,
+            "network.parameter_sharing": "kind" if self.shared else "none",
+        }
+
+
+CROSSED = tuple(Arm(credit, penalty) for credit in CREDITS for penalty in (None, *PENALTIES))
+"""Both attentions, with learnt attention at every penalty, under both credits."""
+SHARED = Arm("team", PENALTIES[0], shared=True)
+"""A further arm: can robots that have the same parameters be unlike in what they do?"""
+ARMS = (*CROSSED, SHARED)
+"""All arms."""
+
+
+def plan_crossed(
+    methods: Sequence[str],
+    situations: Sequence[str],
+    seeds: Sequence[int],
+    budget: str,
+    out: Path,
+    overrides: Mapping[str, object] | None = None,
+) -> list[PlannedRun]:
+    """The runs of the `ARMS` of some methods, as `innerattn.experiments.plan.plan` lists runs."""
+    return [
+        PlannedRun(
+            Case(situation, arm.method, seed, arm.variant),
+            load_run_config(
+                situation,
+                arm.method,
+                budget,
+                overrides={**(overrides or {}), **arm.overrides(), **of_seed(seed)},
+            ),
+            out / "runs" / f"{situation}-{arm.method}-{arm.variant}-{budget}-s{seed}",
+        )
+        for seed in seeds
+        for situation in situations
+        for arm in ARMS
+        if arm.method in methods
+    ]
+
+
+def arm_of(case: Case) -> Arm:
+    """The arm that a planned run belongs to.
+
+    Raises:
+        KeyError: it belongs to none.
+    """
+    return {(arm.method, arm.variant): arm for arm in ARMS}[case.method, case.variant]

@@ -1,0 +1,146 @@
+"""Effects of attention, credit and penalty on the runs' figures; the seed is the unit.
+
+An effect is a contrast of arms: a weighted sum of their means. With uniform weights there is no
+penalty, so that one arm stands against those with learnt attention at every penalty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from innerattn.experiments.crossed.arms import CREDITS, CROSSED, PENALTIES, SHARED, Arm, Credit
+from innerattn.experiments.crossed.outcome import Outcomes, by_seed
+from innerattn.experiments.paper import pairs
+from innerattn.experiments.paper.claims import ENTROPY_MARGIN
+from innerattn.stats.comparison import Contrast, contrast, holm
+
+MARGINS = {
+    "imbalance": pairs.MARGINS["imbalance"],
+    "score": pairs.MARGINS["score"],
+    "entropy_share": ENTROPY_MARGIN,
+}
+"""The figures that effects are asked of, and the largest difference that counts as none."""
+
+LEAST_SEEDS = 3
+"""An effect needs so many seeds that have a run of each arm."""
+
+Weights = Mapping[Arm, float]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect in one situation.
+
+    Attributes:
+        situation: of the worlds.
+        figure: one of `MARGINS`.
+        name: what is compared with what.
+        main: it is an average over penalties, or more, or an interaction; else of single arms.
+        seeds: how many have the figure in each of the compared arms.
+        found: None where these are less than `LEAST_SEEDS`, or do not differ.
+        holm_p: its p-value, adjusted for all that is asked at once in its situation: the main
+            effects on all figures together, and likewise all the others.
+    """
+
+    situation: str
+    figure: str
+    name: str
+    main: bool
+    seeds: int
+    found: Contrast | None
+    holm_p: float | None = None
+
+
+def contrasts() -> list[tuple[str, bool, Weights]]:
+    """All effects that are asked for: name, whether it is a main effect, weights of arms."""
+    least, most = PENALTIES[0], PENALTIES[-1]
+    attention = {credit: _attention(credit) for credit in CREDITS}
+    helpers, team = (attention[credit] for credit in ("helpers", "team"))
+    asked: list[tuple[str, bool, Weights]] = [
+        ("inner - uniform, over credits and penalties", True, _mean([helpers, team])),
+        ("inner - uniform with the team's credit, over penalties", True, team),
+        ("team - helpers, over attentions and penalties", True, _credit(CROSSED)),
+        (
+            f"penalty {most:g} - {least:g}, over credits",
+            True,
+            _mean([_penalty(credit, most) for credit in CREDITS]),
+        ),
+        ("(inner - uniform) with team - with helpers", True, _minus(team, helpers)),
+    ]
+    for credit in CREDITS:
+        asked += [
+            (
+                f"inner at penalty {penalty:g} - uniform, {credit}",
+                False,
+                {Arm(credit, penalty): 1.0, Arm(credit, None): -1.0},
+            )
+            for penalty in PENALTIES
+        ]
+        asked += [
+            (f"penalty {penalty:g} - {least:g}, {credit}", False, _penalty(credit, penalty))
+            for penalty in PENALTIES[1:]
+        ]
+    for penalty in (None, *PENALTIES):
+        arms = [Arm(credit, penalty) for credit in CREDITS]
+        words = "uniform" if penalty is None else f"inner at penalty {penalty:g}"
+        asked.append((f"team - helpers, {words}", False, _credit(arms)))
+    own = Arm(SHARED.credit, SHARED.penalty)
+    name = f"parameters shared by kind - each robot's own, {own.credit}, inner at penalty {least:g}"
+    return [*asked, (name, False, {SHARED: 1.0, own: -1.0})]
+
+
+def effects(situation: str, outcomes: Outcomes) -> list[Effect]:
+    """All effects on all figures in one situation.
+
+    Args:
+        situation: of the worlds.
+        outcomes: figures of the runs of each arm; arms without runs may be missing.
+    """
+    found = []
+    for figure, margin in MARGINS.items():
+        for name, main, weights in contrasts():
+            rows = by_seed(outcomes, list(weights), figure)
+            enough = len(rows) >= LEAST_SEEDS
+            compared = contrast(rows, list(weights.values()), margin) if enough else None
+            found.append(Effect(situation, figure, name, main, len(rows), compared))
+    return _adjusted(found, main=True) + _adjusted(found, main=False)
+
+
+def _adjusted(asked: Sequence[Effect], main: bool) -> list[Effect]:
+    """The effects of one kind, with their p-values adjusted for each other."""
+    kind = [one for one in asked if one.main == main]
+    adjusted = iter(holm([one.found.p for one in kind if one.found is not None]))
+    return [replace(one, holm_p=next(adjusted)) if one.found else one for one in kind]
+
+
+def _attention(credit: Credit) -> Weights:
+    """Learnt attention, averaged over penalties, minus uniform weights."""
+    inner = {Arm(credit, penalty): 1.0 / len(PENALTIES) for penalty in PENALTIES}
+    return {**inner, Arm(credit, None): -1.0}
+
+
+def _penalty(credit: Credit, penalty: float) -> Weights:
+    """A penalty minus the least one."""
+    return {Arm(credit, penalty): 1.0, Arm(credit, PENALTIES[0]): -1.0}
+
+
+def _credit(arms: Sequence[Arm]) -> Weights:
+    """Team's credit minus helpers', averaged over attentions, then over penalties."""
+    weights = {}
+    attentions = {arm.method for arm in arms}
+    for arm in arms:
+        alike = sum(a.method == arm.method and a.credit == arm.credit for a in arms)
+        sign = 1.0 if arm.credit == "team" else -1.0
+        weights[arm] = sign / (alike * len(attentions))
+    return weights
+
+
+def _mean(parts: Sequence[Weights]) -> Weights:
+    """The average of contrasts of different arms."""
+    return {arm: weight / len(parts) for part in parts for arm, weight in part.items()}
+
+
+def _minus(one: Weights, other: Weights) -> Weights:
+    """The difference of contrasts of different arms."""
+    return {**one, **{arm: -weight for arm, weight in other.items()}}

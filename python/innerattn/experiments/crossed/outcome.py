@@ -1,0 +1,70 @@
+"""What one run shows of even sharing, of competence and of attention."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.experiments.crossed.arms import Arm
+from innerattn.experiments.paper.workload import rescues_by_task, workload_imbalance
+from innerattn.experiments.run import FinishedRun
+
+IDLE = 0.2
+"""A food robot with a smaller share of the rescues than this counts as idle."""
+
+OUTCOMES = {
+    "imbalance": "distance of the first food robot's share from 0.5, a mean over tasks",
+    "least_share": "share of all rescues by the food robot that has fewer",
+    "rescues_per_episode": "rescues in an episode of the standard length",
+    "score": "0 random play, 1 scripted dispatch",
+    "entropy_share": "entropy of attention as a share of ln(N - 1), over robots and heads",
+}
+"""The figures of a run and what they are."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Figures of one run by the names of `OUTCOMES`; None where it has none."""
+
+    imbalance: float | None
+    least_share: float | None
+    rescues_per_episode: float
+    score: float | None
+    entropy_share: float | None
+
+
+Outcomes = Mapping[Arm, Mapping[int, Outcome]]
+"""What the runs of each arm show, by their seeds."""
+
+
+def outcome_of(measured: FinishedRun) -> Outcome:
+    """The figures of a run, sharing over all its episodes of the standard length.
+
+    Raises:
+        RunError: a task is not one that two robots share.
+    """
+    total = np.sum(list(rescues_by_task(measured).values()), axis=0)
+    summary = measured.summary
+    return Outcome(
+        imbalance=workload_imbalance(measured),
+        least_share=float(total.min() / total.sum()) if total.sum() else None,
+        rescues_per_episode=float(summary["rescues_per_episode"]["mean"]),
+        score=None if summary["score"] is None else float(summary["score"]["mean"]),
+        entropy_share=_mean(summary["attention_entropy_share"]),
+    )
+
+
+def by_seed(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> NDArray[np.float64]:
+    """A figure of the runs of some arms: (n, k), a row for each seed that has it in all k arms."""
+    runs = [outcomes.get(arm, {}) for arm in arms]
+    seeds = sorted(set.intersection(*(set(of_arm) for of_arm in runs)))
+    rows = [[getattr(of_arm[seed], figure) for of_arm in runs] for seed in seeds]
+    return np.array([row for row in rows if None not in row], np.float64).reshape(-1, len(arms))
+
+
+def _mean(rows: dict[str, Sequence[float | None]]) -> float | None:
+    values = [value for row in rows.values() for value in row if value is not None]
+    return float(np.mean(values)) if values else None

@@ -1,0 +1,152 @@
+"""Fig. 4 over many runs: the entropy of attention during training, from the runs' own metrics.
+
+The paper does not say which situation and method its figure is about, nor whether a line is one
+run's; here every situation and method has its own courses, with a band over runs.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.errors import RunError
+from innerattn.experiments.run import FinishedRun, by_method
+from innerattn.stats.seeds import Array, SeedCurve, SeedEstimate, seed_curve, seed_estimate
+
+SCHEMA_VERSION = 1
+
+PRINTED_NATS = 1.02
+"""What the paper says that all heads' entropy falls to."""
+
+_EVEN_WITHIN_NATS = 1e-6
+_PART = 10  # begin and end are the first and the last tenth of the lines of metrics
+
+
+@dataclass(frozen=True)
+class EntropyCourse:
+    """The entropy of attention in runs of one situation and method.
+
+    Attributes:
+        situation: of the worlds.
+        method: of training.
+        seeds: N of them.
+        robots: R names.
+        env_steps: (T,) int64 at which all runs were logged [env-steps].
+        nats: (N, T, R, H) float64 entropy by run, time, robot and head.
+        begin: mean over robots, heads and the first tenth of the times.
+        end: the same of the last tenth.
+        change: end minus begin.
+    """
+
+    situation: str
+    method: str
+    seeds: tuple[int, ...]
+    robots: tuple[str, ...]
+    env_steps: NDArray[np.int64]
+    nats: Array
+    begin: SeedEstimate
+    end: SeedEstimate
+    change: SeedEstimate
+
+    @property
+    def even_nats(self) -> float:
+        """ln(R - 1), the entropy of even attention."""
+        return math.log(len(self.robots) - 1)
+
+    @property
+    def chooses(self) -> bool:
+        """Whether attention is ever uneven; it never is where its weights are fixed."""
+        return bool((np.abs(self.nats - self.even_nats) > _EVEN_WITHIN_NATS).any())
+
+    def mean(self) -> SeedCurve:
+        """Over robots and heads, (T,)."""
+        return seed_curve(self.nats.mean((2, 3)))
+
+    def by_robot(self) -> SeedCurve:
+        """Over heads, (T, R)."""
+        return seed_curve(self.nats.mean(3))
+
+    def by_head(self) -> Array:
+        """Mean over runs, (T, R, H)."""
+        return np.asarray(self.nats.mean(0))
+
+    def to_json(self) -> dict[str, Any]:
+        """As a JSON object."""
+        return {
+            **{name: getattr(self, name) for name in ("situation", "method", "seeds", "robots")},
+            "even_nats": self.even_nats,
+            "env_steps": self.env_steps.tolist(),
+            "nats_by_seed_time_robot_head": self.nats.tolist(),
+            "mean": self.mean().to_json(),
+            "by_robot": self.by_robot().to_json(),
+            **{name: asdict(getattr(self, name)) for name in ("begin", "end", "change")},
+        }
+
+
+def fig4(runs: Sequence[FinishedRun]) -> list[EntropyCourse]:
+    """Entropy courses of all methods with attention.
+
+    Returns:
+        By situation and method; methods whose metrics hold no entropy are left out.
+
+    Raises:
+        RunError: a run has no readable metrics, or runs of one method were never logged at the same
+            time.
+    """
+    courses = (_course(group) for group in by_method(runs).values())
+    return [course for course in courses if course is not None]
+
+
+def fig4_json(courses: Sequence[EntropyCourse]) -> dict[str, Any]:
+    """The document of ``fig4.json``."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "printed_nats": PRINTED_NATS,
+        "courses": [course.to_json() for course in courses],
+    }
+
+
+def _course(group: Sequence[FinishedRun]) -> EntropyCourse | None:
+    tables = [_entropies(run) for run in group]
+    if not all(tables):
+        return None
+    times = sorted(set.intersection(*(set(table) for table in tables)))
+    if not times:
+        raise RunError(f"{group[0].folder} and others: were never logged at the same env_steps")
+    robots = tuple(tables[0][times[0]])
+    nats = np.array([[list(table[t].values()) for t in times] for table in tables], np.float64)
+    part = max(1, len(times) // _PART)
+    overall = nats.mean((2, 3))
+    begin, end = overall[:, :part].mean(1), overall[:, -part:].mean(1)
+    figures = [seed_estimate(values.tolist()) for values in (begin, end, end - begin)]
+    first, last, change = (figure for figure in figures if figure is not None)
+    return EntropyCourse(
+        situation=group[0].situation,
+        method=group[0].method,
+        seeds=tuple(run.seed for run in group),
+        robots=robots,
+        env_steps=np.array(times, np.int64),
+        nats=nats,
+        begin=first,
+        end=last,
+        change=change,
+    )
+
+
+def _entropies(run: FinishedRun) -> dict[int, dict[str, list[float]]]:
+    """Entropy by env-steps, robot and head; empty where the method has none."""
+    path = run.folder / "metrics.jsonl"
+    try:
+        lines = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
+        found = {int(line["env_steps"]): dict(line["attention_entropy"]) for line in lines}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise RunError(f"{path}: not the metrics of a run") from error
+    if not found:
+        raise RunError(f"{path}: holds no line")
+    return {steps: entropy for steps, entropy in found.items() if entropy}

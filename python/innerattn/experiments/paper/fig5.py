@@ -1,0 +1,219 @@
+"""Fig. 5's evidence over many runs: what attention does around all handoffs, and a control.
+
+A handoff is one robot's rescue with one partner and its next with another; the handoffs of both
+robots that share an ability, in both orders of the tasks, are taken together. The control looks at
+the same moments at the other of these robots, which takes no part: what it shows as well follows
+from the victims that are there, not from who hands over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.experiments.run import FinishedRun
+from innerattn.measures.cooperation import shared_abilities
+from innerattn.measures.sharing.handoff import HANDOFF, handoffs
+from innerattn.measures.sharing.handoff_attention import (
+    Attended,
+    HandoffAttention,
+    handoff_attention,
+)
+from innerattn.records.record import Record
+from innerattn.stats.seeds import Array, SeedCurve, SeedEstimate, seed_curve, seed_estimate
+
+SCHEMA_VERSION = 2
+
+ROLES = ("to_be", "before")
+"""The partner of the second rescue, and that of the first."""
+
+_EVEN_WITHIN = 1e-5
+_SEED = 0  # of the permutations
+
+
+@dataclass(frozen=True)
+class RoleEvidence:
+    """The weight on the partner in one role, meant over heads; N runs, W offsets.
+
+    Attributes:
+        weight: over runs, by offset (W,); each run is a mean over its own handoffs.
+        change: over runs, mean weight after the first rescue minus that up to it.
+        change_by_run: (N,) None for a run without handoffs.
+    """
+
+    weight: SeedCurve
+    change: SeedEstimate | None
+    change_by_run: tuple[float | None, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """As a JSON object."""
+        return {
+            "weight": self.weight.to_json(),
+            "change": asdict(self.change) if self.change else None,
+            "change_by_run": list(self.change_by_run),
+        }
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Attention around all handoffs of one situation and method.
+
+    Attributes:
+        situation: of the worlds.
+        method: of training.
+        seeds: of the N runs.
+        handoffs: (N,) how many.
+        episodes: (N,) how many episodes they come from, of those recorded step by step.
+        offsets: (W,) int64 steps since the first rescue's; those above 0 are after it.
+        step_s: length of a step [s].
+        even: 1 / (R - 1), the weight of even attention.
+        robot: by role, of the robot that hands over.
+        control: by role, of the robot that takes no part, with the same partners.
+        own_part: over runs, the change on the partner-to-be of the robot minus the control's.
+        own_part_by_run: (N,) None for a run without handoffs.
+        own_part_beyond_half: over runs, that part minus half the robot's change.
+        p_by_run: (N,) of the permutation test, see `handoff_attention`; None for a run without
+            handoffs.
+        control_p_by_run: (N,) the same of the robot that takes no part.
+    """
+
+    situation: str
+    method: str
+    seeds: tuple[int, ...]
+    handoffs: tuple[int, ...]
+    episodes: tuple[int, ...]
+    offsets: NDArray[np.int64]
+    step_s: float
+    even: float
+    robot: dict[str, RoleEvidence]
+    control: dict[str, RoleEvidence]
+    own_part: SeedEstimate | None
+    own_part_by_run: tuple[float | None, ...]
+    own_part_beyond_half: SeedEstimate | None
+    p_by_run: tuple[float | None, ...]
+    control_p_by_run: tuple[float | None, ...]
+
+    @property
+    def runs(self) -> int:
+        """How many runs have handoffs."""
+        return sum(number > 0 for number in self.handoffs)
+
+    def to_json(self) -> dict[str, Any]:
+        """As a JSON object."""
+        names = ("situation", "method", "seeds", "handoffs", "episodes", "step_s", "even")
+        return {
+            **{name: getattr(self, name) for name in names},
+            "offsets": self.offsets.tolist(),
+            "robot": {role: found.to_json() for role, found in self.robot.items()},
+            "control": {role: found.to_json() for role, found in self.control.items()},
+            "own_part": asdict(self.own_part) if self.own_part else None,
+            "own_part_by_run": list(self.own_part_by_run),
+            "own_part_beyond_half": (
+                asdict(self.own_part_beyond_half) if self.own_part_beyond_half else None
+            ),
+            "p_by_run": list(self.p_by_run),
+            "control_p_by_run": list(self.control_p_by_run),
+        }
+
+
+def all_handoffs(record: Record) -> NDArray[np.void]:
+    """The handoffs of all robots that share an ability, between any two tasks of two needs.
+
+    Returns:
+        (N,) `HANDOFF`, by robot, then by order of the tasks.
+    """
+    tasks = [task.name for task in record.scenario.tasks if len(task.needs) == 2]
+    found = [
+        handoffs(record, robot, first, later)
+        for robot in alike_robots(record)
+        for first, later in permutations(tasks, 2)
+    ]
+    return np.concatenate([np.zeros(0, HANDOFF), *found])
+
+
+def alike_robots(record: Record) -> tuple[str, ...]:
+    """Names of the robots with the first ability that several have; the two food robots."""
+    robots, shared = record.scenario.robots, shared_abilities(record.scenario)
+    return tuple(robot.name for robot in robots if shared and shared[0] in robot.abilities)
+
+
+def with_bystander(record: Record, found: NDArray[np.void]) -> NDArray[np.void]:
+    """The same handoffs with ``robot`` replaced by the next of the robots alike."""
+    alike = [record.robot_names.index(name) for name in alike_robots(record)]
+    other = dict(zip(alike, alike[1:] + alike[:1], strict=True))
+    control = found.copy()
+    control["robot"] = [other[robot] for robot in found["robot"].tolist()]
+    return control
+
+
+def evidence(group: Sequence[FinishedRun]) -> Evidence | None:
+    """What attention does around handoffs in runs of one situation and method.
+
+    Returns:
+        None where no run has handoffs and attention that chooses, rather than being even.
+    """
+    first = group[0].recorded
+    if not any(_chooses(measured.recorded) for measured in group):
+        return None
+    seen: list[HandoffAttention | None] = []
+    controls: list[HandoffAttention | None] = []
+    for measured in group:
+        found = all_handoffs(measured.recorded)
+        control = with_bystander(measured.recorded, found)
+        seen.append(handoff_attention(measured.recorded, found, _SEED))
+        controls.append(handoff_attention(measured.recorded, control, _SEED))
+    known = [run for run in seen if run is not None]
+    if not known:
+        return None
+    robot = {role: _role(seen, role) for role in ROLES}
+    control_ = {role: _role(controls, role) for role in ROLES}
+    changes = (robot["to_be"].change_by_run, control_["to_be"].change_by_run)
+    pairs = list(zip(*changes, strict=True))
+    own, beyond_half = (
+        tuple(
+            None if ours is None or theirs is None else part * ours - theirs
+            for ours, theirs in pairs
+        )
+        for part in (1.0, 0.5)
+    )
+    return Evidence(
+        situation=group[0].situation,
+        method=group[0].method,
+        seeds=tuple(measured.seed for measured in group),
+        handoffs=tuple(run.handoffs if run else 0 for run in seen),
+        episodes=tuple(run.episodes if run else 0 for run in seen),
+        offsets=known[0].offsets,
+        step_s=first.scenario.dt_s,
+        even=1.0 / (first.scenario.num_robots - 1),
+        robot=robot,
+        control=control_,
+        own_part=seed_estimate(own),
+        own_part_by_run=own,
+        own_part_beyond_half=seed_estimate(beyond_half),
+        p_by_run=tuple(float(run.p[0]) if run else None for run in seen),
+        control_p_by_run=tuple(float(run.p[0]) if run else None for run in controls),
+    )
+
+
+def evidence_json(found: Sequence[Evidence]) -> dict[str, Any]:
+    """The document of ``fig5_evidence.json``."""
+    return {"schema_version": SCHEMA_VERSION, "evidence": [part.to_json() for part in found]}
+
+
+def _chooses(record: Record) -> bool:
+    """Whether attention is ever more than even."""
+    even = 1.0 / max(record.scenario.num_robots - 1, 1)
+    weights = record.steps.get("attention")
+    return weights is not None and bool((weights > even + _EVEN_WITHIN).any())
+
+
+def _role(runs: Sequence[HandoffAttention | None], role: str) -> RoleEvidence:
+    parts: list[Attended | None] = [getattr(run, role) if run else None for run in runs]
+    courses: Array = np.stack([part.weight[0, :, 0] for part in parts if part])
+    changes = tuple(float(part.change[0, 0]) if part else None for part in parts)
+    return RoleEvidence(seed_curve(courses), seed_estimate(changes), changes)

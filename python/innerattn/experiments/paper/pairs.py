@@ -1,0 +1,129 @@
+"""Learnt attention beside uniform weights: seed by seed, and over all situations together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from innerattn.experiments.paper.claims import LEAST_PAIRS
+from innerattn.experiments.paper.competence import Competence
+from innerattn.measures.sharing.evenness import MARGIN
+from innerattn.stats.aggregate import improvement_interval, iqm_interval
+from innerattn.stats.comparison import Contrast, contrast
+from innerattn.stats.intervals import Interval
+from innerattn.stats.seeds import SeedEstimate, seed_estimate
+
+MARGINS = {"score": 0.05, "imbalance": 0.5 - MARGIN[0]}
+"""The figures that are compared, and the largest difference that counts as none."""
+
+_SEED = 0  # of the bootstraps
+_LEAST_RUNS = 2  # of a method in a situation, for a bootstrap
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Learnt and uniform attention with one algorithm in one situation, by one figure.
+
+    Attributes:
+        situation: of the worlds.
+        algorithm: such as "td".
+        figure: one of `MARGINS`.
+        seeds: those that have a run of each with the figure.
+        inner: mean over these of learnt attention.
+        uniform: the same of uniform weights.
+        found: inner minus uniform with the seed as the unit; None where there are less than
+            `LEAST_PAIRS` seeds, or all have the same difference.
+    """
+
+    situation: str
+    algorithm: str
+    figure: str
+    seeds: tuple[int, ...]
+    inner: SeedEstimate | None
+    uniform: SeedEstimate | None
+    found: Contrast | None
+
+
+@dataclass(frozen=True)
+class Together:
+    """One algorithm over the situations in which both attentions have two runs or more.
+
+    Attributes:
+        algorithm: such as "td".
+        situations: these.
+        inner: interquartile mean of the score with learnt attention.
+        uniform: the same with uniform weights.
+        better: how probably a run with learnt attention scores higher than one without.
+    """
+
+    algorithm: str
+    situations: tuple[str, ...]
+    inner: Interval
+    uniform: Interval
+    better: Interval
+
+
+def pairs(competence: Sequence[Competence]) -> list[Pair]:
+    """All pairs of a situation and algorithm with both attentions, figure by figure."""
+    found = []
+    for (situation, algorithm), (inner, uniform) in _matched(competence).items():
+        for figure, margin in MARGINS.items():
+            ours, theirs = _by_seed(inner, figure), _by_seed(uniform, figure)
+            seeds = tuple(sorted(ours.keys() & theirs.keys()))
+            values = [(ours[seed], theirs[seed]) for seed in seeds]
+            enough = len(seeds) >= LEAST_PAIRS
+            found.append(
+                Pair(
+                    *(situation, algorithm, figure, seeds),
+                    inner=seed_estimate([one for one, _ in values]),
+                    uniform=seed_estimate([other for _, other in values]),
+                    found=contrast(values, (1.0, -1.0), margin) if enough else None,
+                )
+            )
+    return found
+
+
+def together(competence: Sequence[Competence]) -> list[Together]:
+    """Each algorithm over all situations, by the score."""
+    matched = _matched(competence)
+    found = []
+    for algorithm in dict.fromkeys(algorithm for _, algorithm in matched):
+        strata = {
+            situation: [list(_by_seed(one, "score").values()) for one in both]
+            for (situation, of), both in matched.items()
+            if of == algorithm
+        }
+        whole = {s: both for s, both in strata.items() if min(map(len, both)) >= _LEAST_RUNS}
+        if whole:
+            inner, uniform = ([both[i] for both in whole.values()] for i in (0, 1))
+            found.append(
+                Together(
+                    algorithm,
+                    tuple(whole),
+                    iqm_interval(inner, _SEED),
+                    iqm_interval(uniform, _SEED),
+                    improvement_interval(inner, uniform, _SEED),
+                )
+            )
+    return found
+
+
+def _matched(
+    competence: Sequence[Competence],
+) -> dict[tuple[str, str], tuple[Competence, Competence]]:
+    """Learnt and uniform attention by situation and algorithm, where both are there."""
+    known = {(one.situation, one.method): one for one in competence}
+    return {
+        (situation, algorithm): (one, other)
+        for (situation, method), one in known.items()
+        for algorithm, inner, kind in [method.rpartition("-")]
+        if inner and kind == "inner" and (other := known.get((situation, f"{algorithm}-uniform")))
+    }
+
+
+def _by_seed(runs: Competence, figure: str) -> Mapping[int, float]:
+    return {
+        seed: value
+        for seed, figures in zip(runs.seeds, runs.each, strict=True)
+        if (value := figures[figure]) is not None
+    }

@@ -1,0 +1,36 @@
+"""How the two food robots of a run share its rescues."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.errors import RunError
+from innerattn.experiments.run import FinishedRun
+from innerattn.measures.sharing import imbalance
+
+
+def rescues_by_task(run: FinishedRun) -> dict[str, NDArray[np.int64]]:
+    """Rescues of each task by food robot, (2,), over all episodes of the standard length.
+
+    Raises:
+        RunError: a task is not one that two robots share.
+    """
+    counts = imbalance.rescues_by_task(run.scored)
+    for task, by_robot in counts.items():
+        if len(by_robot) != 2:
+            raise RunError(f"{run.folder}: {task} is shared by {len(by_robot)} robots; must be two")
+    return counts
+
+
+def workload_imbalance(run: FinishedRun) -> float | None:
+    """Distance of the first food robot's share from 0.5, a mean over tasks, 0 to 0.5.
+
+    Returns:
+        None where a task has no rescues.
+
+    Raises:
+        RunError: a task is not one that two robots share.
+    """
+    rescues_by_task(run)
+    return imbalance.workload_imbalance(run.scored)

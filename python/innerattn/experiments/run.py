@@ -1,0 +1,304 @@
+"""A finished run as a study sees it: what it is, what made it, and what its evaluation recorded.
+
+`read_run` reads every file of a run folder once; nothing is played, trained or hashed anew.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from innerattn.config import RunConfig, read_toml
+from innerattn.errors import RunError
+from innerattn.experiments.plan import Case
+from innerattn.measures.summary import SCHEMA_VERSION
+from innerattn.records.parquet import RECORD_FILES, read_records
+from innerattn.records.record import Record
+from innerattn.records.run_folder import RunInfo, plain_file, read_info
+
+
+class NotMeasuredError(RunError):
+    """The evaluation of a run is not there as a whole."""
+
+
+@dataclass(frozen=True)
+class Scores:
+    """What is scored at one length of episodes; ``score`` is None where it means nothing."""
+
+    episode_steps: int
+    rescues_per_episode: float
+    score: float | None
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """A trained and measured run.
+
+    Attributes:
+        case: what tells it from the other runs of its study.
+        folder: its run folder; of an archived run, where that lay.
+        config: what it was trained and measured with.
+        info: how it was made.
+        summary: its ``evaluation/summary.json``.
+        read: gives the records of its own episodes, each time anew.
+        archived: whether it comes from an archive, which holds neither metrics nor steps.
+    """
+
+    case: Case
+    folder: Path
+    config: RunConfig
+    info: RunInfo
+    summary: dict[str, Any]
+    read: Callable[[], Sequence[Record]]
+    archived: bool = False
+
+    @property
+    def situation(self) -> str:
+        """The worlds it was trained and measured in, such as "mixed"."""
+        return self.case.situation
+
+    @property
+    def method(self) -> str:
+        """How it was trained, such as "td-inner"."""
+        return self.case.method
+
+    @property
+    def seed(self) -> int:
+        """The seed of its training."""
+        return self.case.seed
+
+    @cached_property
+    def config_sha256(self) -> str:
+        """The digest of its configuration, see `innerattn.config.RunConfig.digest`."""
+        return self.config.digest()
+
+    @property
+    def weights_sha256(self) -> str | None:
+        """The digest of its weights; None where the run is older than this record of it."""
+        return self.info.weights_sha256
+
+    @cached_property
+    def scored(self) -> tuple[Record, ...]:
+        """Its own episodes of the standard length, those recorded step by step first.
+
+        Raises:
+            RunError: the records cannot be read, or hold no episode of the run.
+        """
+        own = [r for r in self.read() if r.policy == self.method and r.length == "standard"]
+        if not own:
+            raise RunError(f"{self.folder / 'evaluation'}: holds no episodes of {self.method}")
+        return tuple(own)
+
+    @property
+    def recorded(self) -> Record:
+        """Its episodes that were recorded step by step; an archive keeps no steps of them.
+
+        Raises:
+            RunError: as of `scored`.
+        """
+        return self.scored[0]
+
+    def scores(self) -> tuple[Scores, Scores]:
+        """What its evaluation found at the standard and at the second length of episodes."""
+        standard, long = (_scores(part) for part in (self.summary, self.summary["long"]))
+        return standard, long
+
+
+def read_run(case: Case, folder: Path, *, steps: bool = True) -> FinishedRun:
+    """The finished run in ``folder``.
+
+    Args:
+        case: what it is listed as.
+        folder: the run folder, or a link to it.
+        steps: whether its records are to hold what was recorded step by step.
+
+    Raises:
+        NotMeasuredError: a file of its evaluation is missing or damaged.
+        RunError: the folder is no finished run, a file in it is a link, or the run was measured
+            otherwise than its configuration says, or by another version.
+        ConfigError: its configuration is not valid.
+        OSError: a file cannot be read.
+    """
+    info = read_info(folder)
+    if info.state != "done":
+        raise RunError(f"{folder}: its state is {info.state!r}: must be 'done'")
+    config = read_toml(plain_file(folder / "config.toml"))
+    return measured_run(case, folder, config, info, steps=steps)
+
+
+def measured_run(
+    case: Case, folder: Path, config: RunConfig, info: RunInfo, *, steps: bool
+) -> FinishedRun:
+    """The finished run in ``folder``, of which configuration and ``run.json`` were read already.
+
+    Raises:
+        NotMeasuredError, RunError, OSError: as of `read_run`.
+    """
+    evaluation = folder / "evaluation"
+    summary = _read_summary(evaluation, config)
+
+    def read() -> list[Record]:
+        return read_records(evaluation, policy=config.train.method, steps=steps)
+
+    return FinishedRun(case, folder, config, info, summary, read)
+
+
+def by_method(runs: Sequence[FinishedRun]) -> dict[tuple[str, str], list[FinishedRun]]:
+    """Runs by situation and method, in the order these first appear; by seed within.
+
+    Raises:
+        RunError: there are none, or a situation, method and seed come twice.
+    """
+    if not runs:
+        raise RunError("a study needs at least one run")
+    groups: dict[tuple[str, str], list[FinishedRun]] = {}
+    for run in sorted(runs, key=lambda run: run.seed):
+        groups.setdefault((run.situation, run.method), []).append(run)
+    for group in groups.values():
+        for first, second in pairwise(group):
+            if first.seed == second.seed:
+                raise RunError(
+                    f"{first.folder} and {second.folder}: both are {first.situation}, "
+                    f"{first.method}, seed {first.seed}; must be one run of each seed"
+                )
+    order = dict.fromkeys((run.situation, run.method) for run in runs)
+    return {key: groups[key] for key in order}
+
+
+def refuse_unlike(runs: Sequence[FinishedRun]) -> None:
+    """Refuse runs that cannot be compared.
+
+    Raises:
+        RunError: a run's label is not what its configuration says; runs of one situation and
+            method were trained or measured differently, other than by their seed; or runs of one
+            situation and seed were measured in different worlds, so that they are no pairs.
+    """
+    seen: dict[tuple[str, str], tuple[Path, dict[str, Any]]] = {}
+    measured: dict[tuple[str, int], tuple[Path, int]] = {}
+    for run in runs:
+        for name, label in (("method", run.method), ("seed", run.seed)):
+            if getattr(run.config.train, name) != label:
+                raise RunError(
+                    f"{run.folder}: train.{name} = {getattr(run.config.train, name)!r}, "
+                    f"but it is listed as {label!r}"
+                )
+        what = run.config.in_use()
+        for free in ("seed", "threads", "device", "compile", "log_every_env_steps"):
+            what["train"].pop(free)
+        worlds = what["evaluate"].pop("seed")
+        first = measured.setdefault((run.situation, run.seed), (run.folder, worlds))
+        if worlds != first[1]:
+            raise RunError(
+                f"{run.folder} and {first[0]}: are of one seed, and evaluate.seed is {worlds} and "
+                f"{first[1]}: must be the same worlds"
+            )
+        other, known = seen.setdefault((run.situation, run.method), (run.folder, what))
+        if differing := [name for name in what if what[name] != known.get(name)]:
+            raise RunError(
+                f"{run.folder} and {other}: are listed as the same but for the seed, and differ "
+                f"in {', '.join(differing)}"
+            )
+
+
+def refuse_without_steps(runs: Sequence[FinishedRun]) -> None:
+    """Refuse runs whose first episodes are not recorded step by step.
+
+    Raises:
+        RunError: there is one, such as an archived run.
+    """
+    for run in runs:
+        if not run.recorded.steps:
+            raise RunError(
+                f"{run.folder / 'evaluation'}: holds no episodes of {run.method} recorded step by "
+                "step"
+            )
+
+
+def named_from(folder: Path, base: Path) -> str:
+    """How a report in ``base`` names a run folder: from there, where it lies within."""
+    within = folder.is_relative_to(base)
+    return (folder.relative_to(base) if within else folder).as_posix()
+
+
+def check_summary(path: Path, found: dict[str, Any], config: RunConfig) -> dict[str, Any]:
+    """A summary, if it is that of a run with this configuration.
+
+    Args:
+        path: named in errors.
+        found: the document.
+        config: the run's configuration.
+
+    Raises:
+        NotMeasuredError: it is not a whole summary.
+        RunError: the run was measured otherwise, or by another version.
+    """
+    try:
+        if found["schema_version"] != SCHEMA_VERSION:
+            version = found["schema_version"]
+            raise RunError(f"{path}: schema_version = {version!r}: must be {SCHEMA_VERSION}")
+        for part in (found, found["long"]):
+            _scores(part)
+        _refuse_other_measures(path, found, config)
+    except (ValueError, KeyError, TypeError) as error:
+        raise NotMeasuredError(f"{path}: not a whole evaluation") from error
+    return found
+
+
+def _read_summary(evaluation: Path, config: RunConfig) -> dict[str, Any]:
+    path = evaluation / "summary.json"
+    records = [evaluation / name for name in RECORD_FILES]
+    for file in (path, *records):
+        if not os.path.lexists(file):
+            raise NotMeasuredError(f"{file}: missing")
+    for file in records:
+        _refuse_damaged(plain_file(file))
+    try:
+        found = json.loads(plain_file(path).read_text("utf-8"))
+    except ValueError as error:
+        raise NotMeasuredError(f"{path}: not a whole evaluation") from error
+    return check_summary(path, found, config)
+
+
+def _scores(part: dict[str, Any]) -> Scores:
+    return Scores(
+        int(part["episode_steps"]),
+        float(part["rescues_per_episode"]["mean"]),
+        None if part["score"] is None else float(part["score"]["mean"]),
+    )
+
+
+def _refuse_damaged(file: Path) -> None:
+    file.open("rb").close()  # what cannot be read is an OSError, as is what arrow cannot decode
+    try:
+        pq.read_metadata(file)
+    except (OSError, pa.ArrowException) as error:
+        raise NotMeasuredError(f"{file}: not a whole Parquet file") from error
+
+
+def _refuse_other_measures(path: Path, found: dict[str, Any], config: RunConfig) -> None:
+    settings, scenario = config.evaluate, config.scenario
+    expected = {
+        "method": (found["method"], config.train.method),
+        "situation": (found["situation"], scenario.situation),
+        "seed": (found["seed"], settings.seed),
+        "episodes": (found["episodes"], settings.episodes),
+        "episode_steps": (found["episode_steps"], scenario.episode_steps),
+        "score_episodes": (
+            found["score_episodes"],
+            max(settings.score_episodes, settings.episodes),
+        ),
+        "long.episodes": (found["long"]["episodes"], settings.long_episodes),
+        "long.episode_steps": (found["long"]["episode_steps"], settings.long_episode_steps),
+    }
+    for key, (value, wanted) in expected.items():
+        if value != wanted:
+            raise RunError(f"{path}: {key} = {value!r}, its configuration says {wanted!r}")

@@ -1,0 +1,1 @@
+"""What faults of robots cost, from records alone."""

@@ -1,0 +1,111 @@
+"""What is reported about attention when a robot fails; it computes nothing."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from innerattn.stats.intervals import Interval
+
+SCHEMA_VERSION = 1
+
+CURVE_STEPS = 8
+"""Steps before the onset, and from it on, that a curve shows where the window has as many."""
+
+
+@dataclass(frozen=True)
+class ByHead:
+    """A figure of the weights averaged over heads, and of each head's own."""
+
+    mean: Interval
+    heads: tuple[Interval, ...]
+
+
+@dataclass(frozen=True)
+class Shift:
+    """What one robot's fault did to the weight on it, alpha_ij averaged over its teammates i.
+
+    Intervals are bootstraps over episodes.
+
+    Attributes:
+        robot: its name.
+        value: of the fault.
+        before: mean weight over the steps before the onset.
+        after: over as many steps from the onset on.
+        change: ``after`` minus ``before``; other things than the fault change with time, too.
+        effect: mean weight after the onset minus that at the same steps of the same worlds without
+            the fault; what the fault did.
+        curve: mean weight by step, as many before the onset as from it on; None where no episode
+            goes on.
+        effect_curve: likewise, minus that without the fault; 0 before the onset.
+        shuffled: ``effect`` on robots that are called failing by lot, in the middle 95 % of lots.
+        p_value: how often such a lot is as far from 0 as ``effect``.
+        auc: how well the weight tells that the robot is faulty; see `KindShift`.
+    """
+
+    robot: str
+    value: float
+    before: ByHead
+    after: ByHead
+    change: ByHead
+    effect: ByHead
+    curve: tuple[Interval | None, ...]
+    effect_curve: tuple[Interval | None, ...]
+    shuffled: Interval
+    p_value: float
+    auc: Interval
+
+
+@dataclass(frozen=True)
+class KindShift:
+    """What one kind of fault did to the weight on the robot that has it.
+
+    Attributes:
+        kind: of the fault.
+        effect: as in `Shift`, averaged over robots.
+        auc: share of pairs in which the weight on a robot that is faulty is above the weight on a
+            robot at such a step without the fault; all robots together. Above 0.5 faults draw
+            attention, below 0.5 they turn it away, at 0.5 it tells nothing.
+        robots: by robot.
+    """
+
+    kind: str
+    effect: ByHead
+    auc: ByHead
+    robots: tuple[Shift, ...]
+
+
+@dataclass(frozen=True)
+class FaultAttention:
+    """Where attention goes when a robot fails, for one run.
+
+    Attributes:
+        attention: "inner" or "uniform"; uniform weights do not move, so all effects are 0 (unless
+            unavailable robots are masked).
+        seed: of the worlds, the bootstrap and the lots.
+        episodes: worlds played.
+        counted: those that go on until the onset; figures are over them.
+        episode_steps: their length T [control steps].
+        onset_step: at which the faults begin.
+        shuffles: how often labels were dealt by lot.
+        even_share: 1 / (R - 1), the weight of every teammate where attention is even.
+        effect: over all kinds and robots; see `KindShift`.
+        auc: likewise, over the pairs of all kinds.
+        kinds: by kind of fault.
+    """
+
+    attention: str
+    seed: int
+    episodes: int
+    counted: int
+    episode_steps: int
+    onset_step: int
+    shuffles: int
+    even_share: float
+    effect: ByHead
+    auc: ByHead
+    kinds: tuple[KindShift, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """A document of plain values."""
+        return {"schema_version": SCHEMA_VERSION, **asdict(self)}

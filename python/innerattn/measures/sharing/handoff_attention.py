@@ -1,0 +1,199 @@
+"""Does attention pass on with the work? A robot's weights on two partners around handoffs.
+
+It looks at all handoffs together; one chosen episode, as in Fig. 5, is an illustration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.records.record import Record
+from innerattn.stats.clusters import ratio_intervals
+
+Array = NDArray[np.float64]
+
+_SHUFFLES = 9_999
+_CHUNK = 2**21  # numbers gathered at once, 16 MB
+
+
+@dataclass(frozen=True)
+class Attended:
+    """The weight on one partner; K = 1 + H columns: the mean over heads, then each head.
+
+    Attributes:
+        weight: (3, W, K) float64 mean, low and high end by offset.
+        change: (3, K) float64 mean, low and high end of the mean weight in the steps after the
+            first rescue minus that in the steps up to it.
+    """
+
+    weight: Array
+    change: Array
+
+
+@dataclass(frozen=True)
+class HandoffAttention:
+    """Attention of the robots that hand over, aligned on the first rescue.
+
+    Only steps of a handoff's own two stages count: none before `start`, none after `second`. The
+    95 % intervals are over episodes, since handoffs of one episode share steps; NaN where
+    less than two episodes have the offset.
+
+    Attributes:
+        handoffs: N.
+        episodes: episodes they come from.
+        offsets: (W,) int64 steps since the first rescue's; the action of offset 0 completes it, so
+            offsets above 0 are those after it.
+        counts: (W,) int64 handoffs with such a step.
+        to_be: the partner of the second rescue.
+        before: the partner of the first.
+        p: (K,) float64 two-sided, of the change on the partner to be minus that on the one before.
+    """
+
+    handoffs: int
+    episodes: int
+    offsets: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    to_be: Attended
+    before: Attended
+    p: Array
+
+
+def handoff_attention(
+    record: Record, handoffs: NDArray[np.void], seed: int, reach: int = 8
+) -> HandoffAttention | None:
+    """How attention moves from one partner to the next.
+
+    The p-values are of a permutation test: if attention does not know which of its two partners is
+    next, their names can be exchanged. They are or are not in each episode, for all its handoffs,
+    which are not independent; p is the share of 9,999 draws, and of what is seen, in which the
+    change on the partner to be minus that on the one before is at least as large either way.
+    Teammates that are no partners are left out, since attention that passes from them to both
+    partners alike does not move from one to the other. A change that always goes with one
+    partner, whatever the work, is not told apart unless handoffs in both orders are given.
+
+    Attention may pass on because other victims need other robots, whoever goes. As a control give
+    the same handoffs with ``robot`` replaced by one that takes no part in them.
+
+    Args:
+        record: with attention.
+        handoffs: (N,) `handoff.HANDOFF` of this record, of any robots.
+        seed: seed of the permutations.
+        reach: steps looked at on either side, W / 2.
+
+    Returns:
+        None where there is no handoff or the record has no attention.
+
+    Raises:
+        ValueError: reach is not positive, or a robot is its own partner.
+    """
+    if reach < 1:
+        raise ValueError(f"reach = {reach}: must be 1 or more")
+    partners = np.stack([handoffs["after"], handoffs["before"]])
+    if (partners == handoffs["robot"]).any():
+        raise ValueError("handoffs: a robot cannot be before or after itself")
+    if not len(handoffs) or "attention" not in record.steps:
+        return None
+    offsets = np.arange(1 - reach, reach + 1)
+    weights, counted = aligned_weights(record, handoffs, offsets)
+    names, episode = np.unique(handoffs["episode"], return_inverse=True)
+    changes = _mean(weights, counted & (offsets > 0)) - _mean(weights, counted & (offsets <= 0))
+    roles = partners - (partners > handoffs["robot"])
+    to_be, before = (
+        Attended(*_courses(weights, counted, changes, role, episode)) for role in roles
+    )
+    on_next, on_last = (
+        np.take_along_axis(changes, role[:, None, None], -1)[..., 0] for role in roles
+    )
+    return HandoffAttention(
+        handoffs=len(handoffs),
+        episodes=len(names),
+        offsets=offsets,
+        counts=counted.sum(0),
+        to_be=to_be,
+        before=before,
+        p=_exchange_p(on_next - on_last, episode, seed),
+    )
+
+
+def aligned_weights(
+    record: Record, handoffs: NDArray[np.void], offsets: NDArray[np.int64]
+) -> tuple[Array, NDArray[np.bool_]]:
+    """A robot's attention around its handoffs.
+
+    Args:
+        record: with attention.
+        handoffs: (N,) `handoff.HANDOFF`.
+        offsets: (W,) steps since the first rescue's.
+
+    Returns:
+        (N, W, 1 + H, R - 1) float64 weights on teammates by index, the robot itself left out: their
+        mean over heads, then each head; NaN outside the handoff's stages. (N, W) bool whether it
+        is inside.
+    """
+    step = handoffs["first"][:, None] + offsets
+    inside = (step >= handoffs["start"][:, None]) & (step <= handoffs["second"][:, None])
+    attention = record.steps["attention"]
+    robots = np.arange(attention.shape[-1])
+    teammates = np.stack([np.delete(robots, robot) for robot in robots])
+    robot = handoffs["robot"]
+    episode = handoffs["episode"] - record.first_episode
+    shown = np.where(inside, step, 0)
+    heads = attention[episode[:, None], shown, :, robot[:, None]].astype(np.float64)
+    heads = np.take_along_axis(heads, teammates[robot][:, None, None], -1)
+    weights = np.concatenate([heads.mean(2, keepdims=True), heads], 2)
+    return np.where(inside[..., None, None], weights, np.nan), inside
+
+
+def _mean(weights: Array, chosen: NDArray[np.bool_]) -> Array:
+    """Mean over the chosen of W steps, (N, K, R - 1); there is always one on either side."""
+    total = np.where(chosen[..., None, None], weights, 0.0).sum(1)
+    return np.asarray(total / chosen.sum(1)[:, None, None])
+
+
+def _courses(
+    weights: Array,
+    counted: NDArray[np.bool_],
+    changes: Array,
+    role: NDArray[np.int64],
+    episode: NDArray[np.int64],
+) -> tuple[Array, Array]:
+    """`Attended.weight` and `Attended.change` of the teammate in a role, an index for each of N."""
+    weight = np.take_along_axis(weights, role[:, None, None, None], -1)[..., 0]
+    change = np.take_along_axis(changes, role[:, None, None], -1)[..., 0]
+    sums = _by_episode(np.where(counted[..., None], weight, 0.0), episode)
+    steps = _by_episode(counted[..., None], episode)
+    events = _by_episode(np.ones((len(role), 1)), episode)
+    return (
+        np.stack(ratio_intervals(sums, steps)),
+        np.stack(ratio_intervals(_by_episode(change, episode), events)),
+    )
+
+
+def _by_episode(values: NDArray[np.generic], episode: NDArray[np.int64]) -> Array:
+    """Sums over the handoffs of each episode."""
+    sums = np.zeros((episode.max() + 1, *values.shape[1:]))
+    np.add.at(sums, episode, values)
+    return sums
+
+
+def _exchange_p(differences: Array, episode: NDArray[np.int64], seed: int) -> NDArray[np.float64]:
+    """p-values (K,) of the sums of differences that an exchange of the partners turns round.
+
+    Args:
+        differences: (N, K) what one partner has more than the other.
+        episode: (N,) from 0; all of an episode are turned round together.
+        seed: seed of the exchanges.
+    """
+    sums = _by_episode(differences, episode)
+    seen = np.abs(sums.sum(0))
+    rng = np.random.default_rng(seed)
+    larger = np.ones(len(seen))
+    step = max(1, _CHUNK // len(sums))
+    for start in range(0, _SHUFFLES, step):
+        count = min(step, _SHUFFLES - start)
+        signs = 2.0 * rng.integers(0, 2, (count, len(sums))) - 1.0
+        larger += (np.abs(signs @ sums) >= seen - 1e-12).sum(0)
+    return larger / (_SHUFFLES + 1)

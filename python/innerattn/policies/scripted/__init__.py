@@ -1,0 +1,1 @@
+"""Scripted policies: written by hand from the true state of the worlds; they learn nothing."""

@@ -1,0 +1,131 @@
+"""Scripted policies to measure trained ones against: `random`, `greedy`, `hungarian` and `oracle`.
+
+They see the true state of the worlds and plan for all worlds of a batch at once; none learns. Only
+`oracle` knows of faults.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.config import Scenario
+from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
+from innerattn.errors import ConfigError
+from innerattn.policies.policy import Policy, PolicyInput
+from innerattn.policies.scripted.assignment import Needs, assign, can_be_rescued, pair_costs
+from innerattn.policies.scripted.steering import Steering
+
+
+class RandomPolicy:
+    """Every robot draws every action at random, all with the same chance."""
+
+    name = "random"
+
+    def __init__(self, scenario: Scenario, seed: int = 0) -> None:
+        """Take the kind of actions from ``scenario``; ``seed`` fixes the draws.
+
+        They follow each other: how many worlds are stepped at once decides who gets which.
+        """
+        self._continuous = scenario.actions == "continuous"
+        self._rng = np.random.default_rng(seed)
+
+    def act(self, view: PolicyInput) -> NDArray[Any]:
+        """See `Policy.act`."""
+        shape = view.positions.shape
+        if self._continuous:
+            return self._rng.uniform(-1.0, 1.0, shape).astype(np.float32)
+        return self._rng.integers(0, NUM_DISCRETE_ACTIONS, shape[:2])
+
+
+class _Dispatcher(ABC):
+    """What all dispatching policies share: every step, targets first and then actions."""
+
+    knows_faults = False
+    """Whether the robots reckon with faults, or take all to be healthy."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Take the team and the tasks from ``scenario``."""
+        self.needs = Needs(scenario)
+        self.steering = Steering(scenario)
+
+    def act(self, view: PolicyInput) -> NDArray[Any]:
+        """See `Policy.act`; robots without a victim are drawn to the centre."""
+        places = np.stack([view.victims["x"], view.victims["y"]], -1).astype(np.float64)
+        chosen = self.choose(view, places)
+        targets = np.take_along_axis(places, np.maximum(chosen, 0)[..., None], 1)
+        targets = np.where(chosen[..., None] >= 0, targets, 0.0)
+        return self.steering.actions(view.positions, view.velocities, targets, self._faults(view))
+
+    def _faults(self, view: PolicyInput) -> NDArray[np.void] | None:
+        return view.faults if self.knows_faults else None
+
+    @abstractmethod
+    def choose(self, view: PolicyInput, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The victim slot that each robot goes to (E, R), -1 for none; ``places`` are (E, V, 2)."""
+
+
+class GreedyPolicy(_Dispatcher):
+    """Every robot goes to the nearest victim that it can help, whatever the others do."""
+
+    name = "greedy"
+
+    def choose(self, view: PolicyInput, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        """See `_Dispatcher.choose`."""
+        helpful = self.needs.permitted(view.victims["present"], view.victims["task"]).any(-1)
+        way = places[:, None] - view.positions[:, :, None]
+        distance = np.where(helpful, (way * way).sum(-1), np.inf)
+        return np.where(helpful.any(-1), distance.argmin(-1), -1)
+
+
+class HungarianPolicy(_Dispatcher):
+    """Robots are assigned to needs at the least total cost in arrival times, anew every step."""
+
+    name = "hungarian"
+
+    def choose(self, view: PolicyInput, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        """See `_Dispatcher.choose`."""
+        permitted = self.needs.permitted(view.victims["present"], view.victims["task"])
+        faults = self._faults(view)
+        if faults is not None:
+            needed = np.asarray(permitted.any(1))
+            permitted &= (faults["unavailable"] < 1.0)[:, :, None, None]
+            permitted &= can_be_rescued(permitted, needed)[:, None, :, None]
+        times = self.steering.arrival_times(view.positions, view.velocities, places, faults)
+        need = assign(pair_costs(times, permitted))
+        return np.where(need >= 0, need // permitted.shape[-1], -1)
+
+
+class OraclePolicy(HungarianPolicy):
+    """As `hungarian`, and knows every fault.
+
+    It reckons with weak, slow and misled drives, steers against a bias, and sends nobody who is
+    never available, nor anybody to a victim that cannot be rescued without such a robot.
+    """
+
+    name = "oracle"
+    knows_faults = True
+
+
+SCRIPTED = ("random", "greedy", "hungarian")
+"""Names of the scripted policies that every evaluation measures."""
+
+
+def scripted_policy(name: str, scenario: Scenario, seed: int = 0) -> Policy:
+    """The scripted policy ``name`` for the team and tasks of ``scenario``.
+
+    Raises:
+        ConfigError: no such policy; the message names the known ones.
+    """
+    if name == "random":
+        return RandomPolicy(scenario, seed)
+    if name == "greedy":
+        return GreedyPolicy(scenario)
+    if name == "hungarian":
+        return HungarianPolicy(scenario)
+    if name == "oracle":
+        return OraclePolicy(scenario)
+    raise ConfigError(f"unknown policy {name!r}: known are {', '.join((*SCRIPTED, 'oracle'))}")

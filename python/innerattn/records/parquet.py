@@ -1,0 +1,278 @@
+"""Episode records as Parquet files, so that every table can be computed again without training.
+
+One file has a row per episode, the other a row per rescue. It computes no figure.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from innerattn.config import Scenario
+from innerattn.config.files import write_whole
+from innerattn.errors import RunError
+from innerattn.records.record import FIELDS, Length, Record, rescue_dtype
+from innerattn.records.run_folder import plain_file
+
+FORMAT = "innerattn.records"
+SCHEMA_VERSION = 1
+
+RECORD_FILES = _EPISODES, _RESCUES = "episodes.parquet", "rescues.parquet"
+
+_SUMS = ("record", "episode", "steps", "rescues", "reward")
+"""Columns of ``episodes.parquet`` that every record needs; the others are labels and steps."""
+
+
+def write_records(records: Sequence[Record], folder: Path) -> None:
+    """Write ``episodes.parquet`` and ``rescues.parquet`` into ``folder``, which is made if needed.
+
+    A row of the first holds policy, seed, episode, steps, rescues, reward sums by robot and
+    component, and what was recorded step by step, flattened; shapes and the scenario stand in the
+    file's metadata. A row of the second holds one event; helpers are named.
+
+    Raises:
+        OSError: the files cannot be written; each is written whole or not at all.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    _write(
+        [_episode_table(i, record) for i, record in enumerate(records)], records, folder / _EPISODES
+    )
+    _write(
+        [_rescue_table(i, record) for i, record in enumerate(records)], records, folder / _RESCUES
+    )
+
+
+def read_records(
+    folder: str | Path, *, policy: str | None = None, steps: bool = True
+) -> list[Record]:
+    """The records that `write_records` wrote, in their order.
+
+    Args:
+        folder: where they lie.
+        policy: whose records; None: everybody's.
+        steps: whether to read what was recorded step by step, which is most of the file.
+
+    Raises:
+        RunError: a file is missing, a link, not Parquet, or not of this format and version, or the
+            two do not belong together.
+    """
+    folder = Path(folder)
+    episodes, heads = _read(folder / _EPISODES, None if steps else _SUMS)
+    rescues, others = _read(folder / _RESCUES)
+    if heads != others:
+        raise RunError(f"{folder}: {_EPISODES} and {_RESCUES} are of different episodes")
+    try:
+        lengths = _lengths(heads, episodes)
+        scenarios: dict[str, Scenario] = {}
+        return [
+            _record(i, head, lengths[i], episodes, rescues, steps, scenarios)
+            for i, head in enumerate(heads)
+            if policy in (None, head["policy"])
+        ]
+    except (LookupError, ValueError, TypeError, AttributeError, pa.ArrowException) as error:
+        raise RunError(f"{folder}: records do not fit their description ({error})") from error
+
+
+def _head(record: Record) -> dict[str, Any]:
+    """What all rows of a record share."""
+    return {
+        "policy": record.policy,
+        "scenario": record.scenario.model_dump(mode="json"),
+        "robot_names": list(record.robot_names),
+        "seed": record.seed,
+        "length": record.length,
+        "reward_names": list(record.reward_names),
+        "steps": {
+            name: {"dtype": _dtype_text(values.dtype), "shape": list(values.shape[1:])}
+            for name, values in record.steps.items()
+        },
+    }
+
+
+def _dtype_text(dtype: np.dtype[Any]) -> Any:
+    """A dtype as JSON: a string, or a list of [field, string] pairs."""
+    return [[n, dtype[n].str] for n in dtype.names] if dtype.names else dtype.str
+
+
+def _dtype_of(text: Any) -> np.dtype[Any]:
+    return np.dtype(text if isinstance(text, str) else [(name, kind) for name, kind in text])
+
+
+def _episode_table(index: int, record: Record) -> pa.Table:
+    count = record.num_episodes
+    columns: dict[str, Any] = {
+        "record": pa.array(np.full(count, index)),
+        "policy": pa.array([record.policy] * count),
+        "situation": pa.array([record.scenario.situation] * count),
+        "seed": pa.array(np.full(count, record.seed)),
+        "episode": pa.array(record.first_episode + np.arange(count)),
+        "steps": pa.array(record.lengths),
+        "rescues": pa.array(record.rescue_counts()),
+        "reward": _lists(record.rewards_total),
+    }
+    for name, values in record.steps.items():
+        columns |= {column: _lists(part) for column, part in _parts(name, values)}
+    return pa.table(columns)
+
+
+def _parts(name: str, values: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """A structured array by its fields, any other as it is; with column names."""
+    if values.dtype.names is None:
+        yield name, values
+    else:
+        for part in values.dtype.names:
+            yield f"{name}.{part}", np.ascontiguousarray(values[part])
+
+
+def _lists(values: NDArray[Any]) -> pa.Array:
+    """One flat list per episode."""
+    flat = values.reshape(len(values), -1)
+    offsets = np.arange(len(flat) + 1, dtype=np.int64) * flat.shape[1]
+    return pa.LargeListArray.from_arrays(pa.array(offsets), pa.array(flat.ravel()))
+
+
+def _rescue_table(index: int, record: Record) -> pa.Table:
+    events = record.rescues
+    robots = np.array([*record.robot_names, None], dtype=object)  # -1 is nobody
+    tasks = np.array([task.name for task in record.scenario.tasks], dtype=object)
+    columns: dict[str, Any] = {"record": np.full(len(events), index)}
+    columns["policy"] = pa.array([record.policy] * len(events), pa.string())
+    for name in events.dtype.names or ():
+        values = events[name]
+        if name.startswith("helper_"):
+            columns[name] = pa.array(robots[values], pa.string())
+        elif name == "task":
+            columns[name] = pa.array(tasks[values], pa.string())
+        else:
+            columns[name] = pa.array(np.ascontiguousarray(values))
+    return pa.table(columns)
+
+
+def _write(tables: list[pa.Table], records: Sequence[Record], path: Path) -> None:
+    table = pa.concat_tables(tables, promote_options="default")
+    heads = {
+        "format": FORMAT,
+        "schema_version": SCHEMA_VERSION,
+        "records": [_head(record) for record in records],
+    }
+    table = table.replace_schema_metadata({FORMAT: json.dumps(heads)})
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd")
+    write_whole(path, sink.getvalue().to_pybytes())
+
+
+def _read(
+    path: Path, columns: Sequence[str] | None = None
+) -> tuple[pa.Table, list[dict[str, Any]]]:
+    """Some columns of a file, or all, and what it says of its records."""
+    if not path.exists():
+        raise RunError(f"{path}: no such file")
+    plain_file(path)
+    try:
+        with pq.ParquetFile(path) as file:
+            head = json.loads((file.schema_arrow.metadata or {})[FORMAT.encode()])
+            version, records = head["schema_version"], list(head["records"])
+            table = file.read(columns)
+    except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
+        raise RunError(f"{path}: not a file of {FORMAT}") from error
+    if version != SCHEMA_VERSION:
+        raise RunError(f"{path}: schema version {version}, only {SCHEMA_VERSION} is known")
+    return table, records
+
+
+def _lengths(heads: Sequence[dict[str, Any]], episodes: pa.Table) -> list[Length]:
+    """Which length of an evaluation each record is of.
+
+    Files that are older than this label hold, of each policy, the standard length first: a record
+    that begins at episode 0 again is of the second one.
+    """
+    begun: set[str] = set()
+    lengths: list[Length] = []
+    for index, head in enumerate(heads):
+        name = head["policy"]
+        rows = episodes.filter(pc.equal(episodes["record"], index))
+        again = name in begun and int(_numbers(rows["episode"])[0]) == 0
+        lengths.append(head.get("length", "long" if again else "standard"))
+        begun.add(name)
+    return lengths
+
+
+def _record(
+    index: int,
+    head: dict[str, Any],
+    length: Length,
+    episodes: pa.Table,
+    rescues: pa.Table,
+    steps: bool,
+    scenarios: dict[str, Scenario],
+) -> Record:
+    rows = episodes.filter(pc.equal(episodes["record"], index))
+    events = rescues.filter(pc.equal(rescues["record"], index))
+    described = json.dumps(head["scenario"])
+    if described not in scenarios:
+        scenarios[described] = Scenario.model_validate(head["scenario"])
+    scenario = scenarios[described]
+    names, reward_names = tuple(head["robot_names"]), tuple(head["reward_names"])
+    lengths = _numbers(rows["steps"])
+    record = Record(
+        policy=head["policy"],
+        scenario=scenario,
+        robot_names=names,
+        seed=head["seed"],
+        first_episode=int(_numbers(rows["episode"])[0]),
+        lengths=lengths,
+        rescues=_events(events, scenario, names),
+        reward_names=reward_names,
+        rewards_total=_arrays(rows["reward"]).reshape(len(rows), len(names), len(reward_names)),
+        length=length,
+        steps={
+            name: _steps(name, head["steps"][name], rows)
+            for name in FIELDS
+            if steps and name in head["steps"]
+        },
+    )
+    listed, counted = record.rescue_counts(), _numbers(rows["rescues"])
+    if not np.array_equal(listed, counted):
+        raise ValueError(f"{listed.sum()} rescues are listed, {counted.sum()} were counted")
+    return record
+
+
+def _steps(name: str, layout: dict[str, Any], rows: pa.Table) -> NDArray[Any]:
+    dtype, shape = _dtype_of(layout["dtype"]), (len(rows), *layout["shape"])
+    if dtype.names is None:
+        return _arrays(rows[name]).reshape(shape).astype(dtype, copy=False)
+    values = np.empty(shape, dtype)
+    for part in dtype.names:
+        values[part] = _arrays(rows[f"{name}.{part}"]).reshape(shape)
+    return values
+
+
+def _events(rows: pa.Table, scenario: Scenario, robot_names: tuple[str, ...]) -> NDArray[np.void]:
+    events = np.empty(len(rows), rescue_dtype(scenario))
+    numbers: dict[str | None, int] = {name: i for i, name in enumerate(robot_names)} | {None: -1}
+    tasks = {task.name: i for i, task in enumerate(scenario.tasks)}
+    for name in events.dtype.names or ():
+        if name.startswith("helper_"):
+            events[name] = [numbers[robot] for robot in rows[name].to_pylist()]
+        elif name == "task":
+            events[name] = [tasks[task] for task in rows[name].to_pylist()]
+        else:
+            events[name] = _numbers(rows[name])
+    return events
+
+
+def _numbers(column: pa.ChunkedArray) -> NDArray[Any]:
+    return np.asarray(column.to_numpy())
+
+
+def _arrays(column: pa.ChunkedArray) -> NDArray[Any]:
+    """All lists of a column, end to end."""
+    return np.asarray(column.combine_chunks().flatten().to_numpy(zero_copy_only=False))

@@ -1,0 +1,75 @@
+"""What a policy did in consecutive episodes: rescues, rewards and, where kept, every step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.config import Scenario
+
+FIELDS = (
+    *("obs", "actions", "rewards", "positions", "velocities", "victims", "faults"),
+    "attention",
+)
+"""What can be recorded step by step."""
+
+
+Length = Literal["standard", "long"]
+"""The scenario's own length of an episode, or the second one that policies are measured at."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """Consecutive episodes of one policy.
+
+    Fields with a time axis hold what was so before the step's action (rewards: what the step gave);
+    they are None where they were not recorded and zero after an episode's end.
+
+    Attributes:
+        policy: its name.
+        scenario: the worlds; `episode_steps` is T.
+        robot_names: R names.
+        seed: seed of the worlds.
+        first_episode: number of the first episode.
+        lengths: (E,) int64 steps of each episode.
+        rescues: (N,) structured int64: episode, step, slot, victim, task, helper_0, ...;
+            helper_k filled the task's need k, -1 beyond its last need.
+        reward_names: C names of reward components.
+        rewards_total: (E, R, C) float64 sum over the episode.
+        length: which of an evaluation's two lengths of episodes this is.
+        steps: by name, arrays (E, T, ...): obs (R, D) float32, actions (R,) int64 or (R, 2)
+            float32, rewards (R, C) float32, positions and velocities (R, 2) float32, victims (V,)
+            structured, faults (R,) structured, attention (H, R, R) float32.
+    """
+
+    policy: str
+    scenario: Scenario
+    robot_names: tuple[str, ...]
+    seed: int
+    first_episode: int
+    lengths: NDArray[np.int64]
+    rescues: NDArray[np.void]
+    reward_names: tuple[str, ...]
+    rewards_total: NDArray[np.float64]
+    length: Length = "standard"
+    steps: dict[str, NDArray[Any]] = field(default_factory=dict)
+
+    @property
+    def num_episodes(self) -> int:
+        """Number of episodes E."""
+        return len(self.lengths)
+
+    def rescue_counts(self) -> NDArray[np.int64]:
+        """Rescues of each episode, (E,) int64."""
+        index = self.rescues["episode"] - self.first_episode
+        return np.bincount(index, minlength=self.num_episodes)
+
+
+def rescue_dtype(scenario: Scenario) -> np.dtype[np.void]:
+    """The fields of `Record.rescues`: as many helpers as any task has needs."""
+    most = max(len(task.needs) for task in scenario.tasks)
+    names = ["episode", "step", "slot", "victim", "task", *(f"helper_{k}" for k in range(most))]
+    return np.dtype([(name, np.int64) for name in names])

@@ -1,0 +1,50 @@
+"""What a study makes of its finished runs: the report, its table and its figures, as files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from innerattn.experiments.run import FinishedRun
+from innerattn.report.crossed import write_crossed
+from innerattn.report.paper.write import PARTS, write_report
+
+_MADE = {
+    "table2": ("table2.csv", "table2.json", "table2.md"),
+    "fig4": ("fig4.csv", "fig4.json", "fig4.pdf", "fig4.png"),
+    "fig5": tuple(f"fig5{part}.{x}" for part in ("", "_evidence") for x in ("json", "pdf", "png")),
+    "crossed": tuple(f"crossed.{kind}" for kind in ("csv", "json", "md", "pdf", "png")),
+}
+"""The files of each target but the report."""
+
+
+def make_outputs(
+    target: str, runs: Sequence[FinishedRun], out: Path, budget: str, left_out: Sequence[str]
+) -> list[Path]:
+    """Make what was asked for.
+
+    Args:
+        target: one of `innerattn.experiments.plan.TARGETS`.
+        runs: the finished runs; where some failed or were left out, fewer than planned.
+        out: folder of the study.
+        budget: name of the budget they were trained with.
+        left_out: what is to be said of each run that is not among ``runs``.
+
+    Returns:
+        The files that are there now; none without runs, where those of earlier runs are removed.
+
+    Raises:
+        RunError: runs cannot be compared, or matplotlib is not installed.
+        OSError: a file cannot be written or removed.
+    """
+    parts = PARTS if target == "all" else (target,)
+    report = [] if target == "crossed" else [out / "report.md"]
+    files = report + [out / name for part in parts for name in _MADE[part]]
+    if not runs:
+        for path in files:
+            path.unlink(missing_ok=True)
+    elif target == "crossed":
+        write_crossed(runs, out, budget, left_out)
+    else:
+        write_report(runs, out, budget, parts, left_out)
+    return [path for path in files if path.exists()]

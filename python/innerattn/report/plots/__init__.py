@@ -1,0 +1,1 @@
+"""Plots: drawn from what was measured; they measure nothing."""

@@ -1,0 +1,31 @@
+"""Estimates as they are written in tables and sentences."""
+
+from __future__ import annotations
+
+from innerattn.stats.intervals import Interval
+from innerattn.stats.seeds import SeedEstimate
+
+NONE = "–"
+"""What stands where there is no figure."""
+
+
+def shown(value: SeedEstimate | Interval | None, decimals: int = 2) -> str:
+    """A mean with its interval, where it has one."""
+    if value is None:
+        return NONE
+    mean = fixed(value.mean, decimals)
+    if value.low is None or value.high is None:
+        return mean
+    return f"{mean} [{fixed(value.low, decimals)}, {fixed(value.high, decimals)}]"
+
+
+def fixed(value: float, decimals: int = 2) -> str:
+    """A number with so many decimals; none is minus zero."""
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+
+
+def p_shown(value: float | None) -> str:
+    """A p-value."""
+    if value is None:
+        return NONE
+    return "< 0.001" if value < 0.001 else fixed(value, 3)

@@ -1,0 +1,118 @@
+"""Records against a plain loop, and the promise that policies meet the same starts."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from innerattn.config import Scenario
+from innerattn.envs import BatchEnv
+from innerattn.evaluate import play as episodes
+from innerattn.evaluate.play import run_episodes
+from innerattn.policies import PolicyInput, scripted_policy
+from innerattn.records.record import FIELDS, Record
+
+
+def record_of(name: str, scenario: Scenario, count: int, **options: object) -> Record:
+    return run_episodes(scripted_policy(name, scenario), scenario, count, 9, **options)
+
+
+def assert_equal(one: Record, other: Record) -> None:
+    for field in fields(Record):
+        a, b = getattr(one, field.name), getattr(other, field.name)
+        if field.name == "steps":
+            assert a.keys() == b.keys()
+            for name in a:
+                np.testing.assert_array_equal(a[name], b[name], strict=True)
+        elif isinstance(a, np.ndarray):
+            np.testing.assert_array_equal(a, b, strict=True)
+        else:
+            assert a == b
+
+
+def test_record_against_a_plain_loop() -> None:
+    scenario = Scenario.preset("double").replace(episode_steps=12)
+    record = record_of("hungarian", scenario, 6, record=FIELDS)
+    assert list(record.steps) == [name for name in FIELDS if name != "attention"]
+    policy = scripted_policy("hungarian", scenario)
+    env = BatchEnv(scenario, 6, seed=9, copy=True)
+    obs = env.reset()
+    events = []
+    total = np.zeros((6, 4, 4))
+    for t in range(12):
+        seen = PolicyInput.of(env, obs)
+        actions = policy.act(seen)
+        for name, value in [*seen._asdict().items(), ("actions", actions)]:
+            np.testing.assert_array_equal(record.steps[name][:, t], value)
+        step = env.step(actions)
+        np.testing.assert_array_equal(record.steps["rewards"][:, t].sum(-1), step.reward)
+        total += env.reward_components()
+        events += [
+            tuple(int(event[n]) for n in record.rescues.dtype.names[1:]) for event in step.rescues
+        ]
+        obs = step.obs
+    assert sorted(tuple(map(int, event))[1:] for event in record.rescues) == sorted(events)
+    assert len(events) > 6
+    np.testing.assert_allclose(record.rewards_total, total)
+    np.testing.assert_array_equal(record.lengths, 12)
+    assert record.reward_names[0] == "rescue"
+    # Every rescue is worth one to each of its helpers.
+    assert record.rewards_total[..., 0].sum() == 2 * len(record.rescues)
+
+
+def test_rescue_counts_by_hand() -> None:
+    record = record_of("hungarian", Scenario.preset("double"), 5, first_episode=3)
+    expected = [sum(event["episode"] == 3 + e for event in record.rescues) for e in range(5)]
+    np.testing.assert_array_equal(record.rescue_counts(), expected)
+    assert sum(expected) == len(record.rescues) > 0
+    order = record.rescues[["episode", "step"]].tolist()
+    assert order == sorted(order)
+
+
+def test_policies_meet_the_same_starts() -> None:
+    scenario = Scenario.preset("mixed")
+    records = [record_of(name, scenario, 8, record=FIELDS) for name in ("random", "hungarian")]
+    for name in ("obs", "positions", "victims"):
+        one, other = (record.steps[name] for record in records)
+        np.testing.assert_array_equal(one[:, 0], other[:, 0])
+        assert not np.array_equal(one[:, -1], other[:, -1])
+
+
+def test_batches_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = Scenario.preset("mixed")
+    whole = record_of("hungarian", scenario, 10, record=("positions", "victims"))
+    monkeypatch.setattr(episodes, "_WORLDS_AT_ONCE", 4)
+    done: list[int] = []
+    parts = record_of(
+        "hungarian", scenario, 10, record=("positions", "victims"), progress=done.append
+    )
+    assert_equal(whole, parts)
+    assert done == [4, 4, 2]
+    later = record_of("hungarian", scenario, 3, first_episode=7)
+    np.testing.assert_array_equal(later.rescue_counts(), whole.rescue_counts()[7:])
+
+
+def test_an_episode_that_ends_early_counts_no_further() -> None:
+    scenario = Scenario.preset("double").replace(end_when_rescued=2, episode_steps=40)
+    record = record_of("hungarian", scenario, 12, record=("positions", "rewards"))
+    counts = record.rescue_counts()
+    assert np.all((counts == 2) | (counts == 3))  # two may happen in one step
+    for e, length in enumerate(record.lengths):
+        last = record.rescues[record.rescues["episode"] == e]["step"].max()
+        assert length == last + 1 < 40
+        assert np.all(record.steps["positions"][e, length:] == 0)
+        assert np.any(record.steps["positions"][e, length - 1] != 0)
+        np.testing.assert_allclose(
+            record.steps["rewards"][e].sum(0), record.rewards_total[e], atol=1e-5
+        )
+
+
+@pytest.mark.parametrize("episodes", [0, -1])
+def test_no_episodes_are_refused(episodes: int) -> None:
+    with pytest.raises(ValueError, match=f"episodes = {episodes}: must be at least 1"):
+        record_of("random", Scenario.preset("mixed"), episodes)
+
+
+def test_unknown_fields_are_refused() -> None:
+    with pytest.raises(ValueError, match="'smell'"):
+        record_of("random", Scenario.preset("mixed"), 1, record=("smell",))

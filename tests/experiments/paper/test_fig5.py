@@ -1,0 +1,152 @@
+"""Handoffs of many runs: the control, means over runs by plain loops, the rule, the figures."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from innerattn.experiments.paper.claims import handoff_claims
+from innerattn.experiments.paper.fig5 import (
+    Evidence,
+    all_handoffs,
+    evidence,
+    evidence_json,
+    with_bystander,
+)
+from innerattn.experiments.paper.scene import choose_scene, scene_json
+from innerattn.experiments.run import FinishedRun
+from innerattn.measures.sharing.handoff import handoffs
+from innerattn.measures.sharing.handoff_attention import handoff_attention
+from innerattn.report.paper.fig5 import evidence_lines
+from innerattn.report.plots.aligned import draw_aligned
+from innerattn.report.plots.handoff import draw_handoff
+
+
+@pytest.fixture(scope="module")
+def inner(runs: list[FinishedRun]) -> list[FinishedRun]:
+    return [runs[index] for index in (1, 2, 0)]
+
+
+@pytest.fixture(scope="module")
+def found(inner: list[FinishedRun]) -> Evidence:
+    found = evidence(inner)
+    assert found is not None
+    return found
+
+
+def changes(measured: FinishedRun, role: str, *, bystander: bool) -> list[float]:
+    """Mean weight after the first rescue minus that up to it, of each handoff."""
+    weights, values = measured.recorded.steps["attention"], []
+    for row in all_handoffs(measured.recorded):
+        robot = 1 - row["robot"] if bystander else row["robot"]
+        own = weights[row["episode"], :, :, robot, row[role]].astype(float).mean(1)
+        lowest = max(row["start"], row["first"] - 7)
+        before = own[lowest : row["first"] + 1]
+        after = own[row["first"] + 1 : min(row["second"], row["first"] + 8) + 1]
+        values.append(after.mean() - before.mean())
+    return values
+
+
+def test_changes_of_robot_and_control_against_plain_loops(
+    inner: list[FinishedRun], found: Evidence
+) -> None:
+    for parts, bystander in ((found.robot, False), (found.control, True)):
+        for role, name in (("to_be", "after"), ("before", "before")):
+            plain = [np.mean(changes(measured, name, bystander=bystander)) for measured in inner]
+            assert parts[role].change_by_run == pytest.approx(plain)
+            assert parts[role].change is not None
+            assert parts[role].change.mean == pytest.approx(np.mean(plain))
+    own = np.subtract(found.robot["to_be"].change_by_run, found.control["to_be"].change_by_run)
+    assert found.own_part_by_run == pytest.approx(own)
+    assert found.handoffs == tuple(len(all_handoffs(m.recorded)) for m in inner)
+    beyond = own - np.divide(found.robot["to_be"].change_by_run, 2.0)
+    assert found.own_part_beyond_half is not None
+    assert found.own_part_beyond_half.mean == pytest.approx(beyond.mean())
+    for measured, own_p, control_p in zip(
+        inner, found.p_by_run, found.control_p_by_run, strict=True
+    ):
+        record = measured.recorded
+        own = all_handoffs(record)
+        for p, of in ((own_p, own), (control_p, with_bystander(record, own))):
+            attention = handoff_attention(record, of, 0)
+            assert attention is not None
+            assert p == attention.p[0]
+    assert found.p_by_run != found.control_p_by_run
+
+
+def test_a_run_without_handoffs_does_not_count(inner: list[FinishedRun]) -> None:
+    record = inner[2].recorded
+    without = replace(inner[2], read=lambda: [replace(record, rescues=record.rescues[:0])])
+    found, of_two = evidence([*inner[:2], without]), evidence(inner[:2])
+    assert found is not None
+    assert of_two is not None
+    assert (found.seeds, found.runs, found.handoffs[2]) == ((0, 1, 2), 2, 0)
+    assert found.own_part_by_run == (*of_two.own_part_by_run, None)
+    assert found.p_by_run[2] is found.control_p_by_run[2] is None
+    assert found.own_part == of_two.own_part
+    (line,), (expected,) = evidence_lines([found]), evidence_lines([of_two])
+    assert line.runs == expected.runs
+    assert line.runs.startswith("2 runs (least to largest)")
+    assert (line.robot == expected.robot).all()
+    assert {claim.runs for claim in handoff_claims([found])} == {2}
+
+
+def test_the_control_takes_no_part(inner: list[FinishedRun]) -> None:
+    record = inner[0].recorded
+    own = all_handoffs(record)
+    control = with_bystander(record, own)
+    assert set(own["robot"]) == {0, 1}
+    assert (control["robot"] == 1 - own["robot"]).all()
+    for name in ("episode", "before", "after", "start", "first", "second"):
+        assert (control[name] == own[name]).all()
+
+
+def test_even_attention_gives_no_evidence(runs: list[FinishedRun]) -> None:
+    assert evidence(runs[3:5]) is None
+
+
+def test_the_scene_follows_its_rule(inner: list[FinishedRun]) -> None:
+    scene, record = choose_scene(inner), inner[0].recorded
+    assert scene is not None
+    best = max(
+        handoffs(record, "food_0", "task_1", "task_2").tolist(),
+        key=lambda h: (min(h[5] - h[4] + 1, h[6] - h[5]), h[6] - h[4], -h[0]),
+    )
+    assert (scene.robot, scene.before, scene.after) == (0, 3, 2)
+    assert (scene.start, scene.first, scene.second) == best[4:]
+    assert scene.title == f"mixed, td-inner, seed 0, episode {best[0]}"
+    assert (scene.positions == record.steps["positions"][best[0]]).all()
+    document = json.loads(json.dumps(scene_json(scene), allow_nan=False))
+    assert len(document["steps"]) == len(document["weights_by_step_head_robot"])
+
+
+def test_the_scene_is_drawn_as_panels_a_b_and_c(inner: list[FinishedRun]) -> None:
+    scene = choose_scene(inner)
+    assert scene is not None
+    figure = draw_handoff(scene)
+    arenas, overall, heads = figure.axes[:3], figure.axes[3], figure.axes[4:]
+    assert {(panel.get_xlabel(), panel.get_ylabel()) for panel in arenas} == {("x [m]", "y [m]")}
+    names = {robot.name for robot in scene.scenario.robots}
+    assert all(names <= {text.get_text() for text in panel.texts} for panel in arenas)
+    assert overall.get_xlabel() == "step of the episode [0.1 s each]"
+    lines = [line for line in overall.lines if line.get_label().startswith("on ")]
+    shown = np.array([line.get_ydata() for line in lines])
+    steps = slice(scene.start, scene.second + 1)
+    assert shown == pytest.approx(scene.weights[steps].mean(1)[:, 1:].T)
+    assert [panel.get_title() for panel in heads] == ["head 1", "head 2"]
+    assert [panel.get_title(loc="left") for panel in figure.axes] == [*"A", "", "", *"BC", ""]
+
+
+def test_all_handoffs_are_drawn_with_their_control(found: Evidence) -> None:
+    (line,) = lines = evidence_lines([found])
+    assert line.runs == f"3 runs (95 %), {sum(found.handoffs)} handoffs"
+    figure = draw_aligned(lines)
+    (panel,) = figure.axes
+    assert panel.get_xlabel() == "steps since the first rescue [0.1 s]"
+    assert panel.get_ylabel() == "weight, mean over heads"
+    drawn = [line.get_ydata() for line in panel.lines[:4]]
+    courses = [parts[role].weight.mean for parts in (found.robot, found.control) for role in parts]
+    assert np.array(drawn) == pytest.approx(np.array(courses))
+    assert len(panel.collections) == 4
+    assert json.dumps(evidence_json([found]), allow_nan=False)

@@ -1,0 +1,146 @@
+"""Archived runs: a study takes them for the runs, and makes the same report of them."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from innerattn.errors import RunError
+from innerattn.experiments.archive import FILE, FORMAT, read_archive, write_archive
+from innerattn.experiments.plan import plan
+from innerattn.experiments.run import FinishedRun, read_run, refuse_without_steps
+from innerattn.experiments.scan import finished_runs, scan_runs
+from innerattn.report.crossed import write_crossed
+
+
+def test_what_is_written_is_read_but_for_steps(runs: list[FinishedRun], tmp_path: Path) -> None:
+    path = tmp_path / "new" / FILE
+    write_archive(runs, path)
+    archived = read_archive(path)
+    assert len(archived) == len(runs)
+    for run, copy in zip(runs, archived, strict=True):
+        assert copy.archived
+        assert (copy.case, copy.config, copy.info) == (run.case, run.config, run.info)
+        assert copy.summary == run.summary
+        assert copy.folder == tmp_path / "new" / "runs" / run.folder.name
+        assert (copy.config_sha256, copy.scores()) == (run.config_sha256, run.scores())
+        assert len(copy.scored) == len(run.scored) == 2
+        for mine, its in zip(copy.scored, run.scored, strict=True):
+            assert mine.rescues.dtype == its.rescues.dtype
+            for name in ("rescues", "lengths", "rewards_total"):
+                assert getattr(mine, name).tobytes() == getattr(its, name).tobytes()
+            for name in ("policy", "scenario", "robot_names", "seed", "first_episode"):
+                assert getattr(mine, name) == getattr(its, name)
+            assert (mine.reward_names, mine.length) == (its.reward_names, its.length)
+            assert mine.steps == {}
+    with pytest.raises(RunError, match="recorded step by step"):
+        refuse_without_steps(archived)
+    before = path.read_bytes()
+    write_archive(runs, path)
+    assert path.read_bytes() == before
+
+
+def test_a_study_takes_archived_runs_for_runs(
+    study: Path, small: dict[str, object], tmp_path: Path
+) -> None:
+    methods, situations, seeds = ("td-inner", "td-uniform"), ("mixed",), (0, 1)
+    source = plan(methods, situations, seeds, "quick", study, small)
+    write_archive(finished_runs(scan_runs(source, study)), tmp_path / FILE)
+    planned = plan(methods, situations, seeds, "quick", tmp_path, small)
+    found = scan_runs(planned, tmp_path)
+    assert [one.state for one in found] == ["finished", "finished", "missing", "missing"]
+    assert [run.folder for run in finished_runs(found)] == [one.folder for one in planned[:2]]
+    (whole, *_) = scan_runs(planned, tmp_path, whole=True)
+    assert (whole.state, whole.why) == ("unreadable", "archived, without metrics and steps")
+    other = plan(methods, situations, (0,), "quick", tmp_path, {**small, "td.polyak": 0.5})
+    assert scan_runs(other, tmp_path)[0].why == "td.polyak = 0.02, planned 0.5"
+    planned[0].folder.mkdir(parents=True)  # what lies in the study comes first
+    assert scan_runs(planned, tmp_path)[0].state == "unreadable"
+
+
+def test_archived_runs_give_the_same_report(
+    crossed_study: tuple[Path, list[FinishedRun]], tmp_path: Path
+) -> None:
+    out, runs = crossed_study
+    write_archive(runs, tmp_path / FILE)
+    write_crossed(runs, out, "quick")
+    write_crossed(read_archive(tmp_path / FILE), tmp_path, "quick")
+    for name in (f"crossed.{kind}" for kind in ("md", "json", "csv")):
+        assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
+
+
+def test_what_is_no_archive_is_refused(runs: list[FinishedRun], tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    with pytest.raises(RunError, match="missing, or not a plain file"):
+        read_archive(path)
+    path.write_bytes(b"PAR1, or so")
+    with pytest.raises(RunError, match=r"not a file of innerattn\.archive"):
+        read_archive(path)
+    write_archive(runs[:2], path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-30])
+    with pytest.raises(RunError, match=r"not a file of innerattn\.archive"):
+        read_archive(path)
+    path.write_bytes(whole)
+    (tmp_path / "link").symlink_to(path)
+    with pytest.raises(RunError, match="not a plain file"):
+        read_archive(tmp_path / "link")
+
+    def rewrite(column: str, value: str, version: int = 1) -> None:
+        table = pq.read_table(pa.BufferReader(whole))
+        values = pa.array([value] * len(table))
+        table = table.set_column(table.column_names.index(column), column, values)
+        head = {"format": FORMAT, "schema_version": version, "reward_names": ["rescue"]}
+        pq.write_table(table.replace_schema_metadata({FORMAT: json.dumps(head)}), path)
+
+    rewrite("name", "run", version=2)
+    with pytest.raises(RunError, match="schema version 2, only 1 is known"):
+        read_archive(path)
+    for column in ("config", "info", "summary"):
+        rewrite(column, "{}")
+        with pytest.raises(RunError, match=rf"{FILE}"):
+            read_archive(path)
+
+
+def test_nothing_is_written_of_runs_that_cannot_be_read(
+    runs: list[FinishedRun], tmp_path: Path
+) -> None:
+    (tmp_path / "empty").mkdir()
+    bad = replace(runs[0], read=lambda: [])
+    with pytest.raises(RunError, match="holds no episodes of td-inner"):
+        write_archive([runs[1], bad], tmp_path / FILE)
+    rewards = replace(runs[0].recorded, reward_names=("a", "b", "c", "d"))
+    with pytest.raises(RunError, match="must be the same"):
+        write_archive([runs[1], replace(runs[0], read=lambda: [rewards])], tmp_path / FILE)
+    assert not (tmp_path / FILE).exists()
+
+
+def test_records_without_a_label_of_their_length_are_told_apart(
+    runs: list[FinishedRun], tmp_path: Path
+) -> None:
+    """Records from before the label: of each policy, the second length begins at 0 again."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for name in ("config.toml", "run.json"):
+        (folder / name).write_bytes((runs[0].folder / name).read_bytes())
+    (folder / "evaluation").mkdir()
+    for file in (runs[0].folder / "evaluation").iterdir():
+        target = folder / "evaluation" / file.name
+        if file.suffix != ".parquet":
+            target.write_bytes(file.read_bytes())
+            continue
+        table = pq.read_table(file)
+        head = json.loads(table.schema.metadata[b"innerattn.records"])
+        for record in head["records"]:
+            assert record.pop("length") in ("standard", "long")
+        metadata = {"innerattn.records": json.dumps(head)}
+        pq.write_table(table.replace_schema_metadata(metadata), target)
+    older = read_run(runs[0].case, folder)
+    assert [record.num_episodes for record in older.scored] == [
+        record.num_episodes for record in runs[0].scored
+    ]
+    assert np.array_equal(older.scored[1].rescues, runs[0].scored[1].rescues)
