@@ -17,9 +17,10 @@ from innerattn.config import NetworkConfig
 from innerattn.learn import losses
 from innerattn.learn.adam import AdamStepper, Forward, Stepper
 from innerattn.learn.compiled import traced
+from innerattn.learn.gradients import average_over_robots
 from innerattn.learn.networks import draw_networks
 from innerattn.learn.types import Team
-from innerattn.nn import CriticOutput, action_noise, sample_actions
+from innerattn.nn import CriticOutput, action_noise, robots_of_each_kind, sample_actions
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,9 @@ class ActorCritic:
         self._actor_adam = AdamStepper(self.actor)
         self._critic_adam = AdamStepper(self.critic, critic_weight_decay)
         self._networks = Networks(self._actor_adam, self._critic_adam)
+        self._robots_of_each_kind = None
+        if network.shared_gradients == "mean" and team.kinds is not None:
+            self._robots_of_each_kind = robots_of_each_kind(team.kinds).to(device, dtype)
         self._team = team
         self._updates = 0
 
@@ -139,6 +143,7 @@ class ActorCritic:
             return loss.sum(), loss.detach().mean()
 
         gradients, loss = self._actor_adam.gradients(loss_of)
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         self._actor_adam.step(gradients, _step_size(learning_rate))
         return float(loss)
 

@@ -166,7 +166,7 @@ class PPO(ActorCritic):
             return loss, (loss.detach(), value.detach().mean())
 
         gradients, (loss, mean) = nets.critic.gradients(loss_of)
-        average_over_robots(gradients, self._team.num_robots)
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norm = clip_norm(gradients, config.critic_grad_clip)
         nets.critic.step(gradients, rate)
         return loss, mean, norm
@@ -192,6 +192,7 @@ class PPO(ActorCritic):
             return loss, (loss.detach(), entropy.detach().mean(), taken.detach() - before)
 
         gradients, (loss, entropy, change) = nets.actor.gradients(loss_of)
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norms = clip_norm_by_robot(gradients, config.actor_grad_clip)
         if not self.actor_frozen:
             nets.actor.step(gradients, rate)

@@ -99,14 +99,14 @@ class TD(ActorCritic):
             Network(self.target_actor),
             Network(self.target_critic),
         )
-        self._unpaid_env_steps = 0
+        self._pending_env_steps = 0
 
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
         """Store one control step of E worlds; see `Learner.observe`."""
         del truncated  # a time limit is no termination: the target looks past it
         self.replay.add(batch)
         if len(self.replay) >= min(self._config.warmup_env_steps, self.replay.capacity):
-            self._unpaid_env_steps += len(batch.obs)
+            self._pending_env_steps += len(batch.obs)
 
     @torch.no_grad()
     def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
@@ -128,7 +128,7 @@ class TD(ActorCritic):
             `critic_grad_norm` and `actor_grad_norm` (its mean over robots) are before clipping.
         """
         every = self._config.update_every_env_steps
-        due, self._unpaid_env_steps = divmod(self._unpaid_env_steps, every)
+        due, self._pending_env_steps = divmod(self._pending_env_steps, every)
         if not due:
             return None
         rows = [self.update(self.replay.sample(self._config.batch_size)) for _ in range(due)]
@@ -208,7 +208,7 @@ class TD(ActorCritic):
             return loss, (loss.detach(), q_taken.detach().mean())
 
         gradients, (loss, q_mean) = nets.critic.gradients(loss_of)
-        average_over_robots(gradients, self._team.num_robots)
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norm = clip_norm(gradients, config.critic_grad_clip)
         nets.critic.step(gradients, rate)
         return loss, q_mean, norm
@@ -228,6 +228,7 @@ class TD(ActorCritic):
             return loss, (loss.detach(), entropy)
 
         gradients, (loss, entropy) = nets.actor.gradients(loss_of)
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norms = clip_norm_by_robot(gradients, self._config.actor_grad_clip)
         if not self.actor_frozen:
             nets.actor.step(gradients, rate)

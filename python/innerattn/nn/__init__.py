@@ -15,7 +15,7 @@ from innerattn.nn.critic import Critic, CriticOutput
 from innerattn.nn.encoder import EntityColumns, EntityEncoder
 from innerattn.nn.joint_critic import JointCritic
 from innerattn.nn.linear import PerRobotLinear
-from innerattn.nn.sharing import share_by_kind
+from innerattn.nn.sharing import is_shared_by_kind, robots_of_each_kind, share_by_kind
 
 __all__ = [
     "Actor",
@@ -30,6 +30,8 @@ __all__ = [
     "TeammateAttention",
     "UniformAttention",
     "action_noise",
+    "is_shared_by_kind",
+    "robots_of_each_kind",
     "sample_actions",
     "share_by_kind",
 ]
