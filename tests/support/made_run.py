@@ -12,8 +12,7 @@ from innerattn.evaluate.measure import Evaluation
 from innerattn.evaluate.play import run_episodes
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import FinishedRun, read_run
-from innerattn.measures.competence import STEPS, competence_of
-from innerattn.measures.sharing.imbalance import workload_imbalance
+from innerattn.measures.registry import needed_fields
 from innerattn.measures.summary import summarise
 from innerattn.policies import SCRIPTED, scripted_policy
 from innerattn.records.record import Record
@@ -59,14 +58,10 @@ def made_run(
     recorded = replace(recorded, policy=method, steps={**recorded.steps, "attention": weights})
     rest = replace(run("greedy", SCORED - RECORDED, RECORDED), policy=method)
     long = run_episodes(scripted_policy("greedy", long_worlds, chance), long_worlds, LONG, chance)
-    scripted = {name: [run(name, SCORED, 0, STEPS)] for name in SCRIPTED}
+    scripted = {name: [run(name, SCORED, 0, needed_fields())] for name in SCRIPTED}
     standard = {method: [recorded, rest], **scripted}
     longer = {name: [replace(long, policy=name, length="long")] for name in standard}
-    measures = {
-        name: {**competence_of(records[0]), "imbalance": workload_imbalance(records)}
-        for name, records in standard.items()
-    }
-    summary = summarise(path.name, recorded, standard, longer, measures=measures)
+    summary = summarise(path.name, recorded, standard, longer)
     parts = [record for group in (standard, longer) for all_ in group.values() for record in all_]
     Evaluation(summary, tuple(parts)).write(path / "evaluation")
     return read_run(Case(situation, method, seed), path)

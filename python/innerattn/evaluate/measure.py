@@ -6,7 +6,7 @@ What the figures mean is computed in `summary`, from the records alone.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,8 +14,7 @@ from innerattn.config import EvaluateConfig, Scenario, refuse_late_faults
 from innerattn.config.files import write_whole
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
-from innerattn.measures.competence import STEPS, competence_of
-from innerattn.measures.sharing.imbalance import workload_imbalance
+from innerattn.measures.registry import needed_fields
 from innerattn.measures.summary import Summary, summarise
 from innerattn.policies import SCRIPTED, Policy, scripted_policy
 from innerattn.records.parquet import write_records
@@ -56,7 +55,8 @@ def evaluate_policy(
 ) -> Evaluation:
     """Measure a policy against the scripted ones, all in the same worlds.
 
-    The first `settings.episodes` of the scored episodes are recorded step by step.
+    The first `settings.episodes` of the policy's scored episodes are recorded step by step. Steps
+    of scripted policies are measured and not kept.
 
     Args:
         policy: what is measured.
@@ -111,22 +111,15 @@ def evaluate_policy(
     if scored > settings.episodes:
         rest = run(policy, scenario, scored - settings.episodes, settings.episodes, ())
         standard[policy.name].append(rest)
-    measures = {policy.name: _measured(recorded, standard[policy.name])}
     for name in names:
         chosen = policy if name == policy.name else scripted_policy(name, scenario, settings.seed)
         if chosen is not policy:
-            played = run(chosen, scenario, scored, 0, STEPS)
-            measures[name] = _measured(played, [played])
-            standard[name] = [replace(played, steps={})]
+            standard[name] = [run(chosen, scenario, scored, 0, needed_fields())]
         long[name] = [run(chosen, long_worlds, settings.long_episodes, 0, ())]
+    summary = summarise(label or policy.name, recorded, standard, long, warm_start)
     parts = [record for group in (standard, long) for all_ in group.values() for record in all_]
-    summary = summarise(label or policy.name, recorded, standard, long, warm_start, measures)
-    return Evaluation(summary, tuple(parts))
-
-
-def _measured(recorded: Record, standard: Sequence[Record]) -> dict[str, float | None]:
-    """What is measured of a policy's episodes; imbalance is of all of the standard length."""
-    return {**competence_of(recorded), "imbalance": workload_imbalance(standard)}
+    kept = [part if part is recorded else replace(part, steps={}) for part in parts]
+    return Evaluation(summary, tuple(kept))
 
 
 def evaluate_run(

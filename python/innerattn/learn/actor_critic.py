@@ -121,6 +121,10 @@ class ActorCritic:
             self._update_networks, fullgraph=True, dynamic=False, backend=backend
         )
 
+    def seed_draws(self, seed: int) -> None:
+        """Let the next actions be drawn from ``seed``; see `Learner.seed_draws`."""
+        self._noise.manual_seed(seed)
+
     @torch.no_grad()
     def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
         """Choose actions (E, R) int64 for observations (E, R, D); see `Learner.act`."""

@@ -72,6 +72,9 @@ class Learner(Protocol):
             (E, R) int64, on the device of `obs`.
         """
 
+    def seed_draws(self, seed: int) -> None:
+        """Let the actions that are drawn from now on follow from ``seed`` alone."""
+
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
         """Store one control step of E worlds.
 

@@ -21,7 +21,9 @@ from innerattn.report.paper.table2 import markdown_table
 from innerattn.report.plots.arms import ArmDots, ArmPanel, draw_arms
 from innerattn.report.plots.drawing import check_format, write_figure
 from innerattn.report.smoke import mark_figure, noted_csv, noted_markdown
-from innerattn.stats.seeds import SeedEstimate, seed_estimate
+from innerattn.stats import Estimate
+from innerattn.stats.estimate import as_json
+from innerattn.stats.seeds import seed_estimate
 from innerattn.stats.text import NONE, fixed, p_shown, shown
 
 SCHEMA_VERSION = 1
@@ -242,13 +244,13 @@ def _json(situation: Situation, out: Path) -> dict[str, Any]:
                 "runs": len(runs),
                 "idle": idle_seeds(outcomes, [arm])[0],
                 "mean": {
-                    name: asdict(mean) if (mean := _mean(list(runs.values()), name)) else None
+                    name: mean.to_json() if (mean := _mean(list(runs.values()), name)) else None
                     for name in OUTCOMES
                 },
             }
             for arm, runs in outcomes.items()
         ],
-        "effects": [asdict(effect) for effect in situation.effects],
+        "effects": as_json(situation.effects),
         "runs": [
             {
                 **asdict(run.arm),
@@ -273,12 +275,12 @@ def _panels(situation: Situation) -> list[ArmPanel]:
             mean = _mean(runs, name)
             values = tuple(value for run in runs if (value := getattr(run, name)) is not None)
             bar = None
-            if mean is not None and mean.low is not None and mean.high is not None:
+            if mean is not None and mean.bounded:
                 bar = (mean.mean, mean.low, mean.high)
             dots.append(ArmDots(str(arm), arm.penalty is not None, values, bar))
         panels.append(ArmPanel(situation.name, label, tuple(dots), marks, limits))
     return panels
 
 
-def _mean(runs: Sequence[Outcome], name: str) -> SeedEstimate | None:
+def _mean(runs: Sequence[Outcome], name: str) -> Estimate | None:
     return seed_estimate([getattr(run, name) for run in runs])

@@ -13,7 +13,7 @@ from torch import Tensor
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.learn.types import Learner, Transitions
-from innerattn.policies import PolicyInput, scripted_policy
+from innerattn.policies import PolicyInput, WorldState, scripted_policy
 from innerattn.train.collect import Collector
 
 
@@ -53,7 +53,9 @@ class Imitation:
             that are the script's; `imitation_loss` [nats], the mean over the actors' steps, if
             there were any; the learner's own, where its critic learnt.
         """
-        wanted = torch.from_numpy(self._script.act(PolicyInput.of(self._env, self._env.observe())))
+        wanted = torch.from_numpy(
+            self._script.act(PolicyInput(self._env.observe(), WorldState.of(self._env)))
+        )
         transitions, truncated = self._collector.step()
         self._memory.add(transitions.obs, wanted)
         metrics = {"agreement": float((transitions.actions.cpu() == wanted).float().mean())}

@@ -18,10 +18,10 @@ from innerattn.config import Scenario
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.evaluate.faults.severity import fault_of
 from innerattn.evaluate.play import run_episodes
-from innerattn.measures.faults.retention import Estimate, area, retention
+from innerattn.measures.faults.retention import area, retention
 from innerattn.policies import Policy
 from innerattn.records.record import Record
-from innerattn.stats.intervals import resampled_counts
+from innerattn.stats.resampling import Resampled, resampled_counts
 
 SEVERITIES = (0.25, 0.5, 0.75, 1.0)
 """From harmless (0, which needs no measuring) to the worst (1)."""
@@ -31,8 +31,6 @@ ONSETS = ("start", "middle")
 RESAMPLES = 2000
 """Of the bootstrap that all policies of a grid share."""
 
-MakePolicy = Callable[[], Policy]
-"""Makes a policy that has not acted yet."""
 ProgressCall = Callable[[int, int], None]
 """Called with the episodes done and the episodes to do."""
 
@@ -86,7 +84,7 @@ class Played:
 
 
 def play(
-    policy: MakePolicy,
+    policy: Policy,
     grid: Grid,
     *,
     num_threads: int | None = None,
@@ -95,14 +93,14 @@ def play(
     """Run a policy without and with every fault of the grid.
 
     Args:
-        policy: makes what drives the robots, anew for each fault.
+        policy: what drives the robots; it is reset before each fault.
         grid: the worlds and the faults.
         num_threads: threads that step the worlds; none: all cores.
         progress: called with the number of episodes each time some are done.
     """
 
     def rescues(worlds: Scenario) -> NDArray[np.int64]:
-        record = run_episodes(policy(), worlds, grid.episodes, grid.seed, num_threads=num_threads)
+        record = run_episodes(policy, worlds, grid.episodes, grid.seed, num_threads=num_threads)
         if progress is not None:
             progress(grid.episodes)
         return rescues_by_step(record)
@@ -138,13 +136,13 @@ class Retention:
         late: (K, S, R) retention in the second half of it.
     """
 
-    clean: Estimate
-    cells: Estimate
-    areas: Estimate
-    early: Estimate
-    late: Estimate
+    clean: Resampled
+    cells: Resampled
+    areas: Resampled
+    early: Resampled
+    late: Resampled
 
-    def by_kind(self) -> Estimate:
+    def by_kind(self) -> Resampled:
         """Mean of the areas over robots and onsets, (K,)."""
         return self.areas.mean((1, 2))
 
@@ -155,17 +153,17 @@ def kept(played: Played, grid: Grid) -> Retention:
     steps = played.clean.shape[1]
     half = grid.middle + (steps - grid.middle) // 2
 
-    def since(first: int, last: int, onset: slice | int) -> Estimate:
+    def since(first: int, last: int, onset: slice | int) -> Resampled:
         faulty = played.faulty[:, :, :, onset, :, first:last].sum(-1)
         return retention(faulty, played.clean[:, first:last].sum(-1), weights)
 
     parts = [since(0, steps, 0), since(grid.middle, steps, 1)]
-    cells = Estimate(
+    cells = Resampled(
         np.stack([part.value for part in parts], 3), np.stack([part.resampled for part in parts], 3)
     )
     totals = played.clean.sum(1)
     return Retention(
-        clean=Estimate(np.asarray(totals.mean()), weights @ totals / grid.episodes),
+        clean=Resampled(np.asarray(totals.mean()), weights @ totals / grid.episodes),
         cells=cells,
         areas=area(cells, np.asarray(grid.severities), axis=1),
         early=since(grid.middle, half, 1),
@@ -174,7 +172,7 @@ def kept(played: Played, grid: Grid) -> Retention:
 
 
 def play_all(
-    policies: Sequence[tuple[str, MakePolicy]],
+    policies: Sequence[tuple[str, Policy]],
     grid: Grid,
     *,
     num_threads: int | None = None,
@@ -183,7 +181,7 @@ def play_all(
     """Run policies through the grid, in the same worlds.
 
     Args:
-        policies: names, and what makes each policy.
+        policies: names and policies.
         grid: the worlds and the faults.
         num_threads: threads that step the worlds; none: all cores.
         progress: called each time some episodes are done.

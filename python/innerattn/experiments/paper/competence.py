@@ -9,27 +9,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from innerattn.experiments.paper.workload import workload_imbalance
+from innerattn.experiments.paper.workload import rescues_by_task
 from innerattn.experiments.run import FinishedRun
+from innerattn.measures.registry import MEASURES, measures_of
 from innerattn.policies import SCRIPTED
-from innerattn.stats.seeds import SeedEstimate, seed_estimate
+from innerattn.stats import Estimate
+from innerattn.stats.seeds import seed_estimate
 
 COMPETENCE = {
     "rescues_per_episode": "",
     "score": "0 random play, 1 scripted dispatch",
-    "imbalance": "distance of a share from 0.5",
-    "sooner": "share of choices",
-    "sooner_by_chance": "share of choices",
-    "regret_s": "s",
-    "regret_by_chance_s": "s",
-    "time_to_rescue_s": "s",
-    "time_per_rescue_s": "s",
+    **{
+        name: measure.unit
+        for name, measure in MEASURES.items()
+        if not measure.is_count and name != "rescues_per_episode"
+    },
 }
-"""Figures of competence and their units; the first three are of all episodes, the others of those
-recorded step by step, which with scripted policies are all, too. See `Summary`, `imbalance`,
-`DispatchQuality` and `Waiting`."""
+"""Values of competence and their units: the score (see `measures.summary.Performance`) and
+all `MEASURES` that are no counts. What needs steps is of the episodes recorded step by step, which
+with scripted policies are all."""
 
-_COUNTS = ("choices", "rescued", "left")
+_COUNTS = tuple(name for name, measure in MEASURES.items() if measure.is_count)
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Competence:
     seeds: tuple[int, ...]
     counts: tuple[dict[str, int], ...]
     each: tuple[dict[str, float | None], ...]
-    mean: dict[str, SeedEstimate | None]
+    mean: dict[str, Estimate | None]
 
 
 def competence(group: Sequence[FinishedRun]) -> Competence:
@@ -85,14 +85,20 @@ def _over_runs(
 
 
 def _of_run(run: FinishedRun) -> tuple[dict[str, int], dict[str, float | None]]:
-    """One run's counts and values."""
+    """One run's counts and values.
+
+    Raises:
+        RunError: a task is not one that two robots share.
+    """
+    rescues_by_task(run)
+    measured = _stored(run, run.method)
+    own = {name: _mean(value) for name, value in measures_of(*run.scored).items()}
+    known = {name: value for name, value in own.items() if value is not None}
     score = run.summary["score"]
     return _joined(
         run,
-        run.method,
-        rescues_per_episode=float(run.summary["rescues_per_episode"]["mean"]),
-        score=None if score is None else float(score["mean"]),
-        imbalance=workload_imbalance(run),
+        run.recorded.num_episodes,
+        {**measured, **known, "score": None if score is None else float(score["mean"])},
     )
 
 
@@ -100,21 +106,28 @@ def _of_script(name: str, run: FinishedRun) -> tuple[dict[str, int], dict[str, f
     """A script's counts and values in the worlds of a run."""
     mean = {other: float(of["mean"]) for other, of in run.summary["scripted"].items()}
     least, span = mean["random"], mean["hungarian"] - mean["random"]
-    return _joined(
-        run,
-        name,
-        rescues_per_episode=mean[name],
-        score=(mean[name] - least) / span if run.summary["score"] else None,
-        imbalance=run.summary["measures"][name]["imbalance"],
-    )
+    score = (mean[name] - least) / span if run.summary["score"] else None
+    episodes = int(run.summary["score_episodes"])
+    return _joined(run, episodes, {**_stored(run, name), "score": score})
 
 
 def _joined(
-    run: FinishedRun, policy: str, **values: float | None
+    run: FinishedRun, episodes: int, values: dict[str, float | None]
 ) -> tuple[dict[str, int], dict[str, float | None]]:
-    """Counts and values of a policy; what its evaluation did not measure is None."""
-    measured = run.summary.get("measures", {}).get(policy, {})
-    counts = {"score_episodes": int(run.summary["score_episodes"])}
-    counts["episodes"] = int(measured.get("episodes", run.recorded.num_episodes))
-    counts |= {name: int(measured[name]) for name in _COUNTS if name in measured}
-    return counts, {name: measured.get(name) for name in COMPETENCE} | values
+    """Counts and values; what was not measured is None."""
+    counts = {"score_episodes": int(run.summary["score_episodes"]), "episodes": episodes}
+    counts |= {name: int(value) for name in _COUNTS if (value := values.get(name)) is not None}
+    return counts, {name: values.get(name) for name in COMPETENCE}
+
+
+def _stored(run: FinishedRun, policy: str) -> dict[str, float | None]:
+    """What a run's evaluation stored of a policy's measures at the standard length."""
+    stored = run.summary.get("measures", {}).get(policy, {})
+    return {
+        name: float(value["mean"]) if isinstance(value, dict) else value
+        for name, value in stored.items()
+    }
+
+
+def _mean(value: Estimate | float | int | None) -> float | None:
+    return value.mean if isinstance(value, Estimate) else value

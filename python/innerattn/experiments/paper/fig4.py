@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from innerattn.errors import RunError
 from innerattn.experiments.run import FinishedRun, by_method
-from innerattn.stats.seeds import Array, SeedCurve, SeedEstimate, seed_curve, seed_estimate
+from innerattn.stats import Estimate
+from innerattn.stats.seeds import Array, SeedCurve, seed_curve, seed_estimate
 
 SCHEMA_VERSION = 1
 
@@ -50,9 +51,9 @@ class EntropyCourse:
     robots: tuple[str, ...]
     env_steps: NDArray[np.int64]
     nats: Array
-    begin: SeedEstimate
-    end: SeedEstimate
-    change: SeedEstimate
+    begin: Estimate
+    end: Estimate
+    change: Estimate
 
     @property
     def even_nats(self) -> float:
@@ -85,7 +86,7 @@ class EntropyCourse:
             "nats_by_seed_time_robot_head": self.nats.tolist(),
             "mean": self.mean().to_json(),
             "by_robot": self.by_robot().to_json(),
-            **{name: asdict(getattr(self, name)) for name in ("begin", "end", "change")},
+            **{name: getattr(self, name).to_json() for name in ("begin", "end", "change")},
         }
 
 

@@ -29,6 +29,7 @@ from innerattn.measures.sharing.evenness import (
     evenness_of_runs,
 )
 from innerattn.records.record import Record
+from innerattn.stats.estimate import as_json
 
 SCHEMA_VERSION = 1
 
@@ -117,7 +118,7 @@ class Table2:
             "margin": list(MARGIN),
             "printed_situation": PRINTED_SITUATION,
             "rows": [row.to_json() for row in self.rows],
-            "competence": [asdict(part) for part in self.competence],
+            "competence": as_json(self.competence),
         }
 
 

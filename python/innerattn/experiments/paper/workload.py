@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from innerattn.errors import RunError
 from innerattn.experiments.run import FinishedRun
-from innerattn.measures.sharing import imbalance
+from innerattn.measures.registry import measures_of
+from innerattn.measures.sharing.evenness import counts_by_episode
 
 
 def rescues_by_task(run: FinishedRun) -> dict[str, NDArray[np.int64]]:
@@ -16,7 +17,8 @@ def rescues_by_task(run: FinishedRun) -> dict[str, NDArray[np.int64]]:
     Raises:
         RunError: a task is not one that two robots share.
     """
-    counts = imbalance.rescues_by_task(run.scored)
+    parts = [counts_by_episode(record) for record in run.scored]
+    counts = {task: np.sum([part[task].sum(0) for part in parts], 0) for task in parts[0]}
     for task, by_robot in counts.items():
         if len(by_robot) != 2:
             raise RunError(f"{run.folder}: {task} is shared by {len(by_robot)} robots; must be two")
@@ -33,4 +35,5 @@ def workload_imbalance(run: FinishedRun) -> float | None:
         RunError: a task is not one that two robots share.
     """
     rescues_by_task(run)
-    return imbalance.workload_imbalance(run.scored)
+    value = measures_of(*run.scored)["imbalance"]
+    return value if isinstance(value, float) else None

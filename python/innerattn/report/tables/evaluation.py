@@ -12,7 +12,7 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from innerattn.config import Scenario
-    from innerattn.evaluate import Figures, Interval, Summary
+    from innerattn.evaluate import Estimate, Performance, Summary
 
 _KEY = """\
   random: any action, each with the same chance
@@ -89,19 +89,19 @@ def print_seeds(console: Console, summaries: Mapping[int, Summary | None]) -> No
     console.print(_KEY_OF_SEEDS)
 
 
-def _of_seed(summary: Summary) -> list[Interval | None]:
+def _of_seed(summary: Summary) -> list[Estimate | None]:
     lengths = (summary.standard, summary.long)
     return [x for figures in lengths for x in (figures.rescues_per_episode, figures.score)]
 
 
-def _over_seeds(intervals: Sequence[Interval | None]) -> str:
+def _over_seeds(intervals: Sequence[Estimate | None]) -> str:
     from innerattn.stats.intervals import student_interval
 
     means = [interval.mean for interval in intervals if interval is not None]
     return plus_minus(student_interval(means) if len(means) == len(intervals) else None)
 
 
-def _mean(interval: Interval | None) -> str:
+def _mean(interval: Estimate | None) -> str:
     return "-" if interval is None else f"{interval.mean:.2f}"
 
 
@@ -128,16 +128,16 @@ def _rescues(summary: Summary) -> Table:
     return table
 
 
-def _scripted_cells(figures: Figures, name: str) -> tuple[str, str]:
+def _scripted_cells(figures: Performance, name: str) -> tuple[str, str]:
     means = {policy: interval.mean for policy, interval in figures.scripted.items()}
     span = means["hungarian"] - means["random"]
     score = f"{(means[name] - means['random']) / span:.2f}" if figures.score else "-"
     return plus_minus(figures.scripted[name]), score
 
 
-def plus_minus(interval: Interval | None) -> str:
+def plus_minus(interval: Estimate | None) -> str:
     """A mean and half its interval, as tables show them."""
-    if interval is None or math.isnan(interval.low):
+    if interval is None or not interval.bounded:
         return "-"
     return f"{interval.mean:.2f} ± {(interval.high - interval.low) / 2:.2f}"
 

@@ -13,8 +13,8 @@ from rich.table import Table
 from innerattn.report.tables.evaluation import plus_minus
 
 if TYPE_CHECKING:
-    from innerattn.evaluate import Interval
-    from innerattn.evaluate.bounds.figures import Bounds
+    from innerattn.evaluate import Estimate
+    from innerattn.evaluate.bounds.results import Bounds
     from innerattn.evaluate.faults.grid import Grid, Retention
     from innerattn.measures.faults.shift_results import FaultAttention
 
@@ -85,11 +85,11 @@ def _by_kind(grid: Grid, found: Mapping[str, Retention], heads: Sequence[str]) -
     table = _table("kept", *heads)
     means = {name: kept.by_kind() for name, kept in found.items()}
     for k, kind in enumerate(grid.kinds):
-        table.add_row(_words(kind), *(show(mean[k].interval()) for mean in means.values()))
+        table.add_row(_words(kind), *(show(mean[k].estimate()) for mean in means.values()))
     table.add_section()
-    overall = [show(mean.mean(0).interval()) for mean in means.values()]
+    overall = [show(mean.mean(0).estimate()) for mean in means.values()]
     table.add_row("all kinds", *overall, style="bold")
-    clean = [show(kept.clean.interval()) for kept in found.values()]
+    clean = [show(kept.clean.estimate()) for kept in found.values()]
     table.add_row("rescues", *clean)
     return table
 
@@ -116,7 +116,7 @@ def _after_onset(grid: Grid, kept: Retention) -> Table:
     early, late = kept.early.mean((1, 2)), kept.late.mean((1, 2))
     for k, kind in enumerate(grid.kinds):
         parts = (early[k], late[k], late[k] - early[k])
-        table.add_row(_words(kind), *(plus_minus(part.interval()) for part in parts))
+        table.add_row(_words(kind), *(plus_minus(part.estimate()) for part in parts))
     return table
 
 
@@ -190,5 +190,5 @@ def _share(value: float | None) -> str:
     return "-" if value is None else f"{value:.0%}"
 
 
-def _mean(interval: Interval) -> str:
+def _mean(interval: Estimate) -> str:
     return "-" if math.isnan(interval.mean) else f"{interval.mean:.2f}"
