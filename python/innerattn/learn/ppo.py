@@ -7,7 +7,6 @@ Sources: Schulman et al. 2017; the baseline of Iqbal & Sha 2019, section 3.3.
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -19,6 +18,7 @@ from innerattn.learn.adam import Forward
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
 from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
 from innerattn.learn.networks import draw_networks
+from innerattn.learn.rollout import Rollout, Steps, rows_of, standardised, steps_of
 from innerattn.learn.types import Team, Transitions
 from innerattn.nn import sample_actions
 
@@ -208,44 +208,40 @@ class PPO(ActorCritic):
     def _rollout(self) -> Rollout:
         """The collected steps with their advantages, targets and log-probabilities."""
         config = self._config
-        batches, cut = zip(*self._steps, strict=True)
-        obs = torch.stack([self._robots_first(batch.obs) for batch in batches])  # (T, R, E, D)
-        actions = torch.stack([batch.actions.to(self._device).t() for batch in batches])
-        reward = torch.stack([batch.reward.to(self._device).t() for batch in batches])
-        terminated = torch.stack([batch.terminated.to(self._device) for batch in batches])
-        ended = terminated | torch.stack([flags.to(self._device) for flags in cut])
-        self.scale.update(reward, ended)
+        steps = Steps.stack(self._steps, self._device, self._dtype)
+        self.scale.update(steps.reward, steps.ended)
         scale = self.scale.std(config.return_deviation_floor).unsqueeze(1)
-        reward = (reward / scale).to(self._dtype)
+        reward = (steps.reward / scale).to(self._dtype)
 
-        flat_obs, flat_actions = _rows(obs), _rows(actions)
-        log_prob, taken, baseline = self._evaluate(flat_obs, flat_actions)
-        value = _steps(baseline, len(batches))
+        obs, actions = rows_of(steps.obs), rows_of(steps.actions)
+        log_prob, fitted, baseline = self._evaluate(obs, actions)
+        value = steps_of(baseline, len(reward))
         # Within an episode, the value of the next state is that of the next step. After its last
         # step, and after the last of the rollout, it takes actions drawn for that state.
         next_value = torch.cat([value[1:], torch.zeros_like(value[:1])])
-        drawn = ended.clone()
+        drawn = steps.ended.clone()
         drawn[-1] = True
         step, env = drawn.nonzero(as_tuple=True)
-        after = torch.stack([self._robots_first(batch.next_obs) for batch in batches])
-        after = after[step, :, env].transpose(0, 1)  # (R, n, D)
+        after = steps.next_obs[step, :, env].transpose(0, 1)  # (R, n, D)
         logits = self.actor(after)
         next_actions = sample_actions(logits, self._draw(logits.shape))
         next_value[step, :, env] = self._evaluate(after, next_actions)[2].t()
         advantage = generalised_advantage(
-            reward, value, next_value, terminated, ended, config.gamma, config.gae_lambda
+            reward,
+            value,
+            next_value,
+            steps.terminated,
+            steps.ended,
+            config.gamma,
+            config.gae_lambda,
         )
-        target = _rows(advantage + value)
-        advantage = _rows(advantage)
-        centred = advantage - advantage.mean(dim=1, keepdim=True)
-        spread = advantage.std(dim=1, correction=0, keepdim=True)
         return Rollout(
-            obs=flat_obs,
-            actions=flat_actions,
-            log_prob=losses.gather_actions(log_prob, flat_actions),
-            value=taken,
-            advantage=centred / (spread + 1e-8),
-            target=target,
+            obs=obs,
+            actions=actions,
+            log_prob=losses.gather_actions(log_prob, actions),
+            value=fitted,
+            advantage=standardised(rows_of(advantage)),
+            target=rows_of(advantage + value),
         )
 
     def _evaluate(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
@@ -277,37 +273,3 @@ class PPO(ActorCritic):
             "scale.mean": scale.mean,
             "scale.squares": scale.squares,
         }
-
-
-class Rollout(NamedTuple):
-    """Rows of a rollout, robots first.
-
-    Attributes:
-        obs: (R, B, D).
-        actions: (R, B) int64.
-        log_prob: (R, B) of the actions, under the policy that acted.
-        value: (R, B) the critic's, when the steps were collected.
-        advantage: (R, B), with mean 0 and standard deviation 1 over the rollout for each robot.
-        target: (R, B) for the critic's values.
-    """
-
-    obs: Tensor
-    actions: Tensor
-    log_prob: Tensor
-    value: Tensor
-    advantage: Tensor
-    target: Tensor
-
-    def take(self, rows: Tensor) -> Rollout:
-        """Some rows, by their indices (n,) int64."""
-        return Rollout._make(tensor[:, rows] for tensor in self)
-
-
-def _rows(steps: Tensor) -> Tensor:
-    """Bring (T, R, E, ...) to (R, T * E, ...)."""
-    return steps.transpose(0, 1).flatten(1, 2)
-
-
-def _steps(rows: Tensor, count: int) -> Tensor:
-    """Bring (R, T * E) back to (T, R, E)."""
-    return rows.view(len(rows), count, -1).transpose(0, 1)
