@@ -25,7 +25,7 @@ from innerattn.report.smoke import mark_figure, noted_csv, noted_markdown
 from innerattn.stats import Estimate
 from innerattn.stats.estimate import as_json
 from innerattn.stats.seeds import seed_estimate
-from innerattn.stats.text import NONE, fixed, p_shown, shown
+from innerattn.stats.text import NONE, format_estimate, format_number, format_p
 
 SCHEMA_VERSION = 1
 
@@ -183,10 +183,10 @@ def _arms_table(situation: Situation) -> str:
         rows.append(
             [
                 *(str(arm), str(len(runs))),
-                *(shown(_mean(runs, name)) for name in ("imbalance", "least_share")),
+                *(format_estimate(_mean(runs, name)) for name in ("imbalance", "least_share")),
                 idle_shown(outcomes, [arm]),
-                *(shown(_mean(runs, name)) for name in ("rescues_per_episode", "score")),
-                shown(_mean(runs, "entropy_share"), 3),
+                *(format_estimate(_mean(runs, name)) for name in ("rescues_per_episode", "score")),
+                format_estimate(_mean(runs, "entropy_share"), 3),
             ]
         )
     return markdown_table(head, rows)
@@ -204,8 +204,8 @@ def _effects_table(situation: Situation) -> str:
             rows.append([*cells, *[NONE] * 5])
             continue
         alike = f"{found.margin:g}: {'yes' if found.equivalent else 'not shown'}"
-        cells += [shown(found.difference, 3), shown(found.hedges_g, 1)]
-        rows.append([*cells, p_shown(found.p), p_shown(effect.holm_p), alike])
+        cells += [format_estimate(found.difference, 3), format_estimate(found.hedges_g, 1)]
+        rows.append([*cells, format_p(found.p), format_p(effect.holm_p), alike])
     return markdown_table(head, rows)
 
 
@@ -220,7 +220,7 @@ def _runs_table(situations: Sequence[Situation], out: Path) -> str:
             rows.append(
                 [
                     *(situation.name, str(run.arm), str(run.seed)),
-                    *(NONE if value is None else fixed(value) for value in figures),
+                    *(NONE if value is None else format_number(value) for value in figures),
                     f"`{named_from(run.folder, out)}`",
                     *(f"`{digest}`" for digest in (run.digests.config, run.digests.weights)),
                 ]

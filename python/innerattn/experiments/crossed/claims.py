@@ -14,7 +14,7 @@ from innerattn.experiments.crossed.outcome import IDLE, Outcomes, by_seed
 from innerattn.experiments.paper.claims import EVEN_ENTROPY, Holds
 from innerattn.stats import Estimate
 from innerattn.stats.seeds import seed_estimate
-from innerattn.stats.text import NONE, shown
+from innerattn.stats.text import NONE, format_estimate
 
 LEAST_WITHOUT_IDLE = 10
 """So many seeds without an idle robot say that there is none; fewer say nothing."""
@@ -126,7 +126,8 @@ def _of_effect(effect: Effect, sign: float) -> tuple[str, Holds]:
     found = effect.found
     if found is None:
         return NONE, "undecided"
-    measured = f"{effect.name}: {shown(found.difference)}, g {shown(found.hedges_g, 1)}"
+    difference, g = format_estimate(found.difference), format_estimate(found.hedges_g, 1)
+    measured = f"{effect.name}: {difference}, g {g}"
     low, high = sorted((sign * found.difference.low, sign * found.difference.high))
     if low > 0.0:
         return measured, "yes"
@@ -138,7 +139,7 @@ def _makes_even(situation: str, outcomes: Outcomes) -> Answer:
     rows = by_seed(outcomes, [arm for arms in groups.values() for arm in arms], "imbalance")
     inner, uniform = rows[:, : len(groups["inner"])].mean(axis=1), rows[:, -1]
     means = [seed_estimate(values.tolist()) for values in (inner, uniform, inner - uniform / 2.0)]
-    with_, without, left = (shown(mean) for mean in means)
+    with_, without, left = (format_estimate(mean) for mean in means)
     holds: Holds = "undecided"
     if _ends(means[1])[0] > LEAST_UNEVEN:
         low, high = _ends(means[2])
@@ -184,7 +185,7 @@ def _even_in_all(outcomes: Outcomes, groups: Mapping[str, Sequence[Arm]]) -> tup
     """Whether sharing is even in all groups of arms, by their names."""
     means = {name: _mean(outcomes, arms, "imbalance") for name, arms in groups.items()}
     measured = "; ".join(
-        f"{name}: {shown(means[name])}, idle {idle_shown(outcomes, arms)}"
+        f"{name}: {format_estimate(means[name])}, idle {idle_shown(outcomes, arms)}"
         for name, arms in groups.items()
     )
     idle = any(idle_seeds(outcomes, arms)[0] for arms in groups.values())
@@ -206,4 +207,4 @@ def _held_even(situation: str, outcomes: Outcomes) -> Answer:
     elif high < EVEN_ENTROPY:
         holds = "no"
     claim = f"a penalty of {PENALTIES[-1]:g} holds attention even"
-    return Answer(claim, situation, f"share of ln(N - 1): {shown(mean, 3)}", holds)
+    return Answer(claim, situation, f"share of ln(N - 1): {format_estimate(mean, 3)}", holds)
