@@ -4,13 +4,14 @@ import pytest
 import torch
 from torch import Tensor
 
-from innerattn.config.run import NetworkConfig, PPOConfig, TDConfig
+from innerattn.config import NetworkConfig, PPOConfig, TDConfig
 from innerattn.learn import PPO, TD, Team, Transitions
 from innerattn.learn.actor_critic import ActorCritic
 from innerattn.nn import EntityColumns
 
 NETWORK = {"hidden_width": 8, "attention_heads": 2}
 AVAILABLE = 4  # column of the observation
+BY_KIND = {"attention": "inner", "parameter_sharing": "kind"}
 ENTITIES = {"attention": "inner", "encoder": "entities"}
 ENVS, STEPS = 6, 4
 
@@ -25,16 +26,20 @@ def columns(robots: int) -> EntityColumns:
 
 
 def make(algorithm: str, robots: int, network: dict, numbers: dict) -> ActorCritic:
-    team = Team(robots, columns(robots).width, 3)
+    team = Team(
+        robots,
+        columns(robots).width,
+        3,
+        kinds=("one", *["another"] * (robots - 1)),
+        availability_column=AVAILABLE,
+        entities=columns(robots),
+    )
     given = NetworkConfig(**NETWORK, **network)
     common = {"critic_weight_decay": 0.01, "attention_logit_penalty": 0.1, **numbers}
     extra = {
         "seed": 3,
         "device": torch.device("cpu"),
         "dtype": torch.float64,
-        "availability_column": AVAILABLE,
-        "entities": columns(robots),
-        "kinds": ["one", *["another"] * (robots - 1)],
     }
     if algorithm == "td":
         few = {"batch_size": 7, "warmup_env_steps": 0, "update_every_env_steps": 12}
@@ -58,7 +63,7 @@ def learn(learner: ActorCritic, robots: int) -> list[dict[str, float]]:
     found = []
     for step in range(2 * STEPS):
         learner.observe(transitions(robots, step), torch.zeros(ENVS, dtype=torch.bool))
-        learner.reach(step / (2 * STEPS))
+        learner.set_progress(step / (2 * STEPS))
         metrics = learner.learn()
         found += [] if metrics is None else [metrics]
     return found
@@ -107,7 +112,7 @@ def test_the_traced_update_agrees_by_entities() -> None:
 
 
 def test_the_traced_update_agrees_by_kind() -> None:
-    agree("td", 4, "aot_eager", {"attention": "inner", "parameter_sharing": "kind"}, {})
+    agree("td", 4, "aot_eager", {**BY_KIND, "shared_gradients": "mean"}, {})
 
 
 @pytest.mark.parametrize("algorithm", ["td", "ppo"])
@@ -118,7 +123,7 @@ def test_the_compiled_update_agrees(algorithm: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "network",
-    [ENTITIES, {"attention": "inner", "parameter_sharing": "kind"}],
+    [ENTITIES, BY_KIND],
     ids=["entities", "kind"],
 )
 def test_the_compiled_update_agrees_with_other_networks(network: dict) -> None:

@@ -17,8 +17,7 @@ from innerattn.experiments.crossed.claims import Answer, answers
 from innerattn.experiments.crossed.effects import contrasts, effects
 from innerattn.experiments.crossed.outcome import Outcome, outcome_of
 from innerattn.experiments.plan import PlannedRun
-from innerattn.experiments.run import StudyRun, read_measured
-from innerattn.experiments.scan import FinishedRun
+from innerattn.experiments.run import FinishedRun
 from innerattn.report.crossed import write_crossed
 from innerattn.train.weights import digest_of
 
@@ -259,8 +258,8 @@ def test_where_half_the_unevenness_may_be_gone_nothing_is_said() -> None:
     assert said(outcomes)[MAKES_EVEN].holds == "undecided"
 
 
-def test_outcome_against_a_plain_loop(runs: list[StudyRun]) -> None:
-    measured = read_measured(runs[0])
+def test_outcome_against_a_plain_loop(runs: list[FinishedRun]) -> None:
+    measured = runs[0]
     found = outcome_of(measured)
     scenario = measured.recorded.scenario
     by_index = dict(enumerate(task.name for task in scenario.tasks))
@@ -280,14 +279,14 @@ def test_outcome_against_a_plain_loop(runs: list[StudyRun]) -> None:
     assert found.entropy_share == pytest.approx(shares.mean())
 
 
-def test_a_task_that_two_robots_do_not_share_is_refused(runs: list[StudyRun]) -> None:
-    measured = read_measured(runs[0])
+def test_a_task_that_two_robots_do_not_share_is_refused(runs: list[FinishedRun]) -> None:
+    measured = runs[0]
     robots = measured.recorded.scenario.robots
     third = robots[0].model_copy(update={"name": "food_2"})
     changed = measured.recorded.scenario.replace(robots=[*robots, third])
     scored = tuple(replace(record, scenario=changed) for record in measured.scored)
     with pytest.raises(RunError, match="is shared by 3 robots; must be two"):
-        outcome_of(replace(measured, scored=scored))
+        outcome_of(replace(measured, read=lambda: scored))
 
 
 def test_files_are_the_same_twice_and_name_every_run(
@@ -318,8 +317,8 @@ def test_files_are_the_same_twice_and_name_every_run(
     for row, of_json in zip(rows, situation["runs"], strict=True):
         case = by_folder[of_json["folder"]]
         arm = arm_of(case)
-        own = StudyRun(case.situation, case.method, case.seed, out / of_json["folder"])
-        expected = outcome_of(read_measured(own))
+        (own,) = [run for run in runs if out / of_json["folder"] == run.folder]
+        expected = outcome_of(own)
         penalty = "" if arm.penalty is None else str(arm.penalty)
         assert (row["method"], row["credit"], row["penalty"]) == (arm.method, arm.credit, penalty)
         assert (row["seed"], row["shared"]) == (str(case.seed), str(arm.shared))

@@ -5,13 +5,56 @@ It knows no field of any model.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
-from pydantic_core import PydanticCustomError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
+from pydantic.fields import FieldInfo
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from innerattn.errors import ConfigError
+
+MOST_ROWS = 1_000_000_000
+"""Upper limit of what is held in memory: far beyond what any machine holds."""
+MOST_STEPS = 1_000_000_000_000_000
+"""Upper limit of what is counted in steps."""
+
+
+ADDED_LATER = "added later"
+"""Annotates a key that came after runs had been published. At its default such a key is no part of
+a digest, so that the digests of earlier runs stay what they were; its default must never change."""
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """Annotates a word that must be one of a list, which extensions may add to.
+
+    Attributes:
+        words: Gives the list when a value is checked.
+    """
+
+    words: Callable[[], Iterable[str]]
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Check the word after its type."""
+        return core_schema.no_info_after_validator_function(self._check, handler(source))
+
+    def _check(self, value: str) -> str:
+        *others, last = (repr(word) for word in self.words())
+        if repr(value) not in (*others, last):
+            known = f"{', '.join(others)} or {last}"
+            raise PydanticCustomError("word", "Input should be {known}", {"known": known})
+        return value
 
 
 class Model(BaseModel):
@@ -46,6 +89,27 @@ class Model(BaseModel):
             return self.model_validate(self.model_dump() | fields)
         except ValidationError as error:
             raise config_error(error, self.place) from error
+
+
+def values_for_digest(model: BaseModel) -> dict[str, Any]:
+    """JSON values of a model by key, without keys `ADDED_LATER` that have their default."""
+    known, values = type(model).model_fields, model.model_dump(mode="json")
+    for name, value in model:
+        info = known.get(name)
+        if info is not None and ADDED_LATER in info.metadata and value == _default(info):
+            del values[name]
+        elif isinstance(value, BaseModel):
+            values[name] = values_for_digest(value)
+        elif isinstance(value, tuple):
+            values[name] = [
+                values_for_digest(part) if isinstance(part, BaseModel) else given
+                for part, given in zip(value, values[name], strict=True)
+            ]
+    return values
+
+
+def _default(info: FieldInfo) -> object:
+    return info.get_default(call_default_factory=True)
 
 
 def _types(annotation: Any) -> Iterator[Any]:

@@ -5,12 +5,17 @@ It knows nothing of environments, losses or files.
 """
 
 from innerattn.nn.actor import Actor, action_noise, sample_actions
-from innerattn.nn.attention import Attended, InnerAttention, UniformAttention
+from innerattn.nn.attention import (
+    Attended,
+    InnerAttention,
+    TeammateAttention,
+    UniformAttention,
+)
 from innerattn.nn.critic import Critic, CriticOutput
 from innerattn.nn.encoder import EntityColumns, EntityEncoder
 from innerattn.nn.joint_critic import JointCritic
 from innerattn.nn.linear import PerRobotLinear
-from innerattn.nn.sharing import share_by_kind
+from innerattn.nn.sharing import is_shared_by_kind, robots_of_each_kind, share_by_kind
 
 __all__ = [
     "Actor",
@@ -22,8 +27,11 @@ __all__ = [
     "InnerAttention",
     "JointCritic",
     "PerRobotLinear",
+    "TeammateAttention",
     "UniformAttention",
     "action_noise",
+    "is_shared_by_kind",
+    "robots_of_each_kind",
     "sample_actions",
     "share_by_kind",
 ]

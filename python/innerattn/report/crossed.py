@@ -15,8 +15,7 @@ from innerattn.experiments.crossed.arms import ARMS, Arm, arm_of
 from innerattn.experiments.crossed.claims import RULES, Answer, answers, idle_seeds, idle_shown
 from innerattn.experiments.crossed.effects import MARGINS, Effect, effects
 from innerattn.experiments.crossed.outcome import IDLE, OUTCOMES, Outcome, outcome_of
-from innerattn.experiments.run import Digests, StudyRun, digests, named_from, read_measured
-from innerattn.experiments.scan import FinishedRun
+from innerattn.experiments.run import FinishedRun, named_from
 from innerattn.experiments.smoke import smoke_note
 from innerattn.report.paper.table2 import markdown_table
 from innerattn.report.plots.arms import ArmDots, ArmPanel, draw_arms
@@ -44,21 +43,16 @@ _DRAWN = {
 
 @dataclass(frozen=True)
 class CrossedRun:
-    """A run of the design.
-
-    Attributes:
-        arm: how it was trained.
-        seed: of its training.
-        folder: the run folder.
-        digests: what tells it from any other.
-        outcome: its figures.
-    """
+    """A run of the design: how it was trained, and what it shows."""
 
     arm: Arm
-    seed: int
-    folder: Path
-    digests: Digests
+    run: FinishedRun
     outcome: Outcome
+
+    @property
+    def seed(self) -> int:
+        """The seed of its training."""
+        return self.run.seed
 
 
 @dataclass(frozen=True)
@@ -94,7 +88,6 @@ def write_crossed(
     Raises:
         RunError: a run's evaluation is missing or is not one of two food robots; or matplotlib is
             not installed.
-        ConfigError: a configuration cannot be read.
         OSError: a file cannot be written; each is written whole or not at all.
     """
     check_format(out / "crossed.png")
@@ -125,7 +118,7 @@ def _situation(name: str, runs: Sequence[FinishedRun]) -> Situation:
     own = [run for run in runs if run.case.situation == name]
     order = {arm: index for index, arm in enumerate(ARMS)}
     own.sort(key=lambda run: (order[arm_of(run.case)], run.case.seed))
-    found = tuple(_run(run) for run in own)
+    found = tuple(CrossedRun(arm_of(run.case), run, outcome_of(run)) for run in own)
     outcomes = _by_arm(found)
     compared = tuple(effects(name, outcomes))
     return Situation(name, found, compared, tuple(answers(name, outcomes, compared)))
@@ -133,15 +126,6 @@ def _situation(name: str, runs: Sequence[FinishedRun]) -> Situation:
 
 def _by_arm(runs: Sequence[CrossedRun]) -> dict[Arm, dict[int, Outcome]]:
     return {arm: {run.seed: run.outcome for run in runs if run.arm == arm} for arm in ARMS}
-
-
-def _run(run: FinishedRun) -> CrossedRun:
-    case = run.case
-    labelled = StudyRun(case.situation, case.method, case.seed, run.folder)
-    measured = read_measured(labelled, step_by_step=False)
-    return CrossedRun(
-        arm_of(case), case.seed, run.folder, digests(run.folder), outcome_of(measured)
-    )
 
 
 def _markdown(
@@ -221,8 +205,9 @@ def _runs_table(situations: Sequence[Situation], out: Path) -> str:
                 [
                     *(situation.name, str(run.arm), str(run.seed)),
                     *(NONE if value is None else format_number(value) for value in figures),
-                    f"`{named_from(run.folder, out)}`",
-                    *(f"`{digest}`" for digest in (run.digests.config, run.digests.weights)),
+                    f"`{named_from(run.run.folder, out)}`",
+                    f"`{run.run.config_sha256}`",
+                    f"`{run.run.weights_sha256}`" if run.run.weights_sha256 else NONE,
                 ]
             )
     return markdown_table(head, rows)
@@ -271,10 +256,10 @@ def _json(situation: Situation, out: Path) -> dict[str, Any]:
                 **asdict(run.arm),
                 "method": run.arm.method,
                 "seed": run.seed,
-                "folder": named_from(run.folder, out),
+                "folder": named_from(run.run.folder, out),
                 **asdict(run.outcome),
-                "config_sha256": run.digests.config,
-                "weights_sha256": run.digests.weights,
+                "config_sha256": run.run.config_sha256,
+                "weights_sha256": run.run.weights_sha256,
             }
             for run in situation.runs
         ],

@@ -35,7 +35,7 @@ class Imitation:
         capacity = min(self._config.memory_env_steps, self._config.env_steps + env.num_envs)
         shape = (capacity, env.num_robots, env.obs_width)
         self._memory = _Memory(shape, config.train.seed)
-        self._unpaid_env_steps = 0
+        self._pending_env_steps = 0
 
     @property
     def env_steps(self) -> int:
@@ -70,8 +70,10 @@ class Imitation:
     def _imitate(self, share: float) -> list[float]:
         """Do the steps of the actors that are due; their losses."""
         config = self._config
-        self._unpaid_env_steps += self._env.num_envs
-        due, self._unpaid_env_steps = divmod(self._unpaid_env_steps, config.update_every_env_steps)
+        self._pending_env_steps += self._env.num_envs
+        due, self._pending_env_steps = divmod(
+            self._pending_env_steps, config.update_every_env_steps
+        )
         rate = config.learning_rate * (1.0 - (1.0 - config.final_learning_rate_share) * share)
         return [
             self._learner.imitate(*self._memory.sample(config.batch_size), rate) for _ in range(due)

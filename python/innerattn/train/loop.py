@@ -29,8 +29,8 @@ from innerattn.train.collect import Collector
 from innerattn.train.compilation import compiles
 from innerattn.train.imitate import Imitation
 from innerattn.train.interruption import heard_interruptions
+from innerattn.train.matmul_backend import best_matmul_backend
 from innerattn.train.metrics import Interval, Metrics, MetricsFile, refuse_divergence
-from innerattn.train.products import best_products
 
 Stage = Literal["imitating", "training"]
 Step = Callable[[float], tuple[Transitions, Mapping[str, float] | None]]
@@ -81,7 +81,11 @@ def train(
     refuse_existing(path)
     keep_heap_small()
     threads = thread_count(config)
-    with torch_threads(threads), best_products() as products, heard_interruptions() as check:
+    with (
+        torch_threads(threads),
+        best_matmul_backend() as matmul_backend,
+        heard_interruptions() as check,
+    ):
         env = BatchEnv(
             config.scenario,
             config.train.num_envs,
@@ -96,7 +100,7 @@ def train(
                 learner.compile()
             warm = config.train.warm_start != "none"
             imitation = Imitation(config, env, learner, collector) if warm else None
-            folder = RunFolder.create(path, config, threads, compiled, products)
+            folder = RunFolder.create(path, config, threads, compiled, matmul_backend)
             loop = _Loop(config, folder, learner, collector, env.robot_names, progress, check)
             loop.run(imitation)
     return path
@@ -179,7 +183,7 @@ class _Loop:
         """Collect and learn, with ``share`` of the budget spent."""
         transitions, truncated = self._collector.step()
         self._learner.observe(transitions, truncated)
-        self._learner.reach(share)
+        self._learner.set_progress(share)
         return transitions, self._learner.learn()
 
     def _log(self, newest: Transitions) -> None:

@@ -16,7 +16,7 @@ from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence, evidence
 from innerattn.experiments.paper.sharing_claims import judged, sharing_claims
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
-from innerattn.experiments.run import StudyRun, read_measured
+from innerattn.experiments.run import FinishedRun
 from innerattn.measures.sharing.evenness import evenness, evenness_of_runs
 from innerattn.stats import Estimate
 from innerattn.stats.seeds import seed_estimate
@@ -117,8 +117,8 @@ def test_claims_about_entropy(
 
 
 @pytest.fixture(scope="module")
-def found(runs: list[StudyRun]) -> Evidence:
-    found = evidence([read_measured(runs[0])])
+def found(runs: list[FinishedRun]) -> Evidence:
+    found = evidence([runs[0]])
     assert found is not None
     return found
 

@@ -1,7 +1,7 @@
 """How far attention may move when one robot's input moves: the two sides of every inequality.
 
 Pure functions of tensors. A logit is S_ij = q_i . k_j / sqrt(d), what the softmax takes. Robot j,
-the first dimension, is the one that is changed. The proofs are in docs/robustness.md.
+the first dimension, is the one that is changed. The proofs are in docs/attention-bound.md.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The robustness bounds of eqs. 6-10, held against trained networks in states of their own play.
 
-The inequalities and their proofs are in docs/robustness.md. It measures networks; what the team
-achieves with a faulty robot is not measured here.
+The inequalities and their proofs are in docs/attention-bound.md. It measures networks; what the
+team achieves with a faulty robot is not measured here.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.errors import RunError
-from innerattn.experiments.run import StudyRun, by_method
+from innerattn.experiments.run import FinishedRun, by_method
 from innerattn.stats import Estimate
 from innerattn.stats.seeds import Array, SeedCurve, seed_curve, seed_estimate
 
@@ -90,7 +90,7 @@ class EntropyCourse:
         }
 
 
-def fig4(runs: Sequence[StudyRun]) -> list[EntropyCourse]:
+def fig4(runs: Sequence[FinishedRun]) -> list[EntropyCourse]:
     """Entropy courses of all methods with attention.
 
     Returns:
@@ -113,7 +113,7 @@ def fig4_json(courses: Sequence[EntropyCourse]) -> dict[str, Any]:
     }
 
 
-def _course(group: Sequence[StudyRun]) -> EntropyCourse | None:
+def _course(group: Sequence[FinishedRun]) -> EntropyCourse | None:
     tables = [_entropies(run) for run in group]
     if not all(tables):
         return None
@@ -140,7 +140,7 @@ def _course(group: Sequence[StudyRun]) -> EntropyCourse | None:
     )
 
 
-def _entropies(run: StudyRun) -> dict[int, dict[str, list[float]]]:
+def _entropies(run: FinishedRun) -> dict[int, dict[str, list[float]]]:
     """Entropy by env-steps, robot and head; empty where the method has none."""
     path = run.folder / "metrics.jsonl"
     try:

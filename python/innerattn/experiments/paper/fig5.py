@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.experiments.run import Measured
+from innerattn.experiments.run import FinishedRun
 from innerattn.measures.cooperation import shared_abilities
 from innerattn.measures.sharing.handoff import (
     HANDOFF,
@@ -185,7 +185,7 @@ class _Run(NamedTuple):
     left_out: int
 
 
-def evidence(group: Sequence[Measured]) -> Evidence | None:
+def evidence(group: Sequence[FinishedRun]) -> Evidence | None:
     """Attention around handoffs in runs of one situation and method.
 
     Returns:
@@ -205,9 +205,9 @@ def evidence(group: Sequence[Measured]) -> Evidence | None:
     own = tuple(None if pair is None else pair[0] - pair[1] for pair in pairs)
     beyond_half = tuple(None if pair is None else 0.5 * pair[0] - pair[1] for pair in pairs)
     return Evidence(
-        situation=group[0].run.situation,
-        method=group[0].run.method,
-        seeds=tuple(measured.run.seed for measured in group),
+        situation=group[0].situation,
+        method=group[0].method,
+        seeds=tuple(measured.seed for measured in group),
         handoffs=tuple(run.robot.handoffs if run.robot else 0 for run in runs),
         left_out=tuple(run.left_out for run in runs),
         episodes=tuple(run.robot.episodes if run.robot else 0 for run in runs),

@@ -95,7 +95,7 @@ def _of_seed(summary: Summary) -> list[Estimate | None]:
 
 
 def _over_seeds(intervals: Sequence[Estimate | None]) -> str:
-    from innerattn.evaluate import student_interval
+    from innerattn.stats.student import student_interval
 
     means = [interval.mean for interval in intervals if interval is not None]
     return plus_minus(student_interval(means) if len(means) == len(intervals) else None)

@@ -12,8 +12,8 @@ from rich.table import Table
 from innerattn.report.tables.evaluation import plus_minus
 
 if TYPE_CHECKING:
+    from innerattn.experiments.run import Scores
     from innerattn.experiments.scan import RunStatus
-    from innerattn.experiments.scores import Scores
 
 _KEY = """\
   score: 0 plays like random, 1 like hungarian
@@ -27,17 +27,11 @@ def print_scores(console: Console, found: Sequence[RunStatus]) -> None:
     Args:
         console: where to.
         found: what is there of each run, whether it can be used or not.
-
-    Raises:
-        RunError: a finished run has changed since it was found.
     """
-    from innerattn.experiments.scores import read_scores
-
     cells: dict[tuple[str, str], list[tuple[Scores, Scores] | None]] = {}
     for one in found:
         planned = one.planned
-        usable = one.state == "finished"
-        measured = read_scores(planned.folder, planned.config) if usable else None
+        measured = one.run.scores() if one.run else None
         cells.setdefault((planned.case.situation, planned.case.trained), []).append(measured)
     lengths = next((two for runs in cells.values() for two in runs if two is not None), None)
     if lengths is None:
@@ -73,7 +67,7 @@ def _figures(runs: Sequence[tuple[Scores, Scores]]) -> list[str]:
 
 
 def _over_seeds(values: Sequence[float | None]) -> str:
-    from innerattn.evaluate import student_interval
+    from innerattn.stats.student import student_interval
 
     known = [value for value in values if value is not None]
     if not known or len(known) < len(values):
