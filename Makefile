@@ -18,7 +18,7 @@ test: setup lint ## every check but the long one
 	pytest -n auto --dist worksteal
 
 test-slow: setup ## the long checks: ten million env-steps of contacts, compilers at their slowest
-	INNERATTN_SLOW=1 cargo test --quiet --test containment
+	INNERATTN_SLOW=1 cargo test --quiet --test worlds containment
 	pytest -m slow
 
 lint: setup ## formatting, lints, types, stub, import floors

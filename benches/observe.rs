@@ -2,6 +2,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use innerattn_env::batch::{Autoreset, Batch, Options};
+use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Robot, Scenario};
 
 fn observe(criterion: &mut Criterion) {
@@ -15,7 +16,7 @@ fn observe(criterion: &mut Criterion) {
             first_env: 0,
             autoreset: Autoreset::SameStep,
         };
-        let batch = Batch::new(scenario, options).expect("a valid scenario");
+        let batch = Batch::new(Rules::new(scenario).expect("a valid scenario"), options).expect("a batch");
         let mut obs = vec![0.0; 256 * robots * batch.rules().layout.width()];
         group.throughput(Throughput::Elements(256));
         group.bench_function(BenchmarkId::new("robots", robots), |bencher| {

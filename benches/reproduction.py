@@ -2,8 +2,8 @@
 
 `python benches/reproduction.py STUDY` fills the places of STUDY's newest report: of budget `short`
 in `docs/reproduction.md`, of budget `paper` in `docs/paper_protocol.md`, and of the crossed design
-in `docs/crossed.md`. A page opens with the table of claims; the rest stands below. Small copies of
-its runs go to the page's folder in `docs/records`. It makes no figure.
+in `docs/crossed.md`. A page opens with the table of claims; the rest stands below. Its runs go to
+an archive in `docs/records`. It makes no figure.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from typing import Any
 from page import CROSSED, PAPER_PROTOCOL, REPRODUCTION, publish
 
 from innerattn.errors import InnerattnError
-from innerattn.experiments.archive import keep
-from innerattn.experiments.run import StudyRun
+from innerattn.experiments.archive import write_archive
+from innerattn.experiments.plan import Case
+from innerattn.experiments.run import read_run
 
 PLACES = {
     ("report.md", "short"): (REPRODUCTION, "reproduction"),
@@ -49,7 +50,7 @@ def main() -> None:
         )
     page, pictures = place
     try:
-        _keep_runs(account["runs"], study, DOCS / "records" / page.stem)
+        _archive(account["runs"], study, DOCS / "records" / f"{page.stem}.parquet")
     except InnerattnError as error:
         sys.exit(str(error))
     claims, full = _with_pictures(study / name, pictures).split("\n### ", 1)
@@ -68,12 +69,14 @@ def _with_pictures(report: Path, prefix: str) -> str:
     return re.sub("^#", "##", text, flags=re.MULTILINE).strip()
 
 
-def _keep_runs(runs: list[dict[str, Any]], study: Path, records: Path) -> None:
-    """Small copies of the runs that a report is made of."""
+def _archive(runs: list[dict[str, Any]], study: Path, path: Path) -> None:
+    """Write the runs that a report is made of into one file."""
+    finished = []
     for run in runs:
         if run["state"] == "finished":
-            labelled = StudyRun(run["situation"], run["method"], run["seed"], study / run["folder"])
-            keep(labelled, records / run["folder"])
+            case = Case(run["situation"], run["method"], run["seed"], run["variant"])
+            finished.append(read_run(case, study / run["folder"], steps=False))
+    write_archive(finished, path)
 
 
 if __name__ == "__main__":

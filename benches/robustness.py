@@ -22,7 +22,7 @@ from typing import Any
 from page import ROBUSTNESS, machine, publish, table
 from runs import Run, train_all
 
-from innerattn.experiments.run import digests
+from innerattn.records.run_folder import read_info
 from innerattn.stats.intervals import student_interval
 
 METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform")
@@ -39,7 +39,7 @@ def measured(folders: Sequence[Path], name: str, *options: str) -> Document:
 
     The name ends with what tells these runs from others of their names.
     """
-    weights = "".join(digests(folder).weights for folder in folders)
+    weights = "".join(str(read_info(folder).weights_sha256) for folder in folders)
     own = hashlib.sha256(weights.encode()).hexdigest()[:8]
     path = folders[0].parent / f"robustness-{name}-{own}.json"
     if not path.exists():

@@ -2,6 +2,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use innerattn_env::batch::{Autoreset, Batch, Options};
+use innerattn_env::rules::Rules;
 use innerattn_env::scenario::Scenario;
 
 fn snapshot(criterion: &mut Criterion) {
@@ -14,7 +15,8 @@ fn snapshot(criterion: &mut Criterion) {
             first_env: 0,
             autoreset: Autoreset::SameStep,
         };
-        let mut batch = Batch::new(Scenario::default(), options).expect("a valid scenario");
+        let mut batch =
+            Batch::new(Rules::new(Scenario::default()).expect("a valid scenario"), options).expect("a batch");
         let image = batch.snapshot();
         group.throughput(Throughput::Elements(envs as u64));
         group.bench_function(BenchmarkId::new("take", envs), |bencher| bencher.iter(|| batch.snapshot()));

@@ -2,8 +2,10 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use innerattn_env::batch::{Autoreset, Batch, Options, StepBuffers};
+use innerattn_env::reward::NUM_COMPONENTS;
 use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
+use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Engine, Scenario};
 
 const ROUNDS: usize = 64;
@@ -28,13 +30,14 @@ fn step(criterion: &mut Criterion) {
                 first_env: 0,
                 autoreset: Autoreset::SameStep,
             };
-            let mut batch = Batch::new(scenario, options).expect("a valid scenario");
+            let mut batch =
+                Batch::new(Rules::new(scenario).expect("a valid scenario"), options).expect("a batch");
             let (robots, width) = (batch.rules().team.len(), batch.rules().layout.width());
             let actions = random_actions(envs, robots);
             let mut obs = vec![0.0; envs * robots * width];
             let mut final_obs = obs.clone();
             let mut reward = vec![0.0; envs * robots];
-            let mut components = vec![0.0; envs * robots * 4];
+            let mut components = vec![0.0; envs * robots * NUM_COMPONENTS];
             let (mut terminated, mut truncated) = (vec![false; envs], vec![false; envs]);
             group.throughput(Throughput::Elements(envs as u64));
             let name = format!("{engine:?}, {threads} threads, {substeps} substeps");

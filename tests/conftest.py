@@ -15,8 +15,7 @@ from innerattn.cli.main import main
 from innerattn.errors import InnerattnError
 from innerattn.experiments.crossed.arms import plan_crossed
 from innerattn.experiments.plan import plan
-from innerattn.experiments.run import StudyRun
-from innerattn.experiments.scan import FinishedRun
+from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.experiments.side_by_side import Run
 
 
@@ -117,7 +116,7 @@ def study(tmp_path: Path, finished_study: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> list[StudyRun]:
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[FinishedRun]:
     """Three runs with and two without inner attention, and one of another situation."""
     folder = tmp_path_factory.mktemp("runs")
     return [
@@ -138,5 +137,5 @@ def crossed_study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[
         made = made_run(out / "made", "mixed", case.method, case.seed, chance=number)
         one.folder.parent.mkdir(exist_ok=True)
         made.folder.rename(one.folder)
-        found.append(FinishedRun(one.case, one.folder))
+        found.append(read_run(one.case, one.folder))
     return out, found

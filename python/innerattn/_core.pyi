@@ -5,29 +5,58 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Batch", "__version__", "check_scenario"]
+__all__ = ["FAULT_KINDS", "REWARD_COMPONENTS", "Batch", "Rules", "__version__"]
 
 __version__: str
 
-def check_scenario(json: str) -> str:
-    """Check a scenario in JSON and return it with every key written out.
+FAULT_KINDS: tuple[tuple[str, str, float, float, float, str], ...]
+"""Name, unit ("" for a share), least, most and healthy value, and meaning of each kind of fault."""
+
+REWARD_COMPONENTS: tuple[tuple[str, str], ...]
+"""Name and meaning of each reward component, in the order of their columns."""
+
+@final
+class Rules:
+    """A valid scenario, ready to play. It never changes, and copies of it are the same object.
 
     Raises:
-        ValueError: one line naming the key, its value and what is allowed.
+        ValueError: (of `Rules(json)`) one line that names the key, its value and what is allowed.
     """
+
+    def __new__(cls, json: str) -> Rules: ...
+    def to_json(self) -> str:
+        """The scenario with every key written out."""
+
+    @property
+    def num_victims(self) -> int:
+        """Victim slots V."""
+
+    def __eq__(self, other: object, /) -> bool:
+        """Whether the other is the same scenario."""
+
+    def __copy__(self) -> Rules: ...
+    def __deepcopy__(self, memo: object) -> Rules: ...
+    def __getnewargs__(self) -> tuple[str]: ...
 
 @final
 class Batch:
-    """Many rescue worlds of one scenario. E envs, R robots, D columns, V victim slots, O obstacles.
+    """Many rescue worlds of one scenario.
+
+    E envs, R robots, D columns of an observation, V victim slots, O obstacles, C reward components
+    (`REWARD_COMPONENTS`), K kinds of faults (`FAULT_KINDS`).
 
     Arrays returned by `step` and `reward_components` are read-only and valid until the step after
     next; all others are fresh. Not to be used from two threads at once (RuntimeError), nor, with
     several threads, in a child process after a fork (RuntimeError).
+
+    Raises:
+        ValueError: num_envs or num_threads out of range, or more threads than the system gives.
+        MemoryError: the arrays do not fit.
     """
 
     def __new__(
         cls,
-        scenario_json: str,
+        rules: Rules,
         num_envs: int,
         seed: int,
         num_threads: int | None,
@@ -44,10 +73,6 @@ class Batch:
 
     def observation_names(self) -> list[str]:
         """Names of the D columns; units are m and m/s."""
-
-    @staticmethod
-    def reward_component_names() -> list[str]:
-        """Names of the reward components."""
 
     def reset(self, seed: int | None, mask: NDArray[np.bool_] | None) -> NDArray[np.float32]:
         """Start new episodes in the worlds of `mask` (E,); returns observations (E, R, D)."""
@@ -76,7 +101,7 @@ class Batch:
         """
 
     def reward_components(self) -> NDArray[np.float32]:
-        """Rewards of the last step by component, (E, R, 4)."""
+        """Rewards of the last step by component, (E, R, C)."""
 
     def observe(self) -> NDArray[np.float32]:
         """Present observations, (E, R, D)."""
@@ -102,15 +127,11 @@ class Batch:
     def set_motion(self, positions: NDArray[np.float32], velocities: NDArray[np.float32]) -> None:
         """Put the robots at positions (E, R, 2), m, with velocities (E, R, 2), m/s."""
 
-    @staticmethod
-    def fault_kinds() -> list[str]:
-        """Names of the kinds of faults, in the order of levels."""
-
     def fault_state(self) -> NDArray[np.float32]:
-        """Levels of the faults in effect, (E, R, kinds)."""
+        """Levels of the faults in effect, (E, R, K)."""
 
     def set_faults(self, levels: NDArray[np.float32], mask: NDArray[np.bool_] | None) -> None:
-        """Put levels (E, R, kinds) in place of the scenario's faults in the worlds of `mask` (E,).
+        """Put levels (E, R, K) in place of the scenario's faults in the worlds of `mask` (E,).
 
         Raises:
             ValueError: wrong shape, or a level out of range (kind, env and robot are named).

@@ -2,20 +2,20 @@
 //! split over threads changes when a world is stepped, never what happens in it.
 
 use std::iter::zip;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
-use crate::fault::{KINDS, Levels, NUM_KINDS};
+use crate::fault::{Levels, NUM_KINDS, SPECS};
 use crate::geometry::Vec2;
 use crate::physics::Workspace;
 use crate::pool::Pool;
 use crate::reward::NUM_COMPONENTS;
 use crate::robot::{Commands, NUM_ACTIONS};
 use crate::rules::Rules;
-use crate::scenario::{Actions, Scenario};
+use crate::scenario::Actions;
 use crate::snapshot;
 use crate::task::Rescue;
-use crate::world::{World, check_room};
+use crate::world::World;
 
 /// Most worlds in a batch.
 pub const MAX_ENVS: usize = 1 << 20;
@@ -56,7 +56,7 @@ pub struct StepBuffers<'a> {
     pub final_obs: &'a mut [f32],
     /// Rewards, E × R.
     pub reward: &'a mut [f32],
-    /// Rewards by component, E × R × 4.
+    /// Rewards by component, E × R × C.
     pub components: &'a mut [f32],
     /// Whether the scenario's goal ended the episode, E.
     pub terminated: &'a mut [bool],
@@ -98,7 +98,7 @@ struct Shard {
 
 /// A batch of worlds of one scenario.
 pub struct Batch {
-    rules: Rules,
+    rules: Arc<Rules>,
     shards: Vec<Shard>,
     pool: Pool,
     options: Options,
@@ -108,11 +108,10 @@ impl Batch {
     /// Makes the worlds, each at the start of its episode 0.
     ///
     /// # Errors
-    /// [`Error::Scenario`] or [`Error::Argument`] for a value that is not allowed.
-    pub fn new(scenario: Scenario, options: Options) -> Result<Self> {
+    /// [`Error::Argument`] for an option that is not allowed, and for more threads than the system gives.
+    pub fn new(rules: impl Into<Arc<Rules>>, options: Options) -> Result<Self> {
+        let rules = rules.into();
         argument("num_envs", options.num_envs, MAX_ENVS)?;
-        let rules = Rules::new(scenario)?;
-        check_room(&rules)?;
         let available = std::thread::available_parallelism().map_or(1, usize::from);
         let worth = options.num_envs / rules.physics.envs_worth_a_thread();
         let threads = options.num_threads.unwrap_or(available.min(worth).clamp(1, MAX_THREADS));
@@ -190,7 +189,7 @@ impl Batch {
     /// [`Error::Action`] or [`Error::EpisodeOver`], before anything has moved.
     pub fn step(&mut self, commands: Commands, buffers: StepBuffers) -> Result<Vec<Rescue>> {
         self.check(commands)?;
-        let (rules, autoreset) = (&self.rules, self.options.autoreset);
+        let (rules, autoreset) = (&*self.rules, self.options.autoreset);
         let (robots, width) = (rules.team.len(), rules.layout.width());
         let mut rest = buffers;
         let mut jobs = Vec::with_capacity(self.shards.len());
@@ -303,7 +302,7 @@ impl Batch {
         for (world, (places, speeds)) in zip(worlds, rows) {
             world.positions = places.chunks_exact(2).map(vector).collect();
             world.velocities = speeds.chunks_exact(2).map(vector).collect();
-            world.hold(&self.rules);
+            world.freeze(&self.rules);
         }
         Ok(())
     }
@@ -366,11 +365,11 @@ impl Shard {
 
 /// Refuses levels of a fault that are out of range or not numbers.
 fn check_levels(levels: &Levels, env: usize, robot: usize) -> Result<()> {
-    for (kind, value) in zip(KINDS, levels) {
-        let (low, high, unit) = kind.range();
+    for (spec, value) in zip(SPECS, levels) {
+        let (low, high) = spec.range;
         if !(low as f32..=high as f32).contains(value) {
-            let rule = format!("must be in {low}..={high} {unit}").trim_end().to_string();
-            return Err(Error::Fault { kind: kind.name(), env, robot, value: *value, rule });
+            let rule = format!("must be in {low}..={high} {}", spec.unit).trim_end().to_string();
+            return Err(Error::Fault { kind: spec.name, env, robot, value: *value, rule });
         }
     }
     Ok(())

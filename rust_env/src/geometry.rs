@@ -20,7 +20,7 @@ pub enum Solid {
 impl Solid {
     /// The form of a validated obstacle.
     #[must_use]
-    pub fn of(obstacle: &Obstacle) -> Self {
+    pub(crate) fn of(obstacle: &Obstacle) -> Self {
         match obstacle.shape {
             Shape::Disc => Self::Disc(obstacle.radius_m.unwrap_or_default() as f32),
             Shape::Box => {

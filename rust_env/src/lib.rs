@@ -6,7 +6,6 @@
 
 pub mod error;
 
-pub mod check;
 pub mod matching;
 
 pub mod fault;
@@ -20,6 +19,8 @@ pub mod robot;
 pub mod place;
 pub mod task;
 
+pub mod spawn;
+
 pub mod physics;
 
 pub mod observe;
@@ -27,7 +28,7 @@ pub mod reward;
 
 pub mod rules;
 
-pub mod condition;
+pub mod fault_state;
 
 pub mod world;
 

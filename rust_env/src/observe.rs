@@ -54,7 +54,7 @@ pub struct Layout {
 impl Layout {
     /// The columns of `scenario`.
     #[must_use]
-    pub fn new(scenario: &Scenario, tasks: &[Needs]) -> Self {
+    pub(crate) fn new(scenario: &Scenario, tasks: &[Needs]) -> Self {
         let abilities: Vec<String> = scenario.abilities().iter().map(ToString::to_string).collect();
         let count = |needs: &Needs| {
             let number = |ability| needs.abilities().iter().filter(|need| **need == ability).count() as f32;

@@ -38,7 +38,7 @@ pub struct Physics(Box<dyn Engine>);
 impl Physics {
     /// Prepares the motion of a valid scenario's team.
     #[must_use]
-    pub fn new(scenario: &Scenario, team: &[Body], solids: &[Solid]) -> Self {
+    pub(crate) fn new(scenario: &Scenario, team: &[Body], solids: &[Solid]) -> Self {
         Self(match scenario.engine {
             Choice::Rapier => Box::new(rapier::Rapier::new(scenario, team, solids)),
             Choice::Discs => Box::new(discs::Discs::new(scenario, team, solids)),

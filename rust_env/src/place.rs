@@ -1,7 +1,6 @@
 //! Random places: for obstacles, robots and victims. Sampling is bounded: if no draw is far enough
 //! from everything, the farthest one is taken and the caller is told.
 
-use crate::error::{Error, Result};
 use crate::geometry::{Solid, Vec2};
 use crate::rng::Stream;
 use crate::robot::Body;
@@ -49,30 +48,14 @@ pub struct Placing {
 }
 
 impl Placing {
-    /// The measures of `scenario`.
-    ///
-    /// # Errors
-    /// [`Error::Scenario`] if no victim could stand in the arena, or a robot does not fit in it.
-    pub fn new(scenario: &Scenario) -> Result<Self> {
-        let refuse = |key: String, value: f64, rule: String| {
-            Err(Error::Scenario { key, value: value.to_string(), rule })
-        };
-        let half = scenario.arena_half_width_m;
-        if scenario.wall_clearance_m >= half {
-            let rule = format!("must be below arena_half_width_m = {half} m");
-            return refuse("scenario.wall_clearance_m".into(), scenario.wall_clearance_m, rule);
-        }
-        for (index, robot) in scenario.robots.iter().enumerate() {
-            if robot.radius_m * 2.0 >= half {
-                let rule = format!("must be below half of arena_half_width_m = {half} m");
-                return refuse(format!("scenario.robots[{index}].radius_m"), robot.radius_m, rule);
-            }
-        }
-        Ok(Self {
-            arena: half as f32,
+    /// The measures of a valid scenario.
+    #[must_use]
+    pub(crate) fn new(scenario: &Scenario) -> Self {
+        Self {
+            arena: scenario.arena_half_width_m as f32,
             spawn_clearance: scenario.spawn_clearance_m as f32,
             wall_clearance: scenario.wall_clearance_m as f32,
-        })
+        }
     }
 
     /// A place for an obstacle, clear of those already `placed`.
@@ -121,7 +104,7 @@ mod tests {
     #[test]
     fn places_keep_their_distances() {
         let scenario = Scenario::default();
-        let placing = Placing::new(&scenario).expect("a valid scenario");
+        let placing = Placing::new(&scenario);
         let team = bodies(&scenario);
         let mut stream = Stream::new(0, 0, 0, Purpose::Start);
         let solids = [Solid::Disc(0.3), Solid::Box(Vec2::new(0.2, 0.05))];
@@ -148,19 +131,9 @@ mod tests {
     #[test]
     fn a_crowded_arena_is_told_and_the_roomiest_draw_taken() {
         let scenario = Scenario { spawn_clearance_m: 9.0, ..Scenario::default() };
-        let placing = Placing::new(&scenario).expect("a valid scenario");
+        let placing = Placing::new(&scenario);
         let mut stream = Stream::new(0, 0, 0, Purpose::Start);
         let place = placing.victim(&mut stream, &[Vec2::new(-0.9, -0.9)], &[]);
         assert!(!place.clear && place.at.x > 0.7 && place.at.y > 0.7, "{place:?}");
-    }
-
-    #[test]
-    fn what_cannot_fit_is_refused() {
-        let refused = |scenario: &Scenario| Placing::new(scenario).expect_err("no room").to_string();
-        let narrow = Scenario { wall_clearance_m: 1.0, ..Scenario::default() };
-        assert!(refused(&narrow).starts_with("scenario.wall_clearance_m = 1: must be below"));
-        let mut wide = Scenario::default();
-        wide.robots[3].radius_m = 0.5;
-        assert!(refused(&wide).starts_with("scenario.robots[3].radius_m = 0.5: must be below"));
     }
 }

@@ -1,26 +1,78 @@
-//! Rewards: what each robot gets for a step, by component. To change a reward, change it here.
+//! Rewards: what each robot gets for a step, by component. To change or add one, change its row of
+//! [`COMPONENTS`].
 
 use crate::geometry::Vec2;
 use crate::robot::Body;
 use crate::scenario::{RescueCredit, Scenario, Shaping};
 use crate::task::{Needs, Rescue, Victim};
 
-/// Number of reward components.
-pub const NUM_COMPONENTS: usize = 4;
-/// Names of the reward components, in order.
-pub const COMPONENTS: [&str; NUM_COMPONENTS] = ["rescue", "progress", "contact", "action"];
+/// One term of a robot's reward.
+pub struct Component {
+    /// Its name, as in `reward_component_names`.
+    pub name: &'static str,
+    /// What it rewards, in a few words.
+    pub meaning: &'static str,
+    /// What a robot (its index) gets for a step.
+    pub value: fn(&Weights, &Happened, usize) -> f32,
+}
+
+/// The terms of a robot's reward, in the order of their columns.
+pub const COMPONENTS: &[Component] = &[
+    Component {
+        name: "rescue",
+        meaning: "`rescue_reward` for each rescue that the robot is credited with",
+        value: |weights, happened, robot| {
+            let credited = |rescue: &&Rescue| match weights.credit {
+                RescueCredit::Team => true,
+                RescueCredit::Helpers => rescue.helpers.contains(&Some(robot as u8)),
+            };
+            weights.rescue * happened.rescues.iter().filter(credited).count() as f32
+        },
+    },
+    Component {
+        name: "progress",
+        meaning: "`shaping_weight` for each metre that the team's nearest able robots came nearer to victims",
+        value: |weights, happened, _| {
+            let nearer = match weights.shaping {
+                Shaping::Progress => happened.distance_before - happened.distance_after,
+                Shaping::Potential => happened.distance_before - weights.discount * happened.distance_after,
+                Shaping::None => 0.0,
+            };
+            weights.shaping_weight * nearer
+        },
+    },
+    Component {
+        name: "contact",
+        meaning: "minus `contact_cost` where the robot touched something",
+        value: |weights, happened, robot| -weights.contact * (happened.touched >> robot & 1) as f32,
+    },
+    Component {
+        name: "action",
+        meaning: "minus `action_cost` times the squared length of the robot's drive",
+        value: |weights, happened, robot| -weights.action * happened.effort[robot],
+    },
+];
+
+/// Number C of reward components.
+pub const NUM_COMPONENTS: usize = COMPONENTS.len();
 
 /// The weights of a scenario's rewards.
 #[derive(Debug, Clone)]
 pub struct Weights {
-    credit: RescueCredit,
-    rescue: f32,
+    /// Who is rewarded for a rescue.
+    pub credit: RescueCredit,
+    /// For a rescue.
+    pub rescue: f32,
     /// The dense term's form.
     pub shaping: Shaping,
-    shaping_weight: f32,
-    discount: f32,
-    contact: f32,
-    action: f32,
+    /// For a metre of progress.
+    pub shaping_weight: f32,
+    /// γ of potential shaping.
+    pub discount: f32,
+    /// Cost of a step with a contact.
+    pub contact: f32,
+    /// Cost of a step of full drive.
+    pub action: f32,
 }
 
 /// What happened in a step, as far as rewards care.
@@ -39,9 +91,9 @@ pub struct Happened<'a> {
 }
 
 impl Weights {
-    /// The weights of `scenario`.
+    /// The weights of a valid scenario.
     #[must_use]
-    pub fn new(scenario: &Scenario) -> Self {
+    pub(crate) fn new(scenario: &Scenario) -> Self {
         Self {
             credit: scenario.rescue_credit,
             rescue: scenario.rescue_reward as f32,
@@ -52,28 +104,16 @@ impl Weights {
             action: scenario.action_cost as f32,
         }
     }
+}
 
-    /// Writes each robot's components into `components` (R × [`NUM_COMPONENTS`]) and their sums into
-    /// `reward` (R).
-    pub fn write(&self, happened: &Happened, components: &mut [f32], reward: &mut [f32]) {
-        let dense = match self.shaping {
-            Shaping::Progress => happened.distance_before - happened.distance_after,
-            Shaping::Potential => happened.distance_before - self.discount * happened.distance_after,
-            Shaping::None => 0.0,
-        };
-        for (robot, row) in components.chunks_exact_mut(NUM_COMPONENTS).enumerate() {
-            let helped = |rescue: &&Rescue| match self.credit {
-                RescueCredit::Team => true,
-                RescueCredit::Helpers => rescue.helpers.contains(&Some(robot as u8)),
-            };
-            let rescued = happened.rescues.iter().filter(helped).count();
-            let touched = (happened.touched >> robot & 1) as f32;
-            row[0] = self.rescue * rescued as f32;
-            row[1] = self.shaping_weight * dense;
-            row[2] = -self.contact * touched;
-            row[3] = -self.action * happened.effort[robot];
-            reward[robot] = row.iter().sum();
+/// Writes each robot's components into `components` (R × [`NUM_COMPONENTS`]) and their sums into
+/// `reward` (R).
+pub fn write(weights: &Weights, happened: &Happened, components: &mut [f32], reward: &mut [f32]) {
+    for (robot, (row, sum)) in components.chunks_exact_mut(NUM_COMPONENTS).zip(reward).enumerate() {
+        for (cell, component) in row.iter_mut().zip(COMPONENTS) {
+            *cell = (component.value)(weights, happened, robot);
         }
+        *sum = row.iter().sum();
     }
 }
 
@@ -121,7 +161,7 @@ mod tests {
             effort: &[1.0, 0.25, 0.0, 0.0],
         };
         let (mut rows, mut reward) = ([[0.0; NUM_COMPONENTS]; 4], [0.0; 4]);
-        Weights::new(&scenario).write(&happened, rows.as_flattened_mut(), &mut reward);
+        write(&Weights::new(&scenario), &happened, rows.as_flattened_mut(), &mut reward);
         for (row, reward) in rows.iter().zip(reward) {
             assert!((row.iter().sum::<f32>() - reward).abs() < 1e-6);
         }

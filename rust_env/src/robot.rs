@@ -23,7 +23,7 @@ pub struct Body {
 
 /// The bodies of a scenario's team, in team order.
 #[must_use]
-pub fn bodies(scenario: &Scenario) -> Vec<Body> {
+pub(crate) fn bodies(scenario: &Scenario) -> Vec<Body> {
     let abilities = scenario.abilities();
     let bit = |name: &String| abilities.iter().position(|ability| ability == name).map_or(0, |bit| 1 << bit);
     scenario

@@ -1,14 +1,15 @@
-//! A scenario made ready to play: every constant that worlds share, computed once.
+//! A scenario found valid and made ready to play: every constant that worlds share, computed once. There
+//! is no other way from a description to a world.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::fault::{HEALTHY, Kind};
 use crate::geometry::Solid;
 use crate::observe::Layout;
 use crate::physics::Physics;
-use crate::place::Placing;
 use crate::reward::Weights;
 use crate::robot::{Body, bodies};
 use crate::scenario::Scenario;
+use crate::spawn::{Crowded, Spawn};
 use crate::task::Needs;
 
 /// One of the scenario's faults, as numbers.
@@ -28,7 +29,8 @@ pub struct Process {
     pub duration: u32,
 }
 
-/// What all worlds of a batch share.
+/// What all worlds of a batch share, made of a valid scenario.
+#[non_exhaustive] // made by `Rules::new` alone
 pub struct Rules {
     /// The description it was made from.
     pub scenario: Scenario,
@@ -44,34 +46,72 @@ pub struct Rules {
     pub layout: Layout,
     /// Weights of the rewards.
     pub weights: Weights,
-    /// Distances kept when placing things.
-    pub placing: Placing,
+    /// What appears where.
+    pub spawn: Spawn,
     /// The scenario's faults, but for those that leave their robot healthy.
     pub faults: Vec<Process>,
 }
 
 impl Rules {
-    /// Checks a scenario and makes it ready.
+    /// The one door for a scenario: checks every value, every rule between values and, in 64 trial
+    /// episodes, that everything finds a place, then makes it ready. All else takes what this returns.
+    ///
+    /// What no scenario says is checked where it is given: the number of worlds and threads, and whether
+    /// their memory is to be had, when a [`crate::batch::Batch`] is made.
     ///
     /// # Errors
-    /// [`crate::error::Error::Scenario`] for the first rule that is broken.
+    /// [`Error::Scenario`] for the first rule that is broken.
     pub fn new(scenario: Scenario) -> Result<Self> {
         scenario.validate()?;
         let team = bodies(&scenario);
         let tasks = Needs::of_tasks(&scenario);
         let solids: Vec<Solid> = scenario.obstacles.iter().map(Solid::of).collect();
+        let spawn = Spawn::new(&scenario, &team, &solids);
+        if let Some(crowded) = spawn.find_crowding() {
+            return Err(too_crowded(&scenario, crowded));
+        }
         Ok(Self {
             physics: Physics::new(&scenario, &team, &solids),
             layout: Layout::new(&scenario, &tasks),
             weights: Weights::new(&scenario),
-            placing: Placing::new(&scenario)?,
             faults: processes(&scenario),
+            spawn,
             scenario,
             team,
             tasks,
             solids,
         })
     }
+
+    /// Reads a description from JSON and takes it through the door.
+    ///
+    /// # Errors
+    /// [`Error::ScenarioText`] for text of the wrong form, [`Error::Scenario`] for the first broken rule.
+    pub fn from_json(text: &str) -> Result<Self> {
+        Self::new(Scenario::from_json(text)?)
+    }
+}
+
+/// The error that names what does not fit into the arena.
+fn too_crowded(scenario: &Scenario, crowded: Crowded) -> Error {
+    let (key, value, rule) = match crowded {
+        Crowded::Obstacles => (
+            "scenario.obstacles (their number)",
+            scenario.obstacles.len().to_string(),
+            "no room for them at random places without overlap; use fewer, smaller, or a wider arena",
+        ),
+        Crowded::Robots => (
+            "scenario.robots (their number)",
+            scenario.robots.len().to_string(),
+            "no room for them without overlap; use fewer, smaller, or a wider arena",
+        ),
+        Crowded::Victims => (
+            "scenario.spawn_clearance_m",
+            scenario.spawn_clearance_m.to_string(),
+            "no place is so far from all robots (and wall_clearance_m from obstacles); use a smaller one",
+        ),
+    };
+    Error::Scenario { key: key.into(), value, rule: rule.into() }
 }
 
 #[allow(clippy::float_cmp)] // the healthy value itself, not one near it
@@ -90,4 +130,57 @@ fn processes(scenario: &Scenario) -> Vec<Process> {
             duration: fault.duration_steps.unwrap_or(u32::MAX),
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(change: impl Fn(&mut Scenario)) -> String {
+        let mut scenario = Scenario::default();
+        change(&mut scenario);
+        Rules::new(scenario).err().map(|error| error.to_string()).unwrap_or_default()
+    }
+
+    #[test]
+    fn what_finds_no_place_is_refused() {
+        let refused = refusal(|scenario| scenario.spawn_clearance_m = 3.0);
+        assert!(refused.starts_with("scenario.spawn_clearance_m = 3: no place is so far"), "{refused}");
+        let refused = refusal(|scenario| scenario.robots.iter_mut().for_each(|robot| robot.radius_m = 0.45));
+        assert!(refused.starts_with("scenario.robots (their number) = 4: no room for them"), "{refused}");
+        let disc = r#"{"shape": "disc", "radius_m": 0.6}"#;
+        let text = format!(r#"{{"obstacles": [{disc}, {disc}, {disc}]}}"#);
+        let refused = Rules::from_json(&text).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(refused.starts_with("scenario.obstacles (their number) = 3: no room for them"), "{refused}");
+    }
+
+    #[test]
+    fn the_door_refuses_what_breaks_a_rule_and_what_is_no_scenario() {
+        assert!(refusal(|scenario| scenario.substeps = 0).starts_with("scenario.substeps = 0: must be"));
+        assert!(matches!(Rules::from_json("[]"), Err(Error::ScenarioText(_))));
+        assert_eq!(refusal(|_| ()), "");
+    }
+
+    #[test]
+    fn a_fault_of_the_healthy_value_is_left_out() {
+        let fault = |kind: Kind, value: f64| crate::fault::Fault {
+            robot: "food_1".into(),
+            kind,
+            value,
+            onset_step: 3,
+            onset_rate_hz: Some(2.0),
+            duration_steps: None,
+        };
+        let faults = vec![fault(Kind::MotorGain, 1.0), fault(Kind::Blackout, 0.5)];
+        let rules = Rules::new(Scenario { faults, ..Scenario::default() });
+        let wanted = Process {
+            robot: 1,
+            kind: Kind::Blackout,
+            value: 0.5,
+            onset: 3,
+            rate: Some(0.2),
+            duration: u32::MAX,
+        };
+        assert_eq!(rules.map(|rules| rules.faults), Ok(vec![wanted]));
+    }
 }

@@ -1,5 +1,7 @@
-//! `Scenario`: what a rescue world is made of, as plain data. Nothing here moves or draws anything.
+//! `Scenario`: what a rescue world is made of, as plain data. Nothing here moves or draws anything, and
+//! nothing plays by a scenario before [`crate::rules::Rules::new`] has found it valid.
 
+mod check;
 mod validity;
 
 use serde::{Deserialize, Serialize};
@@ -267,18 +269,15 @@ impl Default for Scenario {
 }
 
 impl Scenario {
-    /// Reads a scenario from JSON and checks it; absent keys take their defaults.
+    /// Reads a description from JSON; absent keys take their defaults. Its values are not checked here.
     ///
     /// # Errors
-    /// [`Error::ScenarioText`] for text of the wrong form, [`Error::Scenario`] for a bad value.
+    /// [`Error::ScenarioText`] for text of the wrong form: syntax, an unknown key, a value of another type.
     pub fn from_json(text: &str) -> Result<Self> {
         if !text.trim_start().starts_with('{') {
             return Err(Error::ScenarioText("must be a JSON object".into())); // a list would do for serde
         }
-        let scenario: Self =
-            serde_json::from_str(text).map_err(|error| Error::ScenarioText(error.to_string()))?;
-        scenario.validate()?;
-        Ok(scenario)
+        serde_json::from_str(text).map_err(|error| Error::ScenarioText(error.to_string()))
     }
 
     /// The scenario as JSON with every key written out.

@@ -72,7 +72,7 @@ fn fits(rules: &Rules, world: &World) -> bool {
         && world.velocities.len() == rules.team.len()
         && world.obstacles.len() == rules.solids.len()
         && world.victims.len() == rules.scenario.num_victims()
-        && world.condition.fits(rules)
+        && world.faults.fits(rules)
         && victims().all(|victim| (victim.task as usize) < rules.tasks.len())
         && places
             .copied()

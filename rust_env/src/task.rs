@@ -27,7 +27,7 @@ pub struct Needs(Vec<u32>);
 impl Needs {
     /// The needs of every task of a valid scenario.
     #[must_use]
-    pub fn of_tasks(scenario: &Scenario) -> Vec<Self> {
+    pub(crate) fn of_tasks(scenario: &Scenario) -> Vec<Self> {
         let abilities = scenario.abilities();
         let number =
             |need: &String| abilities.iter().position(|ability| ability == need).unwrap_or_default() as u32;
@@ -147,6 +147,9 @@ pub struct Rescue {
     /// Helpers, one for each need.
     pub helpers: [Option<u8>; MAX_NEEDS],
 }
+
+#[cfg(test)]
+mod rule_tests;
 
 #[cfg(test)]
 mod tests {

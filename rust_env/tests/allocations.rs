@@ -1,6 +1,7 @@
 //! A world is small, and a step asks the system for next to no memory; what rapier asks for is told.
 //! One test alone: another beside it would be counted, too.
 
+#[path = "worlds/common.rs"]
 mod common;
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -8,6 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use common::{Table, chance, options, random_drive};
 use innerattn_env::batch::Batch;
+use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Engine, Scenario};
 
 /// The system's allocator, counting.
@@ -51,7 +53,8 @@ fn per_env_step(engine: Engine) -> f64 {
 fn bytes_a_world(engine: Engine) -> usize {
     const ENVS: usize = 4096;
     let before = BYTES.load(Relaxed);
-    let batch = Batch::new(Scenario { engine, ..Scenario::default() }, options(ENVS, 0)).expect("a batch");
+    let rules = Rules::new(Scenario { engine, ..Scenario::default() }).expect("a valid scenario");
+    let batch = Batch::new(rules, options(ENVS, 0)).expect("a batch");
     let bytes = (BYTES.load(Relaxed) - before) / ENVS;
     drop(batch);
     bytes

@@ -7,8 +7,14 @@ import re
 import pytest
 from pydantic import ValidationError
 
-from innerattn.config import NetworkConfig, RunConfig, TDConfig, TrainConfig, load_run_config
-from innerattn.config.run import PPOConfig
+from innerattn.config import (
+    NetworkConfig,
+    PPOConfig,
+    RunConfig,
+    TDConfig,
+    TrainConfig,
+    load_run_config,
+)
 from innerattn.errors import ConfigError
 
 

@@ -1,7 +1,9 @@
 """The scenario model: presets, defaults, files, and errors that name the key."""
 
+import copy
 import json
 import math
+import pickle
 from pathlib import Path
 
 import pytest
@@ -28,7 +30,7 @@ def test_default_team_is_table_one() -> None:
 
 
 def test_defaults_are_the_compiled_ones() -> None:
-    assert json.loads(_core.check_scenario("{}")) == Scenario().model_dump(mode="json")
+    assert json.loads(_core.Rules("{}").to_json()) == Scenario().model_dump(mode="json")
 
 
 @pytest.mark.parametrize(("name", "victims"), [("single", 1), ("double", 2), ("mixed", 2)])
@@ -130,6 +132,36 @@ def test_replace_changes_and_checks() -> None:
         scenario.replace(episode_steps=0)
     with pytest.raises(ConfigError, match=r"scenario\.colour: unknown key"):
         scenario.replace(colour=1)
+
+
+def test_every_copy_keeps_what_the_check_returned() -> None:
+    scenario = Scenario.preset("mixed-faults")
+    copies = {
+        "pickle": pickle.loads(pickle.dumps(scenario)),
+        "copy": copy.copy(scenario),
+        "deepcopy": copy.deepcopy(scenario),
+        "model_copy": scenario.model_copy(),
+        "deep model_copy": scenario.model_copy(deep=True),
+        "dump": Scenario.model_validate(scenario.model_dump()),
+        "JSON": Scenario.model_validate_json(scenario.model_dump_json()),
+        "construct": Scenario.model_construct(**dict(scenario)),
+    }
+    for way, other in copies.items():
+        assert other == scenario, way
+        assert hash(other) == hash(scenario), way
+        assert json.loads(other.rules.to_json()) == scenario.model_dump(mode="json"), way
+
+
+def test_a_changed_copy_is_checked_anew() -> None:
+    scenario = Scenario()
+    changed = scenario.model_copy(update={"substeps": 3})
+    assert changed == Scenario(substeps=3) != scenario
+    assert json.loads(changed.rules.to_json())["substeps"] == 3
+    assert changed.rules == Scenario(substeps=3).rules != scenario.rules
+    with pytest.raises(ConfigError, match=r"scenario\.substeps = 0"):
+        scenario.model_copy(update={"substeps": 0})
+    with pytest.raises(ValueError, match=r"scenario\.substeps = 0"):
+        Scenario.model_construct(substeps=0)
 
 
 def test_frozen_and_hashable() -> None:

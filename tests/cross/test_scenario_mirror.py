@@ -29,7 +29,7 @@ CHOICES = [
 
 
 def compiled(table: dict) -> dict:
-    return json.loads(_core.check_scenario(json.dumps(table)))
+    return json.loads(_core.Rules(json.dumps(table)).to_json())
 
 
 def within(key: str, item: dict) -> dict:
@@ -92,9 +92,25 @@ def test_choices_agree(key: str, values: tuple[str, ...]) -> None:
 
 def test_kinds_of_faults_agree() -> None:
     kinds = get_args(Fault.model_fields["kind"].annotation)
-    assert kinds == FAULT_KINDS
+    assert kinds == FAULT_KINDS == tuple(name for name, *_ in _core.FAULT_KINDS)
     for kind in kinds:
         assert compiled({"faults": [FAULT | {"kind": kind}]})["faults"][0]["kind"] == kind
+    with pytest.raises(ValueError, match="unknown variant") as error:
+        compiled({"faults": [FAULT | {"kind": "another"}]})
+    assert set(str(error.value).split("`")[3::2]) == {*kinds}
+
+
+@pytest.mark.parametrize("row", _core.FAULT_KINDS, ids=FAULT_KINDS)
+def test_a_faults_value_is_in_its_range(row: tuple[str, str, float, float, float, str]) -> None:
+    kind, unit, low, high, healthy, meaning = row
+    described = str(Fault.model_fields["value"].description)
+    assert f"{kind}: {meaning}" in described
+    assert f"{kind}: {meaning} [{unit}]" in described or not unit
+    for value in (low, high, healthy):
+        assert compiled({"faults": [FAULT | {"kind": kind, "value": value}]})
+    for value in (low - 0.01, high + 0.01):
+        with pytest.raises(ValueError, match=rf"faults\[0\]\.value \({kind}\) = .*: must be"):
+            compiled({"faults": [FAULT | {"kind": kind, "value": value}]})
 
 
 def test_shapes_agree() -> None:
@@ -153,7 +169,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
     default = Scenario()
     for key in changed:
         assert getattr(scenario, key) != getattr(default, key)
-    assert json.loads(_core.check_scenario(json.dumps(changed))) == scenario.model_dump(mode="json")
+    assert compiled(changed) == scenario.model_dump(mode="json")
 
 
 def test_models_are_all_mirrored() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from worlds import CONTINUOUS, CROWDED, batch, image, plan
 
+from innerattn import _core
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 
@@ -44,7 +45,7 @@ def test_shapes_and_dtypes(copy: bool) -> None:
         (env.positions(), (6, 4, 2), "f4"),
         (env.velocities(), (6, 4, 2), "f4"),
         (env.obstacles(), (6, 2, 2), "f4"),
-        (env.reward_components(), (6, 4, 4), "f4"),
+        (env.reward_components(), (6, 4, len(env.reward_component_names)), "f4"),
         (env.step_counts(), (6,), "i8"),
         (env.episodes(), (6,), "i8"),
     ]:
@@ -59,6 +60,23 @@ def test_attributes_follow_the_scenario() -> None:
     assert env.robot_names == ("food_0", "food_1", "navigation_0", "medical_0")
     assert BatchEnv("double", 1).scenario == Scenario.preset("double")
     assert (batch(2, CONTINUOUS).num_actions, batch(2, CONTINUOUS).continuous) == (0, True)
+
+
+def test_a_scenario_is_checked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A batch takes what the check returned: nothing is checked twice or left unchecked."""
+    checked, check = [], _core.Rules
+
+    def count(json: str) -> _core.Rules:
+        checked.append(json)
+        return check(json)
+
+    monkeypatch.setattr(_core, "Rules", count)
+    scenario = Scenario.preset("double")
+    for num_envs in (1, 3):
+        assert BatchEnv(scenario, num_envs).observe().shape[0] == num_envs
+    assert checked == [scenario.model_dump_json()]
+    with pytest.raises(TypeError, match="Rules"):
+        _core.Batch(scenario.model_dump_json(), 1, 0, None, 0, True)  # type: ignore[arg-type]
 
 
 def test_views_are_read_only_and_last_until_the_step_after_next() -> None:

@@ -1,6 +1,7 @@
 """Whole evaluations of a short run and of a scripted policy."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -72,7 +73,16 @@ def test_evaluation_of_a_run(run: Path, tmp_path: Path) -> None:
     for record in records:
         group = by_length[record.scenario.episode_steps]
         group.setdefault(record.policy, []).append(record)
-    assert summarise("short", records[0], by_length[25], by_length[40]) == summary
+    # Scripted policies' steps are measured and not kept.
+    found = summarise("short", records[0], by_length[25], by_length[40])
+    assert replace(found, standard=replace(found.standard, measures={})) == replace(
+        summary, standard=replace(summary.standard, measures={})
+    )
+    measured = summary.standard.measures
+    assert list(measured) == ["td-inner", "random", "greedy", "hungarian"]
+    assert measured["td-inner"] == found.standard.measures["td-inner"]
+    assert isinstance(measured["hungarian"]["choices"], int)
+    assert found.standard.measures["hungarian"]["choices"] is None
 
 
 def test_the_same_evaluation_twice_is_the_same(run: Path) -> None:

@@ -1,90 +1,146 @@
-"""A run kept in small: a study takes it for the run, and makes the same report of it."""
+"""Archived runs: a study takes them for the runs, and makes the same report of them."""
 
-import shutil
+import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from innerattn.errors import RunError
-from innerattn.experiments.archive import keep
+from innerattn.experiments.archive import FILE, FORMAT, read_archive, write_archive
 from innerattn.experiments.plan import plan
-from innerattn.experiments.run import StudyRun, digests, read_measured
-from innerattn.experiments.scan import FinishedRun, scan_runs
-from innerattn.records.parquet import read_records
-from innerattn.records.run_folder import read_info
+from innerattn.experiments.run import FinishedRun, read_run, refuse_without_steps
+from innerattn.experiments.scan import finished_runs, scan_runs
 from innerattn.report.crossed import write_crossed
 
-LEFT_OUT = ("checkpoints", "metrics.jsonl")
 
-
-def test_the_copy_is_the_run_without_what_is_large(runs: list[StudyRun], tmp_path: Path) -> None:
-    for run in runs:
-        small = tmp_path / "kept" / run.folder.name
-        keep(run, small)
-        assert {path.name for path in run.folder.iterdir()} - {
-            path.name for path in small.iterdir()
-        } == set(LEFT_OUT)
-        assert digests(small) == digests(run.folder)
-        assert read_info(small).weights_sha256 == digests(run.folder).weights
-        whole, copy = (
-            read_measured(one, step_by_step=False) for one in (run, replace(run, folder=small))
-        )
-        assert copy.summary == whole.summary
-        for mine, its in zip(copy.scored, whole.scored, strict=True):
-            assert mine.rescues.tobytes() == its.rescues.tobytes()
-            assert mine.lengths.tolist() == its.lengths.tolist()
-            assert mine.rewards_total.tobytes() == its.rewards_total.tobytes()
+def test_what_is_written_is_read_but_for_steps(runs: list[FinishedRun], tmp_path: Path) -> None:
+    path = tmp_path / "new" / FILE
+    write_archive(runs, path)
+    archived = read_archive(path)
+    assert len(archived) == len(runs)
+    for run, copy in zip(runs, archived, strict=True):
+        assert copy.archived
+        assert (copy.case, copy.config, copy.info) == (run.case, run.config, run.info)
+        assert copy.summary == run.summary
+        assert copy.folder == tmp_path / "new" / "runs" / run.folder.name
+        assert (copy.config_sha256, copy.scores()) == (run.config_sha256, run.scores())
+        assert len(copy.scored) == len(run.scored) == 2
+        for mine, its in zip(copy.scored, run.scored, strict=True):
+            assert mine.rescues.dtype == its.rescues.dtype
+            for name in ("rescues", "lengths", "rewards_total"):
+                assert getattr(mine, name).tobytes() == getattr(its, name).tobytes()
+            for name in ("policy", "scenario", "robot_names", "seed", "first_episode"):
+                assert getattr(mine, name) == getattr(its, name)
+            assert (mine.reward_names, mine.length) == (its.reward_names, its.length)
             assert mine.steps == {}
-        assert {record.policy for record in read_records(small / "evaluation")} == {run.method}
-        with pytest.raises(RunError, match="recorded step by step"):
-            read_measured(replace(run, folder=small))
-    assert [path.name for path in (tmp_path / "kept").glob(".*")] == []
+    with pytest.raises(RunError, match="recorded step by step"):
+        refuse_without_steps(archived)
+    before = path.read_bytes()
+    write_archive(runs, path)
+    assert path.read_bytes() == before
 
 
-def test_a_study_goes_on_with_kept_runs(
+def test_a_study_takes_archived_runs_for_runs(
     study: Path, small: dict[str, object], tmp_path: Path
 ) -> None:
-    planned = plan(("td-inner", "td-uniform"), ("mixed",), (0, 1), "quick", tmp_path, small)
-    for one in planned[:2]:
-        case, source = one.case, study / "runs" / one.folder.name
-        keep(StudyRun(case.situation, case.method, case.seed, source), one.folder)
-    states = [one.state for one in scan_runs(planned, tmp_path)]
-    assert states == ["finished", "finished", "missing", "missing"]
+    methods, situations, seeds = ("td-inner", "td-uniform"), ("mixed",), (0, 1)
+    source = plan(methods, situations, seeds, "quick", study, small)
+    write_archive(finished_runs(scan_runs(source, study)), tmp_path / FILE)
+    planned = plan(methods, situations, seeds, "quick", tmp_path, small)
+    found = scan_runs(planned, tmp_path)
+    assert [one.state for one in found] == ["finished", "finished", "missing", "missing"]
+    assert [run.folder for run in finished_runs(found)] == [one.folder for one in planned[:2]]
+    (whole, *_) = scan_runs(planned, tmp_path, whole=True)
+    assert (whole.state, whole.why) == ("unreadable", "archived, without metrics and steps")
+    other = plan(methods, situations, (0,), "quick", tmp_path, {**small, "td.polyak": 0.5})
+    assert scan_runs(other, tmp_path)[0].why == "td.polyak = 0.02, planned 0.5"
+    planned[0].folder.mkdir(parents=True)  # what lies in the study comes first
+    assert scan_runs(planned, tmp_path)[0].state == "unreadable"
 
 
-def test_kept_runs_give_the_same_report(
+def test_archived_runs_give_the_same_report(
     crossed_study: tuple[Path, list[FinishedRun]], tmp_path: Path
 ) -> None:
     out, runs = crossed_study
-    kept = []
-    for run in runs:
-        folder = tmp_path / "runs" / run.folder.name
-        keep(StudyRun(run.case.situation, run.case.method, run.case.seed, run.folder), folder)
-        kept.append(replace(run, folder=folder))
-    names = [f"crossed.{kind}" for kind in ("md", "json", "csv")]
+    write_archive(runs, tmp_path / FILE)
     write_crossed(runs, out, "quick")
-    write_crossed(kept, tmp_path, "quick")
-    for name in names:
+    write_crossed(read_archive(tmp_path / FILE), tmp_path, "quick")
+    for name in (f"crossed.{kind}" for kind in ("md", "json", "csv")):
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
 
 
-def test_what_is_there_stays(runs: list[StudyRun], tmp_path: Path) -> None:
-    small = tmp_path / "run"
-    keep(runs[0], small)
-    before = {path: path.stat().st_mtime_ns for path in small.rglob("*")}
-    keep(runs[0], small)
-    with pytest.raises(RunError, match="holds another run than"):
-        keep(runs[1], small)
-    assert {path: path.stat().st_mtime_ns for path in small.rglob("*")} == before
+def test_what_is_no_archive_is_refused(runs: list[FinishedRun], tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    with pytest.raises(RunError, match="missing, or not a plain file"):
+        read_archive(path)
+    path.write_bytes(b"PAR1, or so")
+    with pytest.raises(RunError, match=r"not a file of innerattn\.archive"):
+        read_archive(path)
+    write_archive(runs[:2], path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-30])
+    with pytest.raises(RunError, match=r"not a file of innerattn\.archive"):
+        read_archive(path)
+    path.write_bytes(whole)
+    (tmp_path / "link").symlink_to(path)
+    with pytest.raises(RunError, match="not a plain file"):
+        read_archive(tmp_path / "link")
+
+    def rewrite(column: str, value: str, version: int = 1) -> None:
+        table = pq.read_table(pa.BufferReader(whole))
+        values = pa.array([value] * len(table))
+        table = table.set_column(table.column_names.index(column), column, values)
+        head = {"format": FORMAT, "schema_version": version, "reward_names": ["rescue"]}
+        pq.write_table(table.replace_schema_metadata({FORMAT: json.dumps(head)}), path)
+
+    rewrite("name", "run", version=2)
+    with pytest.raises(RunError, match="schema version 2, only 1 is known"):
+        read_archive(path)
+    for column in ("config", "info", "summary"):
+        rewrite(column, "{}")
+        with pytest.raises(RunError, match=rf"{FILE}"):
+            read_archive(path)
 
 
-def test_a_run_that_is_not_whole_is_not_kept(runs: list[StudyRun], tmp_path: Path) -> None:
-    shutil.copytree(runs[0].folder, tmp_path / "run")
-    (tmp_path / "run" / "evaluation" / "summary.json").unlink()
-    with pytest.raises(RunError, match="no finished evaluation"):
-        keep(replace(runs[0], folder=tmp_path / "run"), tmp_path / "kept" / "run")
-    assert not (tmp_path / "kept").exists()
-    shutil.rmtree(tmp_path / "run" / "checkpoints")
-    with pytest.raises(RunError, match="holds no checkpoint yet"):
-        digests(tmp_path / "run")
+def test_nothing_is_written_of_runs_that_cannot_be_read(
+    runs: list[FinishedRun], tmp_path: Path
+) -> None:
+    (tmp_path / "empty").mkdir()
+    bad = replace(runs[0], read=lambda: [])
+    with pytest.raises(RunError, match="holds no episodes of td-inner"):
+        write_archive([runs[1], bad], tmp_path / FILE)
+    rewards = replace(runs[0].recorded, reward_names=("a", "b", "c", "d"))
+    with pytest.raises(RunError, match="must be the same"):
+        write_archive([runs[1], replace(runs[0], read=lambda: [rewards])], tmp_path / FILE)
+    assert not (tmp_path / FILE).exists()
+
+
+def test_records_without_a_label_of_their_length_are_told_apart(
+    runs: list[FinishedRun], tmp_path: Path
+) -> None:
+    """Records from before the label: of each policy, the second length begins at 0 again."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for name in ("config.toml", "run.json"):
+        (folder / name).write_bytes((runs[0].folder / name).read_bytes())
+    (folder / "evaluation").mkdir()
+    for file in (runs[0].folder / "evaluation").iterdir():
+        target = folder / "evaluation" / file.name
+        if file.suffix != ".parquet":
+            target.write_bytes(file.read_bytes())
+            continue
+        table = pq.read_table(file)
+        head = json.loads(table.schema.metadata[b"innerattn.records"])
+        for record in head["records"]:
+            assert record.pop("length") in ("standard", "long")
+        metadata = {"innerattn.records": json.dumps(head)}
+        pq.write_table(table.replace_schema_metadata(metadata), target)
+    older = read_run(runs[0].case, folder)
+    assert [record.num_episodes for record in older.scored] == [
+        record.num_episodes for record in runs[0].scored
+    ]
+    assert np.array_equal(older.scored[1].rescues, runs[0].scored[1].rescues)

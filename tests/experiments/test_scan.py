@@ -11,7 +11,6 @@ import pytest
 from innerattn.errors import RunError
 from innerattn.experiments.failures import forget_failures, note_failure
 from innerattn.experiments.plan import PlannedRun, plan
-from innerattn.experiments.run import digests
 from innerattn.experiments.scan import RunStatus, finished_runs, scan_runs
 
 
@@ -70,20 +69,13 @@ def test_what_cannot_be_measured_again_is_left_alone(
     study: Path, planned: list[PlannedRun]
 ) -> None:
     folder = planned[0].folder
-    digest = digests(folder).weights
-    shutil.rmtree(folder / "checkpoints")  # a small copy of a run has no weights
-    edit(folder / "run.json", lambda info: info.update(weights_sha256=digest))
+    shutil.rmtree(folder / "checkpoints")
     assert find(planned, study).state == "finished"
-    first = scan_runs(planned, study, whole=True)[0]
-    assert (first.state, first.why) == (
-        "unreadable",
-        "a small copy of a run, without metrics and steps",
-    )
     (folder / "evaluation" / "summary.json").unlink()
     found = find(planned, study)
     assert (found.state, found.why) == (
         "unreadable",
-        f"kept without its weights, and {folder / 'evaluation' / 'summary.json'}: missing",
+        f"it has no weights to measure, and {folder / 'evaluation' / 'summary.json'}: missing",
     )
 
 
@@ -139,13 +131,29 @@ def test_a_key_that_came_later_has_its_default(study: Path, planned: list[Planne
     assert find(planned, study).state == "finished"
 
 
-def test_a_link_is_not_followed(study: Path, planned: list[PlannedRun], tmp_path: Path) -> None:
-    planned[0].folder.rename(tmp_path / "elsewhere")
-    planned[0].folder.symlink_to(tmp_path / "elsewhere")
-    assert find(planned, study).state == "unreadable"
+def test_a_linked_run_folder_is_followed_and_a_linked_file_is_not(
+    study: Path, planned: list[PlannedRun], tmp_path: Path
+) -> None:
+    folder = planned[0].folder
+    folder.rename(tmp_path / "elsewhere")
+    folder.symlink_to(tmp_path / "elsewhere")
+    assert find(planned, study).state == "finished"
+    for name in (
+        "run.json",
+        "config.toml",
+        "evaluation/summary.json",
+        "evaluation/rescues.parquet",
+    ):
+        file = tmp_path / "elsewhere" / name
+        file.rename(tmp_path / "file")
+        file.symlink_to(tmp_path / "file")
+        found = find(planned, study)
+        assert (found.state, str(folder / name) in (found.why or "")) == ("unreadable", True)
+        file.unlink()
+        (tmp_path / "file").rename(file)
 
 
-@pytest.mark.parametrize("name", ["run.json", "config.toml", "checkpoints/latest"])
+@pytest.mark.parametrize("name", ["run.json", "config.toml"])
 def test_what_is_damaged_is_named(name: str, study: Path, planned: list[PlannedRun]) -> None:
     (planned[0].folder / name).write_text("?")
     found = find(planned, study)

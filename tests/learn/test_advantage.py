@@ -77,7 +77,7 @@ def test_the_scale_is_that_of_all_returns_seen() -> None:
     open_returns, seen = np.zeros((2, 3)), []
     for _ in range(4):
         reward, ended = rng.normal(2.0, 3.0, size=(5, 2, 3)), rng.random((5, 3)) < 0.3
-        scale.see(torch.tensor(reward), torch.tensor(ended))
+        scale.update(torch.tensor(reward), torch.tensor(ended))
         for step in range(5):
             open_returns = reward[step] + 0.9 * open_returns
             seen.append(open_returns.copy())
@@ -85,10 +85,10 @@ def test_the_scale_is_that_of_all_returns_seen() -> None:
     expected = np.stack(seen, axis=1).reshape(2, -1)
     assert scale.count.item() == expected.shape[1]
     np.testing.assert_allclose(scale.mean, expected.mean(axis=1), rtol=1e-12)
-    np.testing.assert_allclose(scale.deviation(1e-3), expected.std(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(scale.std(1e-3), expected.std(axis=1), rtol=1e-12)
 
 
 def test_constant_rewards_of_nothing_are_divided_by_the_floor() -> None:
     scale = ReturnScale(1, 0.9, torch.device("cpu"))
-    scale.see(torch.zeros(3, 1, 2), torch.zeros(3, 2, dtype=torch.bool))
-    assert scale.deviation(0.01).tolist() == [0.01]
+    scale.update(torch.zeros(3, 1, 2), torch.zeros(3, 2, dtype=torch.bool))
+    assert scale.std(0.01).tolist() == [0.01]

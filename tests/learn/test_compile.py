@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from innerattn.config.run import NetworkConfig, PPOConfig, TDConfig
+from innerattn.config import NetworkConfig, PPOConfig, TDConfig
 from innerattn.learn import PPO, TD, Team, Transitions
 from innerattn.learn.actor_critic import ActorCritic
 from innerattn.nn import EntityColumns
@@ -25,16 +25,20 @@ def columns(robots: int) -> EntityColumns:
 
 
 def make(algorithm: str, robots: int, network: dict, numbers: dict) -> ActorCritic:
-    team = Team(robots, columns(robots).width, 3)
+    team = Team(
+        robots,
+        columns(robots).width,
+        3,
+        kinds=("one", *["another"] * (robots - 1)),
+        availability_column=AVAILABLE,
+        entities=columns(robots),
+    )
     given = NetworkConfig(**NETWORK, **network)
     common = {"critic_weight_decay": 0.01, "attention_logit_penalty": 0.1, **numbers}
     extra = {
         "seed": 3,
         "device": torch.device("cpu"),
         "dtype": torch.float64,
-        "availability_column": AVAILABLE,
-        "entities": columns(robots),
-        "kinds": ["one", *["another"] * (robots - 1)],
     }
     if algorithm == "td":
         few = {"batch_size": 7, "warmup_env_steps": 0, "update_every_env_steps": 12}
@@ -58,7 +62,7 @@ def learn(learner: ActorCritic, robots: int) -> list[dict[str, float]]:
     found = []
     for step in range(2 * STEPS):
         learner.observe(transitions(robots, step), torch.zeros(ENVS, dtype=torch.bool))
-        learner.reach(step / (2 * STEPS))
+        learner.set_progress(step / (2 * STEPS))
         metrics = learner.learn()
         found += [] if metrics is None else [metrics]
     return found

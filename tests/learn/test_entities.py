@@ -3,8 +3,7 @@
 import pytest
 import torch
 
-from innerattn.config import NetworkConfig, TDConfig
-from innerattn.config.run import PPOConfig
+from innerattn.config import NetworkConfig, PPOConfig, TDConfig
 from innerattn.learn import PPO, TD, Team, Transitions
 from innerattn.learn.actor_critic import ActorCritic
 from innerattn.nn import EntityColumns
@@ -18,8 +17,8 @@ def columns(robots: int) -> EntityColumns:
 
 def make(algorithm: str, robots: int, encoder: str = "entities", **network: object) -> ActorCritic:
     given = NetworkConfig(hidden_width=32, attention_heads=2, encoder=encoder, **network)
-    team = Team(robots, columns(robots).width, ACTIONS)
-    extra = {"seed": 1, "device": torch.device("cpu"), "entities": columns(robots)}
+    team = Team(robots, columns(robots).width, ACTIONS, entities=columns(robots))
+    extra = {"seed": 1, "device": torch.device("cpu")}
     if algorithm == "td":
         few = TDConfig(batch_size=8, warmup_env_steps=0, update_every_env_steps=8)
         return TD(team, given, few, **extra)
@@ -82,6 +81,7 @@ def test_flat_networks_ignore_whose_the_columns_are() -> None:
 
 @pytest.mark.parametrize("entities", [None, columns(2)])
 def test_columns_must_be_those_of_the_observation(entities: EntityColumns | None) -> None:
-    network, team = NetworkConfig(encoder="entities"), Team(3, columns(3).width, ACTIONS)
+    network = NetworkConfig(encoder="entities")
+    team = Team(3, columns(3).width, ACTIONS, entities=entities)
     with pytest.raises(ValueError, match=r"entities = .*'entities' needs the 17 columns"):
-        TD(team, network, TDConfig(), seed=1, device=torch.device("cpu"), entities=entities)
+        TD(team, network, TDConfig(), seed=1, device=torch.device("cpu"))

@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from innerattn.config.run import NetworkConfig, PPOConfig, TDConfig
+from innerattn.config import NetworkConfig, PPOConfig, TDConfig
 from innerattn.learn import PPO, TD, Team, Transitions
 
 TEAM = Team(3, 6, 5)

@@ -4,8 +4,10 @@ import math
 
 import pytest
 import torch
+from torch import Tensor
 
 from innerattn.learn import losses
+from innerattn.nn import Attended
 
 HALF = math.log(0.5)
 
@@ -30,13 +32,23 @@ def test_critic_loss_is_a_mean_over_the_batch_and_a_sum_over_robots() -> None:
     assert losses.critic_loss(q, target).item() == pytest.approx((1 + 4) / 2 + 1 / 2)
 
 
-def test_logit_penalty_counts_visible_pairs() -> None:
+def attended(scores: Tensor | None, visible: Tensor) -> Attended:
+    return Attended(torch.zeros(1), torch.zeros(1), scores, visible)
+
+
+def test_logit_regularisation_counts_visible_pairs() -> None:
     scores = torch.tensor([[[[9.0, 2.0], [4.0, 9.0]]]])
     visible = torch.tensor([[[False, True], [True, False]]])
-    assert losses.attention_logit_penalty(scores, visible).item() == 4 + 16
-    assert losses.attention_logit_penalty(scores, visible & False).item() == 0
-    alone = losses.attention_logit_penalty(scores[..., :1, :1], visible[:, :1, :1])
-    assert alone.item() == 0
+
+    def value(given: Attended, weight: float = 0.5) -> float:
+        return float(losses.attention_logit_regularisation(given, weight))
+
+    assert value(attended(scores, visible)) == 0.5 * (4 + 16)
+    assert value(attended(scores, visible), weight=0.0) == 0
+    assert value(attended(scores, visible & False)) == 0
+    assert value(attended(scores[..., :1, :1], visible[:, :1, :1])) == 0  # a robot alone
+    assert value(attended(None, visible)) == 0
+    assert losses.attention_logit_regularisation(None, 0.5) == 0
 
 
 def test_policy_losses() -> None:

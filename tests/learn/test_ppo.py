@@ -8,8 +8,7 @@ import torch
 from reference import Adam, PlainNetwork, PlainTD, clip_factor, pick, policy, values
 from torch import Tensor
 
-from innerattn.config import NetworkConfig
-from innerattn.config.run import PPOConfig
+from innerattn.config import NetworkConfig, PPOConfig
 from innerattn.learn import PPO, Team, Transitions, ppo
 
 CPU = torch.device("cpu")
@@ -344,7 +343,7 @@ def test_a_loaded_learner_equals_the_saved_one() -> None:
     saved.learn()
     loaded.load(saved.state())
     assert loaded.updates == saved.updates
-    assert loaded.scale.deviation(1e-3).tolist() == saved.scale.deviation(1e-3).tolist()
+    assert loaded.scale.std(1e-3).tolist() == saved.scale.std(1e-3).tolist()
     obs = torch.randn(6, 3, OBS_WIDTH)
     assert torch.equal(loaded.act(obs, greedy=True), saved.act(obs, greedy=True))
     with pytest.raises(ValueError, match=r"state has no tensor 'scale\.count'"):

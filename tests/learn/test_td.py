@@ -23,9 +23,15 @@ NUMBERS = {
 }
 
 
-def make(robots: int, network: dict | None = None, numbers: dict | None = None, **extra) -> TD:
+def make(
+    robots: int,
+    network: dict | None = None,
+    numbers: dict | None = None,
+    column: int | None = None,
+    **extra,
+) -> TD:
     return TD(
-        Team(robots, OBS_WIDTH, NUM_ACTIONS),
+        Team(robots, OBS_WIDTH, NUM_ACTIONS, availability_column=column),
         NetworkConfig(**{**NETWORK, **(network or {})}),
         TDConfig(**{**NUMBERS, **(numbers or {})}),
         **{"seed": 3, "device": CPU, "dtype": torch.float64, **extra},
@@ -126,7 +132,7 @@ def test_masked_updates_agree_with_the_plain_form(
     attention: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     network = {"attention": attention, "mask_unavailable": True}
-    learner = make(3, network, availability_column=AVAILABLE)
+    learner = make(3, network, column=AVAILABLE)
     plain = PlainTD(
         learner.state(), NetworkConfig(**NETWORK, **network), learner._config, AVAILABLE
     )
@@ -142,14 +148,14 @@ def test_masked_updates_agree_with_the_plain_form(
 @pytest.mark.parametrize("column", [None, -1, OBS_WIDTH])
 def test_masking_needs_a_column_of_the_observation(column: int | None) -> None:
     with pytest.raises(ValueError, match=r"availability_column = .*0\.\.4"):
-        make(3, {"mask_unavailable": True}, availability_column=column)
+        make(3, {"mask_unavailable": True}, column=column)
 
 
-@pytest.mark.parametrize("kinds", [None, ["food", "food"]])
-def test_sharing_by_kind_needs_the_kinds_of_the_team(kinds: list[str] | None) -> None:
-    network, team = NetworkConfig(parameter_sharing="kind"), Team(3, 4, 5)
+@pytest.mark.parametrize("kinds", [None, ("food", "food")])
+def test_sharing_by_kind_needs_the_kinds_of_the_team(kinds: tuple[str, ...] | None) -> None:
+    network, team = NetworkConfig(parameter_sharing="kind"), Team(3, 4, 5, kinds)
     with pytest.raises(ValueError, match=r"^kinds = .*'kind' needs those of 3 robots$"):
-        TD(team, network, TDConfig(), seed=1, device=torch.device("cpu"), kinds=kinds)
+        TD(team, network, TDConfig(), seed=1, device=torch.device("cpu"))
 
 
 @pytest.mark.parametrize("attention", ["inner", "uniform"])
@@ -215,7 +221,7 @@ def test_the_step_size_falls_evenly(share: float, rate: float) -> None:
     numbers = {"learning_rate": 0.01, "final_learning_rate_share": 0.2}
     learner = make(2, numbers=numbers)
     before = learner.state()
-    learner.reach(share)
+    learner.set_progress(share)
     learner.update(transitions(2, seed=1))
     after = learner.state()
     moved = (after["critic.output.bias"] - before["critic.output.bias"]).abs()

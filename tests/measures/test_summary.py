@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from innerattn.config import Scenario
+from innerattn.measures import measures_of
 from innerattn.measures.summary import summarise
 from innerattn.records.record import Record, rescue_dtype
+from innerattn.stats.estimate import as_json
 
 SCENARIO = Scenario.preset("double")
 NAMES = tuple(robot.name for robot in SCENARIO.robots)
@@ -88,6 +90,13 @@ def test_document() -> None:
     for name in ("rescues_per_episode", "score"):
         assert set(document[name]) == {"mean", "low", "high"}
     assert document["long"]["scripted"]["hungarian"]["mean"] == 3.0
+    for part in (document, document["long"]):
+        assert list(part["measures"]) == ["td-inner", "random", "greedy", "hungarian"]
+        for name, parts in STANDARD.items():
+            assert part["measures"][name] == as_json(measures_of(*parts))
+    own = document["measures"]["td-inner"]
+    assert own["rescues_per_episode"] == document["rescues_per_episode"]
+    assert own["left"] is None  # victims were not recorded
     assert {
         "policy": "runs/x",
         "method": "td-inner",

@@ -7,11 +7,10 @@ import pytest
 
 from innerattn.stats.intervals import (
     mean_interval,
-    resampled_counts,
-    resampled_means,
     score_interval,
     student_interval,
 )
+from innerattn.stats.resampling import resampled_counts, resampled_means
 
 
 def test_resampling_against_every_possible_resample() -> None:

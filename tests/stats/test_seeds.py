@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from innerattn.stats import Estimate
 from innerattn.stats.intervals import student_interval
 from innerattn.stats.seeds import numbers, seed_curve, seed_estimate
 
@@ -18,7 +19,7 @@ def test_a_mean_says_how_many_runs_have_it() -> None:
     )
     alone = seed_estimate([None, 2.0])
     assert alone is not None
-    assert (alone.mean, alone.low, alone.runs) == (2.0, None, 1)
+    assert alone == Estimate(2.0, runs=1)
     assert seed_estimate([None, math.nan]) is None
 
 

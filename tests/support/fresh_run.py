@@ -26,5 +26,7 @@ def make_run(folder: Path, config: RunConfig) -> Path:
     """A run folder with the weights that training begins with."""
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         learner = build_learner(config, env)
-    RunFolder.create(folder, config, threads=1).save_weights(learner.state(), 0)
+    run = RunFolder.create(folder, config, threads=1)
+    run.save_weights(learner.state(), 0)
+    run.mark("done", 0, 0, 0.0)
     return folder

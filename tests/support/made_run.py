@@ -10,30 +10,44 @@ from fresh_run import make_run
 from innerattn.config import load_run_config
 from innerattn.evaluate.measure import Evaluation
 from innerattn.evaluate.play import run_episodes
-from innerattn.experiments.run import StudyRun
+from innerattn.experiments.plan import Case
+from innerattn.experiments.run import FinishedRun, read_run
+from innerattn.measures.registry import needed_fields
 from innerattn.measures.summary import summarise
 from innerattn.policies import SCRIPTED, scripted_policy
 from innerattn.records.record import Record
 
-RECORDED, SCORED, LONG, HEADS, ROBOTS = 40, 60, 2, 2, 4
+RECORDED, SCORED, LONG, LONG_STEPS, HEADS, ROBOTS = 40, 60, 2, 30, 2, 4
 LOGGED = 12
 FIELDS = ("positions", "velocities", "victims")
 
 
 def made_run(
     folder: Path, situation: str, method: str, seed: int, chance: int | None = None
-) -> StudyRun:
+) -> FinishedRun:
     """Robots go as the greedy dispatch sends them; attention and entropy are random.
 
     Worlds and what is random are those of ``chance``; None: of ``seed``.
     """
     chance = seed if chance is None else chance
-    small = {"train.method": method, "train.seed": seed, "train.threads": 1}
-    config = load_run_config(situation, overrides={**small, "network.hidden_width": 8})
+    config = load_run_config(
+        situation,
+        overrides={
+            "train.method": method,
+            "train.seed": seed,
+            "train.threads": 1,
+            "network.hidden_width": 8,
+            "evaluate.episodes": RECORDED,
+            "evaluate.score_episodes": SCORED,
+            "evaluate.long_episodes": LONG,
+            "evaluate.long_episode_steps": LONG_STEPS,
+            "evaluate.seed": chance,
+        },
+    )
     path = make_run(folder / f"{situation}-{method}-s{seed}", config)
     rng = np.random.default_rng(chance)
     _write_metrics(path / "metrics.jsonl", method, rng)
-    worlds, long_worlds = config.scenario, config.scenario.replace(episode_steps=30)
+    worlds, long_worlds = config.scenario, config.scenario.replace(episode_steps=LONG_STEPS)
 
     def run(name: str, count: int, first: int = 0, fields: tuple[str, ...] = ()) -> Record:
         policy = scripted_policy(name, worlds, chance)
@@ -44,13 +58,13 @@ def made_run(
     recorded = replace(recorded, policy=method, steps={**recorded.steps, "attention": weights})
     rest = replace(run("greedy", SCORED - RECORDED, RECORDED), policy=method)
     long = run_episodes(scripted_policy("greedy", long_worlds, chance), long_worlds, LONG, chance)
-    scripted = {name: [run(name, SCORED)] for name in SCRIPTED}
+    scripted = {name: [run(name, SCORED, 0, needed_fields())] for name in SCRIPTED}
     standard = {method: [recorded, rest], **scripted}
-    longer = {name: [replace(long, policy=name)] for name in standard}
+    longer = {name: [replace(long, policy=name, length="long")] for name in standard}
     summary = summarise(path.name, recorded, standard, longer)
     parts = [record for group in (standard, longer) for all_ in group.values() for record in all_]
     Evaluation(summary, tuple(parts)).write(path / "evaluation")
-    return StudyRun(situation, method, seed, path)
+    return read_run(Case(situation, method, seed), path)
 
 
 def made_attention(rng: np.random.Generator, method: str, record: Record) -> np.ndarray:

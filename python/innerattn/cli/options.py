@@ -8,12 +8,14 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 from innerattn.config import RunConfig
+from innerattn.config.model import OneOf
 from innerattn.errors import InnerattnError, RunError
 
 _SHORT = ("method", "warm_start", "seed", "device", "compile")
@@ -62,14 +64,14 @@ def short_option(name: str, default: object) -> OptionField:
     """An option for key ``name`` of the section `train`."""
     info = type(RunConfig().train).model_fields[name]
     note = tyro.conf.arg(aliases=[f"--train.{name}"], help=info.description)
-    return name, Annotated[info.annotation, note], field(default=default)
+    return name, Annotated[_type_of(info), note], field(default=default)
 
 
 def run_options(defaults: RunConfig) -> list[OptionField]:
     """Options for every key of a run, with ``defaults``, as fields of a dataclass for tyro."""
     options = [short_option(name, getattr(defaults.train, name)) for name in _SHORT]
-    for section in RunConfig.model_fields:
-        kind: Any = _section_type(section, getattr(defaults, section))
+    for section, values in defaults:
+        kind: Any = _section_type(section, values)
         options.append((section, kind, field(default_factory=kind)))
     return options
 
@@ -77,7 +79,7 @@ def run_options(defaults: RunConfig) -> list[OptionField]:
 def changed(command: object, defaults: RunConfig) -> dict[str, object]:
     """The values of a parsed command that differ from ``defaults``, by dotted key."""
     values = {f"train.{name}": getattr(command, name) for name in _SHORT}
-    for section in RunConfig.model_fields:
+    for section, _ in defaults:
         given = vars(getattr(command, section))
         values |= {f"{section}.{name}": value for name, value in given.items()}
     before = defaults.model_dump()
@@ -88,11 +90,19 @@ def changed(command: object, defaults: RunConfig) -> dict[str, object]:
     }
 
 
+def _type_of(info: FieldInfo) -> Any:
+    """The type of a key; a word of a list that extensions may add to is one of today's list."""
+    for note in info.metadata:
+        if isinstance(note, OneOf):
+            return Literal[tuple(note.words())]
+    return info.annotation
+
+
 def _section_type(section: str, defaults: BaseModel) -> type:
     options: list[OptionField] = [
         (
             name,
-            Annotated[info.annotation, tyro.conf.arg(help=info.description)],
+            Annotated[_type_of(info), tyro.conf.arg(help=info.description)],
             field(default=getattr(defaults, name)),
         )
         for name, info in type(defaults).model_fields.items()

@@ -93,7 +93,8 @@ class Reproduce(Command):
                 write_account(out, self.target, self.budget, found)
                 _say_what_is_kept(found)
                 raise
-            found = scan_runs(planned, out, whole=whole)
+            if not self.report_only:
+                found = scan_runs(planned, out, whole=whole)
             write_account(out, self.target, self.budget, found)
             note = smoke_note(self.budget)
             unusable = [one for one in found if one.state != "finished"]

@@ -21,7 +21,7 @@ from innerattn.report.tables.robustness import print_robustness
 
 if TYPE_CHECKING:
     from innerattn.config import Scenario
-    from innerattn.evaluate.bounds.figures import Bounds
+    from innerattn.evaluate.bounds.results import Bounds
     from innerattn.evaluate.faults.grid import Grid, MakePolicy, Retention
     from innerattn.evaluate.trained import TrainedPolicy
     from innerattn.measures.faults.shift_results import FaultAttention

@@ -16,7 +16,8 @@ from innerattn.cli.options import Command, UsageError, changed, run_options
 from innerattn.cli.progress import Evaluating, SeveralRuns, Training
 from innerattn.cli.seeds import parse_seeds
 from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
-from innerattn.config.run import Method, WarmStart
+from innerattn.config.registry import methods
+from innerattn.config.sections import WarmStart
 from innerattn.cores import usable_cores
 from innerattn.experiments.side_by_side import Run, refuse_what_cannot_run, train_side_by_side
 from innerattn.report.tables.evaluation import print_seeds, print_summary
@@ -24,8 +25,9 @@ from innerattn.report.tables.evaluation import print_seeds, print_summary
 if TYPE_CHECKING:
     Preset: TypeAlias = str
     Budget: TypeAlias = str
+    Method: TypeAlias = str
 else:
-    Preset, Budget = Literal[SCENARIOS], Literal[BUDGETS]
+    Preset, Budget, Method = Literal[SCENARIOS], Literal[BUDGETS], Literal[tuple(methods())]
 
 
 @dataclass(kw_only=True)

@@ -4,22 +4,23 @@ It validates and reads and writes TOML; it steps no world, trains nothing and pr
 """
 
 from innerattn.config.load import load_run_config, read_toml, write_toml
-from innerattn.config.run import (
-    BUDGETS,
-    EvaluateConfig,
-    ImitationConfig,
-    NetworkConfig,
-    PPOConfig,
-    RunConfig,
-    TDConfig,
-    TrainConfig,
-    refuse_late_faults,
+from innerattn.config.ppo import PPOConfig
+from innerattn.config.registry import (
+    Algorithm,
+    AlgorithmConfig,
+    register_algorithm,
+    register_attention,
 )
+from innerattn.config.run import BUDGETS, RunConfig, refuse_late_faults
 from innerattn.config.scenario import SCENARIOS, Fault, Obstacle, Robot, Scenario, Task
+from innerattn.config.sections import EvaluateConfig, ImitationConfig, NetworkConfig, TrainConfig
+from innerattn.config.td import TDConfig
 
 __all__ = [
     "BUDGETS",
     "SCENARIOS",
+    "Algorithm",
+    "AlgorithmConfig",
     "EvaluateConfig",
     "Fault",
     "ImitationConfig",
@@ -35,5 +36,7 @@ __all__ = [
     "load_run_config",
     "read_toml",
     "refuse_late_faults",
+    "register_algorithm",
+    "register_attention",
     "write_toml",
 ]

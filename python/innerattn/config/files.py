@@ -8,17 +8,19 @@ from __future__ import annotations
 import os
 import tomllib
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
 from innerattn.errors import ConfigError
 
-_PRESETS = files("innerattn.config") / "presets"
+PRESETS = files("innerattn.config") / "presets"
+"""Folder of the built-in presets."""
 
 
 def preset_names(folder: str) -> tuple[str, ...]:
     """Names of the presets in ``folder`` ("scenarios" or "budgets"), sorted."""
-    entries = (entry.name for entry in (_PRESETS / folder).iterdir())
+    entries = (entry.name for entry in (PRESETS / folder).iterdir())
     return tuple(sorted(name[:-5] for name in entries if name.endswith(".toml")))
 
 
@@ -32,7 +34,13 @@ def preset_table(folder: str, name: str) -> dict[str, Any]:
     if name not in known:
         what = folder.removesuffix("s")
         raise ConfigError(f"unknown {what} preset {name!r}: known are {', '.join(known)}")
-    return tomllib.loads((_PRESETS / folder / f"{name}.toml").read_text("utf-8"))
+    return tomllib.loads((PRESETS / folder / f"{name}.toml").read_text("utf-8"))
+
+
+def budget_table(folder: Traversable | None, budget: str) -> dict[str, Any]:
+    """What an algorithm changes in a budget: the table in ``folder``, or nothing without a file."""
+    file = folder / f"{budget}.toml" if folder is not None else None
+    return tomllib.loads(file.read_text("utf-8")) if file is not None and file.is_file() else {}
 
 
 def toml_table(path: str | Path) -> dict[str, Any]:

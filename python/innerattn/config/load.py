@@ -1,7 +1,7 @@
 """From presets, a file and single values to one `RunConfig`, and from there to TOML and back.
 
-Later sources win: scenario preset, budget, what the budget says for PPO, what it says for PPO after
-a warm start, configuration file, single values.
+Later sources win: scenario preset, budget, what the algorithm changes in the budget, what it
+changes after a warm start, configuration file, single values.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
-from innerattn.config.files import preset_table, toml_table, write_whole
+from innerattn.config.files import budget_table, preset_table, toml_table, write_whole
 from innerattn.config.model import config_error
-from innerattn.config.run import RunConfig, on_policy
+from innerattn.config.registry import methods
+from innerattn.config.run import RunConfig
 from innerattn.config.scenario import Scenario
 from innerattn.errors import ConfigError
 
@@ -56,10 +57,11 @@ def load_run_config(
     chosen = {name: single.get(f"train.{name}", train.get(name)) for name in _CHOOSING}
     table: dict[str, Any] = {"scenario": preset_table("scenarios", preset)}
     _merge(table, preset_table("budgets", budget))
-    if on_policy(chosen["method"]):
-        _merge(table, preset_table("budgets/ppo", budget))
+    known = methods().get(str(chosen["method"]))
+    if known is not None:
+        _merge(table, budget_table(known.algorithm.budgets, budget))
         if chosen["warm_start"] not in (None, "none"):
-            _merge(table, preset_table("budgets/ppo-warm", budget))
+            _merge(table, budget_table(known.algorithm.warm_budgets, budget))
     _merge(table, given)
     for key, value in single.items():
         section, dot, name = key.partition(".")

@@ -5,13 +5,50 @@ It knows no field of any model.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
-from pydantic_core import PydanticCustomError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from innerattn.errors import ConfigError
+
+MOST_ROWS = 1_000_000_000
+"""Upper limit of what is held in memory: far beyond what any machine holds."""
+MOST_STEPS = 1_000_000_000_000_000
+"""Upper limit of what is counted in steps."""
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """Annotates a word that must be one of a list, which extensions may add to.
+
+    Attributes:
+        words: Gives the list when a value is checked.
+    """
+
+    words: Callable[[], Iterable[str]]
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Check the word after its type."""
+        return core_schema.no_info_after_validator_function(self._check, handler(source))
+
+    def _check(self, value: str) -> str:
+        *others, last = (repr(word) for word in self.words())
+        if repr(value) not in (*others, last):
+            known = f"{', '.join(others)} or {last}"
+            raise PydanticCustomError("word", "Input should be {known}", {"known": known})
+        return value
 
 
 class Model(BaseModel):

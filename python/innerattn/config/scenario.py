@@ -1,15 +1,17 @@
 """The description of one rescue world: team, tasks, arena, reward.
 
 Names, types, defaults and units live here; ranges and rules between fields live in the compiled
-module, which checks every scenario when it is made.
+module, which checks every scenario once, when it is made. What that check returns is what worlds
+are made of.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, ValidationError
 
 from innerattn import _core
 from innerattn.config.files import preset_names, preset_table, toml_table
@@ -71,9 +73,11 @@ class Fault(Model):
         "lost_communication",
     ] = Field(description="what goes wrong")
     value: float = Field(
-        description="how badly; motor_gain, speed_limit: share that is left; heading_bias [rad]; "
-        "position_noise [m], velocity_noise [m/s]: deviation on each axis; others: share of the "
-        "control steps that are struck"
+        description="how badly; "
+        + "; ".join(
+            f"{name}: {meaning}" + f" [{unit}]" * bool(unit)
+            for name, unit, _, _, _, meaning in _core.FAULT_KINDS
+        )
     )
     onset_step: Count = Field(
         0, description="control step at which it begins, or from which on it may begin at random"
@@ -165,10 +169,24 @@ class Scenario(Model):
         False, description="let robots see the faults in effect, their own and their teammates'"
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        _core.check_scenario(self.model_dump_json())
-        return self
+    _rules: _core.Rules = PrivateAttr()
+
+    def model_post_init(self, _context: object, /) -> None:
+        """Check the scenario and keep what the check returned."""
+        self._rules = _core.Rules(self.model_dump_json())
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy; one with changed fields is checked, as `replace` does.
+
+        Raises:
+            ConfigError: unknown field or invalid value.
+        """
+        return self.replace(**update) if update else super().model_copy(deep=deep)
+
+    @property
+    def rules(self) -> _core.Rules:
+        """This scenario as the compiled module found it valid: what a batch of worlds takes."""
+        return self._rules
 
     @classmethod
     def preset(cls, name: str) -> Scenario:
@@ -208,4 +226,4 @@ class Scenario(Model):
     @property
     def num_victims(self) -> int:
         """Number of victim slots V."""
-        return {"single": 1, "double": len(self.tasks), "mixed": self.max_victims}[self.situation]
+        return self._rules.num_victims

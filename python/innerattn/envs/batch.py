@@ -27,7 +27,7 @@ _VICTIM_DTYPE = np.dtype(
 )
 
 
-FAULT_KINDS: tuple[str, ...] = tuple(_core.Batch.fault_kinds())
+FAULT_KINDS: tuple[str, ...] = tuple(name for name, *_ in _core.FAULT_KINDS)
 """Kinds of faults; `BatchEnv.fault_state` has a field for each."""
 _FAULT_DTYPE = np.dtype([(kind, "f4") for kind in FAULT_KINDS])
 
@@ -77,7 +77,8 @@ class BatchEnv:
         MemoryError: the arrays do not fit.
     """
 
-    reward_component_names: tuple[str, ...] = tuple(_core.Batch.reward_component_names())
+    reward_component_names: tuple[str, ...] = tuple(name for name, _ in _core.REWARD_COMPONENTS)
+    """Names of the C reward components."""
 
     def __init__(
         self,
@@ -99,7 +100,7 @@ class BatchEnv:
         if autoreset not in ("same_step", "disabled"):
             raise ValueError(f"autoreset = {autoreset!r}: must be 'same_step' or 'disabled'")
         self._batch: _core.Batch | None = _core.Batch(
-            self.scenario.model_dump_json(),
+            self.scenario.rules,
             _whole("num_envs", num_envs, 1, 2**20),
             _whole("seed", seed, 0, 2**64 - 1),
             None if num_threads is None else _whole("num_threads", num_threads, 1, 256),
@@ -158,7 +159,7 @@ class BatchEnv:
         return self._core.observe()
 
     def reward_components(self) -> NDArray[np.float32]:
-        """Rewards of the last step, (E, R, 4) float32, columns `reward_component_names`."""
+        """Rewards of the last step, (E, R, C) float32, columns `reward_component_names`."""
         return self._lend(self._core.reward_components())
 
     def positions(self) -> NDArray[np.float32]:

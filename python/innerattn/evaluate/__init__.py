@@ -6,17 +6,18 @@ It trains nothing and prints nothing.
 from innerattn.evaluate.measure import Evaluation, evaluate_policy, evaluate_run
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import TrainedPolicy, load_trained
-from innerattn.measures.summary import Figures, Summary
+from innerattn.measures.summary import Performance, Summary
 from innerattn.policies import SCRIPTED, Policy, PolicyInput, scripted_policy
 from innerattn.records.parquet import read_records, write_records
 from innerattn.records.record import Record
-from innerattn.stats.intervals import Interval, student_interval
+from innerattn.stats import Estimate
+from innerattn.stats.intervals import student_interval
 
 __all__ = [
     "SCRIPTED",
+    "Estimate",
     "Evaluation",
-    "Figures",
-    "Interval",
+    "Performance",
     "Policy",
     "PolicyInput",
     "Record",

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from innerattn.config import EvaluateConfig, Scenario, refuse_late_faults
 from innerattn.config.files import write_whole
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
+from innerattn.measures.registry import needed_fields
 from innerattn.measures.summary import Summary, summarise
 from innerattn.policies import SCRIPTED, Policy, scripted_policy
 from innerattn.records.parquet import write_records
@@ -54,7 +55,8 @@ def evaluate_policy(
 ) -> Evaluation:
     """Measure a policy against the scripted ones, all in the same worlds.
 
-    The first `settings.episodes` of the scored episodes are recorded step by step.
+    The first `settings.episodes` of the policy's scored episodes are recorded step by step. Steps
+    of scripted policies are measured and not kept.
 
     Args:
         policy: what is measured.
@@ -91,7 +93,7 @@ def evaluate_policy(
     def run(
         chosen: Policy, worlds: Scenario, episodes: int, first: int, record: tuple[str, ...]
     ) -> Record:
-        return run_episodes(
+        played = run_episodes(
             chosen,
             worlds,
             episodes,
@@ -101,6 +103,7 @@ def evaluate_policy(
             num_threads=num_threads,
             progress=count,
         )
+        return played if worlds is scenario else replace(played, length="long")
 
     long_worlds = scenario.replace(episode_steps=settings.long_episode_steps)
     recorded = run(policy, scenario, settings.episodes, 0, FIELDS)
@@ -111,11 +114,12 @@ def evaluate_policy(
     for name in names:
         chosen = policy if name == policy.name else scripted_policy(name, scenario, settings.seed)
         if chosen is not policy:
-            standard[name] = [run(chosen, scenario, scored, 0, ())]
+            standard[name] = [run(chosen, scenario, scored, 0, needed_fields())]
         long[name] = [run(chosen, long_worlds, settings.long_episodes, 0, ())]
-    parts = [record for group in (standard, long) for all_ in group.values() for record in all_]
     summary = summarise(label or policy.name, recorded, standard, long, warm_start)
-    return Evaluation(summary, tuple(parts))
+    parts = [record for group in (standard, long) for all_ in group.values() for record in all_]
+    kept = [part if part is recorded else replace(part, steps={}) for part in parts]
+    return Evaluation(summary, tuple(kept))
 
 
 def evaluate_run(

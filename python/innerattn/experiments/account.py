@@ -9,11 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from innerattn.config.files import write_whole
-from innerattn.experiments.run import digests
 from innerattn.experiments.scan import RunStatus
-from innerattn.experiments.scores import read_scores
 from innerattn.experiments.smoke import smoke_note
-from innerattn.records.run_folder import read_info
 
 SCHEMA_VERSION = 1
 
@@ -34,8 +31,7 @@ def write_account(
         The file.
 
     Raises:
-        RunError: a finished run has changed since it was found.
-        OSError: a file cannot be read or written.
+        OSError: the file cannot be written.
     """
     cases = [one.planned.case for one in found]
     document = {
@@ -62,16 +58,14 @@ def _row(out: Path, found: RunStatus) -> dict[str, Any]:
         "state": found.state,
         "why": found.why,
     }
-    if found.state != "finished":
+    if found.run is None:
         return row
-    info = read_info(planned.folder)
-    standard, long = read_scores(planned.folder, planned.config)
-    named = digests(planned.folder)
+    standard, long = found.run.scores()
     return row | {
         **asdict(standard),
         "long": asdict(long),
-        "config_sha256": named.config,
-        "weights_sha256": named.weights,
-        "commit": info.commit,
-        "versions": info.versions,
+        "config_sha256": found.run.config_sha256,
+        "weights_sha256": found.run.weights_sha256,
+        "commit": found.run.info.commit,
+        "versions": found.run.info.versions,
     }

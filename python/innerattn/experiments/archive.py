@@ -1,55 +1,176 @@
-"""A finished run in small, to be published or carried elsewhere: what its figures come from."""
+"""Finished runs of a study in one Parquet file, small enough to publish.
+
+A row is a run: its case, configuration, ``run.json`` and summary as JSON, and of its own episodes
+of the standard length the lengths, rescues and reward sums. Weights, metrics, what was recorded
+step by step and the episodes of other policies are left out. A study takes an archived run for the
+run itself; what needs the rest, such as Fig. 4 and Fig. 5, refuses it.
+"""
 
 from __future__ import annotations
 
 import json
-import os
-import shutil
-from dataclasses import asdict, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from innerattn.config import RunConfig
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
-from innerattn.experiments.run import StudyRun, digests, read_measured
-from innerattn.records.parquet import write_records
-from innerattn.records.run_folder import plain_file, read_info
+from innerattn.experiments.plan import Case
+from innerattn.experiments.run import FinishedRun, check_summary
+from innerattn.records.record import Record, rescue_dtype
+from innerattn.records.run_folder import plain_file, run_info
+
+FORMAT = "innerattn.archive"
+SCHEMA_VERSION = 1
+FILE = "archive.parquet"
+"""The name of a study's archive in its folder."""
+
+_TEXTS = ("situation", "method", "variant", "name", "config", "info", "summary")
+_COMPRESSION_LEVEL = 19
 
 
-def keep(run: StudyRun, target: Path) -> None:
-    """Make a small copy of a run folder, some hundredth of its size.
+def write_archive(runs: Iterable[FinishedRun], path: Path) -> None:
+    """Write finished runs to ``path``; the file appears whole or not at all.
 
-    It holds the configuration, ``run.json`` with the digest of the weights, and of the evaluation
-    the summary and the run's own episodes of the standard length: steps, rescues and sums of
-    rewards. It lacks weights, metrics, what was recorded step by step, and what other policies
-    did. A study takes it for a finished run; what needs the rest, such as Fig. 4 and Fig. 5,
-    refuses it.
-
-    Args:
-        run: which.
-        target: the copy; one that is there already stays as it is.
+    The same runs give the same bytes.
 
     Raises:
-        RunError: the run has no weights or no finished evaluation, or another is at ``target``.
-        ConfigError: a configuration cannot be read.
-        OSError: a file cannot be read or written; the copy is made whole or not at all.
+        RunError: records of a run cannot be read, or runs have different reward components.
+        OSError: a file cannot be read or written.
     """
-    named = digests(run.folder)
-    if os.path.lexists(target):
-        if digests(target) != named:
-            raise RunError(f"{target}: holds another run than {run.folder}; remove one of them")
-        return
-    info = replace(read_info(run.folder), weights_sha256=named.weights)
-    scored = read_measured(run, step_by_step=False).scored
-    partial = target.with_name(f".{target.name}.{os.getpid()}")
-    partial.mkdir(parents=True)
+    rows = [_row(run) for run in runs]
+    names = {tuple(row.pop("reward_names")) for row in rows}
+    if len(names) > 1:
+        raise RunError(f"{path}: runs have the reward components {sorted(names)}: must be the same")
+    columns = {key: pa.array([row[key] for row in rows], _type(key)) for key in _keys(rows)}
+    head = {
+        "format": FORMAT,
+        "schema_version": SCHEMA_VERSION,
+        "reward_names": list(names.pop()) if names else [],
+    }
+    table = pa.table(columns).replace_schema_metadata({FORMAT: json.dumps(head)})
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd", compression_level=_COMPRESSION_LEVEL)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, sink.getvalue().to_pybytes())
+
+
+def read_archive(path: Path) -> list[FinishedRun]:
+    """The runs that `write_archive` wrote, in their order, with ``archived`` set.
+
+    Each run's ``folder`` is ``runs/NAME`` beside the archive, where it would lie in a study.
+
+    Raises:
+        RunError: the file is missing, a link, damaged, of another format or version, or a run's
+            summary does not fit its configuration.
+    """
+    plain_file(path)
     try:
-        for name in ("config.toml", "evaluation/summary.json"):
-            source = plain_file(run.folder / name)
-            (partial / name).parent.mkdir(exist_ok=True)
-            write_whole(partial / name, source.read_bytes())
-        write_whole(partial / "run.json", f"{json.dumps(asdict(info), indent=1)}\n".encode())
-        write_records([replace(record, steps={}) for record in scored], partial / "evaluation")
-        os.rename(partial, target)
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
-        raise
+        with pq.ParquetFile(path) as file:
+            table = file.read()
+        head = json.loads((table.schema.metadata or {})[FORMAT.encode()])
+        version, reward_names = head["schema_version"], tuple(head["reward_names"])
+    except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
+        raise RunError(f"{path}: not a file of {FORMAT}") from error
+    if version != SCHEMA_VERSION:
+        raise RunError(f"{path}: schema version {version}, only {SCHEMA_VERSION} is known")
+    try:
+        texts = table.select([*_TEXTS, "seed"]).to_pylist()
+        return [_run(path, table, i, row, reward_names) for i, row in enumerate(texts)]
+    except (LookupError, ValueError, TypeError, AttributeError, pa.ArrowException) as error:
+        raise RunError(f"{path}: runs do not fit their description ({error})") from error
+
+
+def _keys(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """All columns, in the order in which runs first have them."""
+    return list(dict.fromkeys(key for row in rows for key in row))
+
+
+def _type(key: str) -> pa.DataType:
+    if key in _TEXTS:
+        return pa.string()
+    if key == "seed":
+        return pa.int64()
+    return pa.large_list(pa.float64() if key.startswith("reward_") else pa.int32())
+
+
+def _row(run: FinishedRun) -> dict[str, Any]:
+    records = run.scored
+    rescues = np.concatenate([record.rescues for record in records])
+    rewards = np.concatenate([record.rewards_total for record in records])
+    row: dict[str, Any] = {
+        "situation": run.situation,
+        "method": run.method,
+        "variant": run.case.variant,
+        "seed": run.seed,
+        "name": run.folder.name,
+        "config": json.dumps(run.config.model_dump(mode="json")),
+        "info": json.dumps(asdict(run.info)),
+        "summary": json.dumps(run.summary),
+        "recorded": [records[0].num_episodes],
+        "lengths": np.concatenate([record.lengths for record in records]),
+        "reward_names": records[0].reward_names,
+    }
+    for index, name in enumerate(records[0].reward_names):
+        row[f"reward_{name}"] = rewards[:, :, index].ravel()
+    for name in rescues.dtype.names or ():
+        row[f"rescue_{name}"] = np.ascontiguousarray(rescues[name])
+    return row
+
+
+def _run(
+    path: Path, table: pa.Table, index: int, row: dict[str, Any], reward_names: tuple[str, ...]
+) -> FinishedRun:
+    case = Case(row["situation"], row["method"], row["seed"], row["variant"])
+    config = RunConfig.model_validate(json.loads(row["config"]))
+    where = Path(f"{path}: {row['name']}")
+    return FinishedRun(
+        case=case,
+        folder=path.parent / "runs" / row["name"],
+        config=config,
+        info=run_info(json.loads(row["info"])),
+        summary=check_summary(where, json.loads(row["summary"]), config),
+        read=lambda: _records(case, config, table, index, reward_names),
+        archived=True,
+    )
+
+
+def _records(
+    case: Case, config: RunConfig, table: pa.Table, index: int, reward_names: tuple[str, ...]
+) -> list[Record]:
+    """The episodes that were recorded step by step, now without their steps, and the others."""
+
+    def values(column: str) -> NDArray[Any]:
+        return np.asarray(table[column][index].values.to_numpy())
+
+    scenario = config.scenario
+    lengths = values("lengths").astype(np.int64)
+    rescues = np.empty(len(values("rescue_episode")), rescue_dtype(scenario))
+    for name in rescues.dtype.names or ():
+        rescues[name] = values(f"rescue_{name}")
+    rewards = np.stack([values(f"reward_{name}") for name in reward_names], -1)
+    rewards = rewards.reshape(len(lengths), scenario.num_robots, len(reward_names))
+    recorded = int(values("recorded")[0])
+    parts = [slice(0, recorded), slice(recorded, len(lengths))]
+    return [
+        Record(
+            policy=case.method,
+            scenario=scenario,
+            robot_names=tuple(robot.name for robot in scenario.robots),
+            seed=config.evaluate.seed,
+            first_episode=part.start,
+            lengths=lengths[part],
+            rescues=rescues[(rescues["episode"] >= part.start) & (rescues["episode"] < part.stop)],
+            reward_names=reward_names,
+            rewards_total=rewards[part],
+        )
+        for part in parts
+        if part.start < part.stop
+    ]

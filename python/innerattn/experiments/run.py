@@ -1,71 +1,158 @@
-"""The runs of a study: their labels, what evaluation recorded of them, and what names them."""
+"""A finished run as a study sees it: what it is, what made it, and what its evaluation recorded.
+
+`read_run` reads every file of a run folder once; nothing is played, trained or hashed anew.
+"""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+import pyarrow.parquet as pq
+
 from innerattn.config import RunConfig, read_toml
 from innerattn.errors import RunError
-from innerattn.records.parquet import read_records
+from innerattn.experiments.plan import Case
+from innerattn.measures.summary import SCHEMA_VERSION
+from innerattn.records.parquet import RECORD_FILES, read_records
 from innerattn.records.record import Record
-from innerattn.records.run_folder import newest_weights, plain_file, read_info
-from innerattn.train.weights import digest_of
+from innerattn.records.run_folder import RunInfo, plain_file, read_info
+
+
+class NotMeasuredError(RunError):
+    """The evaluation of a run is not there as a whole."""
 
 
 @dataclass(frozen=True)
-class StudyRun:
-    """A finished run with an evaluation in its folder.
+class Scores:
+    """What is scored at one length of episodes; ``score`` is None where it means nothing."""
+
+    episode_steps: int
+    rescues_per_episode: float
+    score: float | None
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """A trained and measured run.
 
     Attributes:
-        situation: the worlds it was trained and measured in, such as "mixed".
-        method: how it was trained, such as "td-inner".
-        seed: of its training.
-        folder: the run folder.
+        case: what tells it from the other runs of its study.
+        folder: its run folder; of an archived run, where that lay.
+        config: what it was trained and measured with.
+        info: how it was made.
+        summary: its ``evaluation/summary.json``.
+        read: gives the records of its own episodes, each time anew.
+        archived: whether it comes from an archive, which holds neither metrics nor steps.
     """
 
-    situation: str
-    method: str
-    seed: int
+    case: Case
     folder: Path
-
-
-@dataclass(frozen=True)
-class Measured:
-    """What evaluation recorded of a run.
-
-    Attributes:
-        run: which.
-        recorded: the episodes that were recorded step by step.
-        scored: all episodes of the standard length in order, those of ``recorded`` first.
-        summary: the run folder's ``evaluation/summary.json``.
-    """
-
-    run: StudyRun
-    recorded: Record
-    scored: tuple[Record, ...]
+    config: RunConfig
+    info: RunInfo
     summary: dict[str, Any]
+    read: Callable[[], Sequence[Record]]
+    archived: bool = False
+
+    @property
+    def situation(self) -> str:
+        """The worlds it was trained and measured in, such as "mixed"."""
+        return self.case.situation
+
+    @property
+    def method(self) -> str:
+        """How it was trained, such as "td-inner"."""
+        return self.case.method
+
+    @property
+    def seed(self) -> int:
+        """The seed of its training."""
+        return self.case.seed
+
+    @cached_property
+    def config_sha256(self) -> str:
+        """The digest of its configuration, see `innerattn.config.RunConfig.digest`."""
+        return self.config.digest()
+
+    @property
+    def weights_sha256(self) -> str | None:
+        """The digest of its weights; None where the run is older than this record of it."""
+        return self.info.weights_sha256
+
+    @cached_property
+    def scored(self) -> tuple[Record, ...]:
+        """Its own episodes of the standard length, those recorded step by step first.
+
+        Raises:
+            RunError: the records cannot be read, or hold no episode of the run.
+        """
+        own = [r for r in self.read() if r.policy == self.method and r.length == "standard"]
+        if not own:
+            raise RunError(f"{self.folder / 'evaluation'}: holds no episodes of {self.method}")
+        return tuple(own)
+
+    @property
+    def recorded(self) -> Record:
+        """Its episodes that were recorded step by step; an archive keeps no steps of them.
+
+        Raises:
+            RunError: as of `scored`.
+        """
+        return self.scored[0]
+
+    def scores(self) -> tuple[Scores, Scores]:
+        """What its evaluation found at the standard and at the second length of episodes."""
+        standard, long = (_scores(part) for part in (self.summary, self.summary["long"]))
+        return standard, long
 
 
-@dataclass(frozen=True)
-class Digests:
-    """SHA-256 of what a run was asked to do and of what it learnt, in hexadecimal.
+def read_run(case: Case, folder: Path, *, steps: bool = True) -> FinishedRun:
+    """The finished run in ``folder``.
 
-    Attributes:
-        config: of its configuration, see `innerattn.config.RunConfig.digest`.
-        weights: of the newest weights, see `innerattn.train.weights.digest_of`.
+    Args:
+        case: what it is listed as.
+        folder: the run folder, or a link to it.
+        steps: whether its records are to hold what was recorded step by step.
+
+    Raises:
+        NotMeasuredError: a file of its evaluation is missing or damaged.
+        RunError: the folder is no finished run, a file in it is a link, or the run was measured
+            otherwise than its configuration says, or by another version.
+        ConfigError: its configuration is not valid.
+        OSError: a file cannot be read.
     """
+    info = read_info(folder)
+    if info.state != "done":
+        raise RunError(f"{folder}: its state is {info.state!r}: must be 'done'")
+    config = read_toml(plain_file(folder / "config.toml"))
+    return measured_run(case, folder, config, info, steps=steps)
 
-    config: str
-    weights: str
+
+def measured_run(
+    case: Case, folder: Path, config: RunConfig, info: RunInfo, *, steps: bool
+) -> FinishedRun:
+    """The finished run in ``folder``, of which configuration and ``run.json`` were read already.
+
+    Raises:
+        NotMeasuredError, RunError, OSError: as of `read_run`.
+    """
+    evaluation = folder / "evaluation"
+    summary = _read_summary(evaluation, config)
+
+    def read() -> list[Record]:
+        return read_records(evaluation, policy=config.train.method, steps=steps)
+
+    return FinishedRun(case, folder, config, info, summary, read)
 
 
-def by_method(runs: Sequence[StudyRun]) -> dict[tuple[str, str], list[StudyRun]]:
+def by_method(runs: Sequence[FinishedRun]) -> dict[tuple[str, str], list[FinishedRun]]:
     """Runs by situation and method, in the order these first appear; by seed within.
 
     Raises:
@@ -73,7 +160,7 @@ def by_method(runs: Sequence[StudyRun]) -> dict[tuple[str, str], list[StudyRun]]
     """
     if not runs:
         raise RunError("a study needs at least one run")
-    groups: dict[tuple[str, str], list[StudyRun]] = {}
+    groups: dict[tuple[str, str], list[FinishedRun]] = {}
     for run in sorted(runs, key=lambda run: run.seed):
         groups.setdefault((run.situation, run.method), []).append(run)
     for group in groups.values():
@@ -87,26 +174,24 @@ def by_method(runs: Sequence[StudyRun]) -> dict[tuple[str, str], list[StudyRun]]
     return {key: groups[key] for key in order}
 
 
-def read_configs(runs: Sequence[StudyRun]) -> list[RunConfig]:
-    """The runs' configurations, in their order.
+def refuse_unlike(runs: Sequence[FinishedRun]) -> None:
+    """Refuse runs that cannot be compared.
 
     Raises:
         RunError: a run's label is not what its configuration says; runs of one situation and
             method were trained or measured differently, other than by their seed; or runs of one
             situation and seed were measured in different worlds, so that they are no pairs.
-        ConfigError: a configuration cannot be read.
     """
-    configs = [read_toml(plain_file(run.folder / "config.toml")) for run in runs]
     seen: dict[tuple[str, str], tuple[Path, dict[str, Any]]] = {}
     measured: dict[tuple[str, int], tuple[Path, int]] = {}
-    for run, config in zip(runs, configs, strict=True):
+    for run in runs:
         for name, label in (("method", run.method), ("seed", run.seed)):
-            if getattr(config.train, name) != label:
+            if getattr(run.config.train, name) != label:
                 raise RunError(
-                    f"{run.folder}: train.{name} = {getattr(config.train, name)!r}, "
+                    f"{run.folder}: train.{name} = {getattr(run.config.train, name)!r}, "
                     f"but it is listed as {label!r}"
                 )
-        what = config.in_use()
+        what = run.config.in_use()
         for free in ("seed", "threads", "device", "compile", "log_every_env_steps"):
             what["train"].pop(free)
         worlds = what["evaluate"].pop("seed")
@@ -122,35 +207,20 @@ def read_configs(runs: Sequence[StudyRun]) -> list[RunConfig]:
                 f"{run.folder} and {other}: are listed as the same but for the seed, and differ "
                 f"in {', '.join(differing)}"
             )
-    return configs
 
 
-def read_measured(run: StudyRun, *, step_by_step: bool = True) -> Measured:
-    """What evaluation recorded of a run.
-
-    Args:
-        run: which.
-        step_by_step: whether every step of ``recorded`` is needed; `kept.keep` leaves them out.
+def refuse_without_steps(runs: Sequence[FinishedRun]) -> None:
+    """Refuse runs whose first episodes are not recorded step by step.
 
     Raises:
-        RunError: there is no finished evaluation of the run's method in its folder.
+        RunError: there is one, such as an archived run.
     """
-    folder = run.folder / "evaluation"
-    try:
-        summary = json.loads((folder / "summary.json").read_text("utf-8"))
-    except (OSError, ValueError) as error:
-        raise RunError(f"{folder / 'summary.json'}: no finished evaluation") from error
-    own = [record for record in read_records(folder) if record.policy == run.method]
-    scored: list[Record] = []
-    for record in own:  # the longer episodes come last and begin at number 0 again
-        if record.first_episode != sum(part.num_episodes for part in scored):
-            break
-        scored.append(record)
-    if not scored or summary.get("method") != run.method:
-        raise RunError(f"{folder}: holds no episodes of {run.method}")
-    if step_by_step and not scored[0].steps:
-        raise RunError(f"{folder}: holds no episodes of {run.method} recorded step by step")
-    return Measured(run, scored[0], tuple(scored), summary)
+    for run in runs:
+        if not run.recorded.steps:
+            raise RunError(
+                f"{run.folder / 'evaluation'}: holds no episodes of {run.method} recorded step by "
+                "step"
+            )
 
 
 def named_from(folder: Path, base: Path) -> str:
@@ -159,15 +229,76 @@ def named_from(folder: Path, base: Path) -> str:
     return (folder.relative_to(base) if within else folder).as_posix()
 
 
-def digests(folder: Path) -> Digests:
-    """What tells the run in ``folder`` from any other.
+def check_summary(path: Path, found: dict[str, Any], config: RunConfig) -> dict[str, Any]:
+    """A summary, if it is that of a run with this configuration.
 
-    A run that was kept without its weights has the digest of theirs written down.
+    Args:
+        path: named in errors.
+        found: the document.
+        config: the run's configuration.
 
     Raises:
-        RunError: a file is missing, is no plain file, or holds no whole weights.
-        ConfigError: ``config.toml`` is not valid.
+        NotMeasuredError: it is not a whole summary.
+        RunError: the run was measured otherwise, or by another version.
     """
-    config = read_toml(plain_file(folder / "config.toml"))
-    kept = None if os.path.lexists(folder / "checkpoints") else read_info(folder).weights_sha256
-    return Digests(config.digest(), kept or digest_of(plain_file(newest_weights(folder))))
+    try:
+        if found["schema_version"] != SCHEMA_VERSION:
+            version = found["schema_version"]
+            raise RunError(f"{path}: schema_version = {version!r}: must be {SCHEMA_VERSION}")
+        for part in (found, found["long"]):
+            _scores(part)
+        _refuse_other_measures(path, found, config)
+    except (ValueError, KeyError, TypeError) as error:
+        raise NotMeasuredError(f"{path}: not a whole evaluation") from error
+    return found
+
+
+def _read_summary(evaluation: Path, config: RunConfig) -> dict[str, Any]:
+    path = evaluation / "summary.json"
+    records = [evaluation / name for name in RECORD_FILES]
+    for file in (path, *records):
+        if not os.path.lexists(file):
+            raise NotMeasuredError(f"{file}: missing")
+    for file in records:
+        _refuse_damaged(plain_file(file))
+    try:
+        found = json.loads(plain_file(path).read_text("utf-8"))
+    except ValueError as error:
+        raise NotMeasuredError(f"{path}: not a whole evaluation") from error
+    return check_summary(path, found, config)
+
+
+def _scores(part: dict[str, Any]) -> Scores:
+    return Scores(
+        int(part["episode_steps"]),
+        float(part["rescues_per_episode"]["mean"]),
+        None if part["score"] is None else float(part["score"]["mean"]),
+    )
+
+
+def _refuse_damaged(file: Path) -> None:
+    file.open("rb").close()  # what cannot be read is an OSError, as is what arrow cannot decode
+    try:
+        pq.read_metadata(file)
+    except (OSError, pa.ArrowException) as error:
+        raise NotMeasuredError(f"{file}: not a whole Parquet file") from error
+
+
+def _refuse_other_measures(path: Path, found: dict[str, Any], config: RunConfig) -> None:
+    settings, scenario = config.evaluate, config.scenario
+    expected = {
+        "method": (found["method"], config.train.method),
+        "situation": (found["situation"], scenario.situation),
+        "seed": (found["seed"], settings.seed),
+        "episodes": (found["episodes"], settings.episodes),
+        "episode_steps": (found["episode_steps"], scenario.episode_steps),
+        "score_episodes": (
+            found["score_episodes"],
+            max(settings.score_episodes, settings.episodes),
+        ),
+        "long.episodes": (found["long"]["episodes"], settings.long_episodes),
+        "long.episode_steps": (found["long"]["episode_steps"], settings.long_episode_steps),
+    }
+    for key, (value, wanted) in expected.items():
+        if value != wanted:
+            raise RunError(f"{path}: {key} = {value!r}, its configuration says {wanted!r}")

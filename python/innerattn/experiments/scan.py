@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from innerattn.config import RunConfig, read_toml
 from innerattn.errors import InnerattnError
+from innerattn.experiments import archive
 from innerattn.experiments.failures import read_failures
-from innerattn.experiments.plan import Case, PlannedRun
-from innerattn.experiments.run import digests
-from innerattn.experiments.scores import NotMeasuredError, read_scores
+from innerattn.experiments.plan import PlannedRun
+from innerattn.experiments.run import FinishedRun, NotMeasuredError, measured_run
 from innerattn.records.run_folder import plain_file, read_info
 
 State = Literal[
@@ -35,39 +35,39 @@ _MOST_KEYS, _MOST_LETTERS = 3, 60
 
 @dataclass(frozen=True)
 class RunStatus:
-    """What is at the place of a planned run, and why it is not a finished run, if it is not."""
+    """What is at the place of a planned run.
+
+    Attributes:
+        planned: the run that a study needs.
+        state: what there is of it.
+        why: why it is not a finished run, if it is not.
+        run: the finished run, if it is one.
+    """
 
     planned: PlannedRun
     state: State
     why: str | None = None
-
-
-@dataclass(frozen=True)
-class FinishedRun:
-    """A run of a study that tables and figures may use.
-
-    Attributes:
-        case: which one it is.
-        folder: the run folder; its ``evaluation`` is whole.
-    """
-
-    case: Case
-    folder: Path
+    run: FinishedRun | None = None
 
 
 def scan_runs(planned: Iterable[PlannedRun], out: Path, *, whole: bool = False) -> list[RunStatus]:
-    """What is there of each planned run of the study in ``out``.
+    """What is there of each planned run of the study in ``out``; every file is read once.
+
+    A run without a folder is taken from the study's archive, if that has it.
 
     Args:
         planned: the runs.
         out: folder of the study.
-        whole: whether metrics and steps are needed, so that small copies of runs do not do.
+        whole: whether metrics and steps are needed, so that archived runs do not do.
 
     Raises:
-        RunError: the study's list of failures is damaged.
+        RunError: the study's list of failures or its archive is damaged.
     """
     failures = read_failures(out)
-    found = [_find(one, whole) for one in planned]
+    path = out / archive.FILE
+    archived = archive.read_archive(path) if os.path.lexists(path) else []
+    by_name = {run.folder.name: run for run in archived}
+    found = [_scan(one, by_name.get(one.folder.name), whole) for one in planned]
     return [
         RunStatus(one.planned, "failed", failures[name])
         if one.state in TO_TRAIN and (name := one.planned.folder.name) in failures
@@ -78,11 +78,7 @@ def scan_runs(planned: Iterable[PlannedRun], out: Path, *, whole: bool = False) 
 
 def finished_runs(found: Iterable[RunStatus]) -> list[FinishedRun]:
     """The runs that can be used."""
-    return [
-        FinishedRun(one.planned.case, one.planned.folder)
-        for one in found
-        if one.state == "finished"
-    ]
+    return [one.run for one in found if one.run is not None]
 
 
 def differences(config: RunConfig, planned: RunConfig) -> list[str]:
@@ -99,12 +95,22 @@ def differences(config: RunConfig, planned: RunConfig) -> list[str]:
     ]
 
 
-def _find(planned: PlannedRun, whole: bool) -> RunStatus:
+def _scan(planned: PlannedRun, archived: FinishedRun | None, whole: bool) -> RunStatus:
     folder = planned.folder
-    if not os.path.lexists(folder):
+    if os.path.lexists(folder):
+        return _scan_folder(planned, whole)
+    if archived is None:
         return RunStatus(planned, "missing")
-    if folder.is_symlink():
-        return RunStatus(planned, "unreadable", "a link: must be a run folder")
+    differing = differences(archived.config, planned.config)
+    if differing:
+        return RunStatus(planned, "other_configuration", _some(differing))
+    if whole:
+        return RunStatus(planned, "unreadable", "archived, without metrics and steps")
+    return RunStatus(planned, "finished", run=replace(archived, case=planned.case, folder=folder))
+
+
+def _scan_folder(planned: PlannedRun, whole: bool) -> RunStatus:
+    folder = planned.folder
     try:
         info = read_info(folder)
         config = read_toml(plain_file(folder / "config.toml"))
@@ -113,17 +119,14 @@ def _find(planned: PlannedRun, whole: bool) -> RunStatus:
             return RunStatus(planned, "other_configuration", _some(differing))
         if info.state != "done":
             return RunStatus(planned, "unfinished", f"its state is {info.state!r}")
-        digests(folder)
-        read_scores(folder, config)
+        run = measured_run(planned.case, folder, config, info, steps=whole)
     except NotMeasuredError as error:
         if not os.path.lexists(folder / "checkpoints"):
-            return RunStatus(planned, "unreadable", f"kept without its weights, and {error}")
+            return RunStatus(planned, "unreadable", f"it has no weights to measure, and {error}")
         return RunStatus(planned, "unmeasured", "trained, but not measured as a whole")
     except (InnerattnError, OSError) as error:
         return RunStatus(planned, "unreadable", " ".join(str(error).split()))
-    if whole and not os.path.lexists(folder / "checkpoints"):
-        return RunStatus(planned, "unreadable", "a small copy of a run, without metrics and steps")
-    return RunStatus(planned, "finished")
+    return RunStatus(planned, "finished", run=run)
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from innerattn.experiments.run import Scores
 from innerattn.experiments.scan import RunStatus
-from innerattn.experiments.scores import Scores, read_scores
 from innerattn.measures.summary import Summary
-from innerattn.stats.seeds import SeedEstimate, seed_estimate
+from innerattn.stats import Estimate
+from innerattn.stats.seeds import seed_estimate
 
 TwoLengths = tuple[Scores, Scores]
 """Scores at the standard and at the second length of episodes."""
@@ -25,8 +26,8 @@ class MeanScores:
     """
 
     episode_steps: int
-    rescues_per_episode: SeedEstimate | None
-    score: SeedEstimate | None
+    rescues_per_episode: Estimate | None
+    score: Estimate | None
 
 
 @dataclass(frozen=True)
@@ -81,17 +82,13 @@ def method_scores(found: Sequence[RunStatus]) -> list[MethodScores]:
     """Means of every situation and method of a study, in the order in which they are planned.
 
     Args:
-        found: what is there of each planned run; only finished runs are read.
-
-    Raises:
-        RunError: a finished run has changed since it was found.
+        found: what is there of each planned run; only finished runs count.
     """
     groups: dict[tuple[str, str], list[TwoLengths | None]] = {}
     for one in found:
-        planned = one.planned
-        finished = one.state == "finished"
-        scores = read_scores(planned.folder, planned.config) if finished else None
-        groups.setdefault((planned.case.situation, planned.case.trained), []).append(scores)
+        case = one.planned.case
+        scores = one.run.scores() if one.run else None
+        groups.setdefault((case.situation, case.trained), []).append(scores)
     listed = []
     for (situation, method), runs in groups.items():
         used = [two for two in runs if two is not None]

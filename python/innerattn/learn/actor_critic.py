@@ -5,31 +5,35 @@ It acts, reports attention, saves and loads; when and how to update is each lear
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
-from torch.func import functional_call
 
-from innerattn.config.run import NetworkConfig
+from innerattn.config import NetworkConfig
 from innerattn.learn import losses
-from innerattn.learn.descent import (
-    Descent,
-    Kept,
-    Network,
-    clip_each_robot,
-    clip_whole,
-)
+from innerattn.learn.adam import AdamStepper, Forward, Stepper
+from innerattn.learn.compiled import traced
 from innerattn.learn.networks import draw_networks
 from innerattn.learn.types import Team
-from innerattn.nn import CriticOutput, EntityColumns, action_noise, sample_actions
+from innerattn.nn import CriticOutput, action_noise, sample_actions
+
+
+@dataclass(frozen=True)
+class Networks:
+    """The networks of an update, plain or traced."""
+
+    actor: Stepper
+    critic: Stepper
 
 
 class ActorCritic:
     """Networks and optimisers of a learner.
+
+    A subclass decides when to update and gives `_update_networks`.
 
     Attributes:
         actor: The trained policies.
@@ -37,8 +41,11 @@ class ActorCritic:
         actor_frozen: While set, updates leave the policies as they are; see `Learner`.
     """
 
-    _step: Callable[..., Tensor]
-    """All arithmetic of one update, with nothing in it that a compiler cannot follow."""
+    _update_networks: Callable[..., Tensor]
+    """All arithmetic of one update, from `Networks`, batches and the step size () to figures (n,).
+
+    It must call networks through `Networks` only, and hold nothing that a compiler cannot follow.
+    """
 
     def __init__(
         self,
@@ -51,41 +58,36 @@ class ActorCritic:
         seed: int,
         device: torch.device,
         dtype: torch.dtype = torch.float32,
-        availability_column: int | None = None,
         critic_outputs: int | None = None,
-        entities: EntityColumns | None = None,
-        kinds: Sequence[str] | None = None,
     ) -> None:
         """Build networks and optimisers.
 
         Args:
-            team: Sizes of the team.
+            team: What is known of the team.
             network: Sizes and kind of the networks.
             learning_rate: Step size of both Adams at the start.
             final_learning_rate_share: Share of it that is left at the end of training.
-            critic_weight_decay: L2 penalty of the critic's Adam.
+            critic_weight_decay: Weight of the L2 penalty of the critic's Adam.
             seed: Seed of the initial weights and of every draw.
             device: Where the networks live.
             dtype: Floating-point type of the networks.
-            availability_column: Column of a robot's observation that says whether it is available
-                (above 0.5); needed only where `network.mask_unavailable` is set.
             critic_outputs: Values that the critic gives for each robot; None: one for each action.
-            entities: As in `draw_networks`.
-            kinds: As in `draw_networks`.
 
         Raises:
             ValueError: `network.mask_unavailable` is set without a column of the observation, or as
                 in `draw_networks`.
         """
-        if network.mask_unavailable and availability_column not in range(team.obs_width):
+        column = team.availability_column
+        if network.mask_unavailable and column not in range(team.obs_width):
             raise ValueError(
-                f"availability_column = {availability_column}: network.mask_unavailable needs a "
+                f"availability_column = {column}: network.mask_unavailable needs a "
                 f"column in 0..{team.obs_width - 1}"
             )
-        self._availability_column = availability_column if network.mask_unavailable else None
+        self._availability_column = column if network.mask_unavailable else None
         self._device, self._dtype = device, dtype
         self._bfloat16 = network.precision == "bfloat16"
-        self._learning_rate, self._final_share = learning_rate, final_learning_rate_share
+        self._first_rate, self._final_share = learning_rate, final_learning_rate_share
+        self._rate = learning_rate
         weights_seed, noise_seed, self._data_seed = (
             int(child.generate_state(1, np.uint64)[0])
             for child in np.random.SeedSequence(seed).spawn(3)
@@ -93,15 +95,12 @@ class ActorCritic:
         self._noise = torch.Generator(device).manual_seed(noise_seed)
         # Drawn on the CPU in float32 and then moved: a seed gives the same weights everywhere.
         weights = torch.Generator().manual_seed(weights_seed)
-        actor, critic = draw_networks(team, network, weights, critic_outputs, entities, kinds)
+        actor, critic = draw_networks(team, network, weights, critic_outputs)
         self.actor, self.critic = actor.to(device, dtype), critic.to(device, dtype)
         self.actor_frozen = False
-        self._actor_descent = Descent(self.actor, learning_rate, weight_decay=0.0)
-        self._critic_descent = Descent(self.critic, learning_rate, critic_weight_decay)
-        self._values = {
-            "actor": self._actor_descent.values,
-            "critic": self._critic_descent.values,
-        }
+        self._actor_adam = AdamStepper(self.actor)
+        self._critic_adam = AdamStepper(self.critic, critic_weight_decay)
+        self._networks = Networks(self._actor_adam, self._critic_adam)
         self._team = team
         self._updates = 0
 
@@ -112,7 +111,12 @@ class ActorCritic:
 
     def compile(self, backend: str = "inductor") -> None:
         """Do updates as one compiled graph from now on; see `Learner.compile`."""
-        self._step = torch.compile(self._step, fullgraph=True, dynamic=False, backend=backend)
+        plain = self._networks
+        forms: Any = {field.name: traced(getattr(plain, field.name)) for field in fields(plain)}
+        self._networks = type(plain)(**forms)
+        self._update_networks = torch.compile(
+            self._update_networks, fullgraph=True, dynamic=False, backend=backend
+        )
 
     @torch.no_grad()
     def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
@@ -124,25 +128,23 @@ class ActorCritic:
             actions = sample_actions(logits, self._draw(logits.shape))
         return actions.t().contiguous().to(obs.device)
 
+    @torch.no_grad()
     def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
         """Step the policies towards given actions; see `Learner.imitate`."""
         seen, wanted = self._robots_first(obs), actions.to(self._device).t()
 
-        def loss_of(actor: Network) -> tuple[Tensor, Tensor]:
-            loss = -losses.taken(actor(seen).log_softmax(dim=1), wanted).mean(dim=1)
+        def loss_of(actor: Forward) -> tuple[Tensor, Tensor]:
+            log_prob = actor(seen).log_softmax(dim=1)
+            loss = -losses.gather_actions(log_prob, wanted).mean(dim=1)
             return loss.sum(), loss.detach().mean()
 
-        own_rate = self._actor_descent.learning_rate
-        self._actor_descent.set_learning_rate(learning_rate)
-        _, loss = self._step_actor(loss_of, self._rate(), math.inf)
-        self._actor_descent.set_learning_rate(own_rate)
+        gradients, loss = self._actor_adam.gradients(loss_of)
+        self._actor_adam.step(gradients, _step_size(learning_rate))
         return float(loss)
 
-    def reach(self, share: float) -> None:
-        """Let the step size fall evenly from its first to its final value; see `Learner.reach`."""
-        left = 1.0 - (1.0 - self._final_share) * share
-        for descent in (self._actor_descent, self._critic_descent):
-            descent.set_learning_rate(left * self._learning_rate)
+    def set_progress(self, share: float) -> None:
+        """Let the step size fall evenly; see `Learner.set_progress`."""
+        self._rate = (1.0 - (1.0 - self._final_share) * share) * self._first_rate
 
     def attention(self, obs: Tensor, actions: Tensor) -> Tensor | None:
         """Attention weights (B, H, R, R) of the critic, if it has any; see `Learner.attention`."""
@@ -184,7 +186,7 @@ class ActorCritic:
                 tensor.copy_(state[name])
         self._updates = int(own["updates"])
 
-    def _networks(self) -> dict[str, nn.Module]:
+    def _modules(self) -> dict[str, nn.Module]:
         """All networks that are part of the state, by name."""
         return {"actor": self.actor, "critic": self.critic}
 
@@ -195,74 +197,23 @@ class ActorCritic:
     def _tensors(self) -> dict[str, Tensor]:
         """Live tensors of the state by name."""
         tensors = self._running()
-        for name, network in self._networks().items():
-            tensors |= {f"{name}.{key}": value for key, value in network.named_parameters()}
-        for name, descent in (
-            ("actor_adam", self._actor_descent),
-            ("critic_adam", self._critic_descent),
-        ):
-            for key, moments in descent.moments.items():
+        for name, module in self._modules().items():
+            tensors |= {f"{name}.{key}": value for key, value in module.named_parameters()}
+        for name, adam in (("actor_adam", self._actor_adam), ("critic_adam", self._critic_adam)):
+            for key, moments in adam.moments.items():
                 tensors |= {f"{name}.{key}.{part}": moments[part] for part in sorted(moments)}
         return tensors
 
-    def _run(self, name: str, *inputs: Tensor | None) -> Any:
-        """What a network makes of its inputs, without a gradient."""
-        network = self._networks()[name]
-        if torch.compiler.is_compiling():
-            output: Any = functional_call(network, self._values[name], inputs)
-            return output
-        return network(*inputs)
-
-    @staticmethod
-    def _attention_penalty(output: CriticOutput, weight: float) -> Tensor | float:
-        """The weighted logit penalty () of a critic; 0 where nothing is scored."""
-        attended = output.attended
-        if not weight or attended is None or attended.scores is None:
-            return 0.0
-        return weight * losses.attention_logit_penalty(attended.scores, attended.visible)
-
-    def _step_critic(
-        self, loss_of: Callable[[Network], tuple[Tensor, Kept]], rate: Tensor, limit: float
-    ) -> tuple[Tensor, Kept]:
-        """A step of the critic down a loss summed over robots; the norm before clipping."""
-
-        def clip(gradients: dict[str, Tensor]) -> Tensor:
-            # The loss is a sum over robots, so what they share would learn faster with every robot
-            # more; MAAC likewise divides its gradient by their number, before clipping.
-            shared = [g for name, g in gradients.items() if name.startswith("attention.")]
-            if shared:
-                torch._foreach_div_(shared, self.actor.num_robots)
-            return clip_whole(gradients, limit)
-
-        return self._critic_descent.step(loss_of, clip, rate)
-
-    def _step_actor(
-        self, loss_of: Callable[[Network], tuple[Tensor, Kept]], rate: Tensor, limit: float
-    ) -> tuple[Tensor, Kept]:
-        """A step of the actors, each robot clipped alone; the norms (R,) before clipping."""
-        return self._actor_descent.step(
-            loss_of,
-            lambda gradients: clip_each_robot(gradients, limit),
-            rate,
-            frozen=self.actor_frozen,
-        )
-
     def _update(self, *tensors: Tensor) -> Tensor:
-        """Do `_step`, with products of the precision that was asked for, and count it."""
+        """Do `_update_networks` with products of the precision that was asked for; count it."""
         with torch.autocast(self._device.type, torch.bfloat16, enabled=self._bfloat16):
-            values = self._step(*tensors)
+            figures = self._update_networks(self._networks, *tensors, _step_size(self._rate))
         self._updates += 1
-        return values
+        return figures
 
     def _draw(self, shape: tuple[int, ...]) -> Tensor:
         """Noise for `sample_actions`, of the shape of the logits."""
         return action_noise(shape, self._noise, self._dtype)
-
-    def _rate(self) -> Tensor:
-        """() the step size now; as a tensor, since a graph is compiled anew for another number."""
-        return torch.tensor(
-            self._actor_descent.learning_rate, dtype=torch.float64, device=self._device
-        )
 
     def _robots_first(self, obs: Tensor) -> Tensor:
         """Bring (B, R, D) to (R, B, D), as the networks take it, on their device and dtype."""
@@ -273,3 +224,8 @@ class ActorCritic:
         if self._availability_column is None:
             return None
         return (obs[:, :, self._availability_column] > 0.5).t()
+
+
+def _step_size(rate: float) -> Tensor:
+    """() float64 on the CPU: a graph would be compiled anew for every other plain number."""
+    return torch.tensor(rate, dtype=torch.float64)

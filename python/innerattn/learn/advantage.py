@@ -45,12 +45,12 @@ def generalised_advantage(
 
 
 class ReturnScale:
-    """Running deviation of discounted returns, by which rewards are divided.
+    """Running standard deviation of discounted returns, by which rewards are divided.
 
     Attributes:
         count: () float64, returns seen.
         mean: (R,) float64.
-        squares: (R,) float64, sum of squared deviations from the mean.
+        squares: (R,) float64, sum of squared differences from the mean.
     """
 
     def __init__(self, num_robots: int, gamma: float, device: torch.device) -> None:
@@ -61,7 +61,7 @@ class ReturnScale:
         self.mean = torch.zeros(num_robots, dtype=torch.float64, device=device)
         self.squares = torch.zeros_like(self.mean)
 
-    def see(self, reward: Tensor, ended: Tensor) -> None:
+    def update(self, reward: Tensor, ended: Tensor) -> None:
         """Take in rewards (T, R, E) and the ends of episodes (T, E) of worlds that go on."""
         returns = []
         before = self._open
@@ -79,6 +79,6 @@ class ReturnScale:
         self.mean += apart * added / (self.count + added)
         self.count += added
 
-    def deviation(self, floor: float) -> Tensor:
-        """(R,) float64, at least ``floor``."""
+    def std(self, floor: float) -> Tensor:
+        """(R,) float64, the standard deviation, at least ``floor``."""
         return (self.squares / self.count.clamp_min(1.0)).sqrt().clamp_min(floor)

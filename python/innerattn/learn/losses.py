@@ -10,8 +10,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from innerattn.nn import Attended
 
-def taken(x: Tensor, actions: Tensor) -> Tensor:
+
+def gather_actions(x: Tensor, actions: Tensor) -> Tensor:
     """Pick the (R, B) entries of (R, A, B) that belong to actions (R, B) int64."""
     return x.gather(1, actions.unsqueeze(1)).squeeze(1)
 
@@ -43,16 +45,21 @@ def critic_loss(q_taken: Tensor, target: Tensor) -> Tensor:
     return (q_taken - target).square().mean(dim=1).sum()
 
 
-def attention_logit_penalty(scores: Tensor, visible: Tensor) -> Tensor:
-    """Mean square of a robot's raw scores over batch and teammates, summed over heads and robots.
+def attention_logit_regularisation(attended: Attended | None, weight: float) -> Tensor | float:
+    """The weighted mean of (q_i . k_j)^2 over batch and teammates, summed over heads and robots.
 
     Args:
-        scores: (B, H, R, R) raw scores q_i . k_j.
-        visible: (1 or B, R, R) bool, the pairs that count.
+        attended: What the critic's attention made of a batch.
+        weight: Weight in the critic's loss.
+
+    Returns:
+        (); 0 where the critic scores no teammate, or the weight is 0.
     """
-    batch, _, robots, _ = scores.shape
-    squares = scores.square() * visible.unsqueeze(1)
-    return squares.sum() / (batch * max(robots - 1, 1))
+    if not weight or attended is None or attended.scores is None:
+        return 0.0
+    batch, _, robots, _ = attended.scores.shape
+    squares = attended.scores.square() * attended.visible.unsqueeze(1)
+    return weight * (squares.sum() / (batch * max(robots - 1, 1)))
 
 
 def expected_policy_loss(
@@ -75,9 +82,9 @@ def sampled_policy_loss(log_prob: Tensor, q: Tensor, actions: Tensor, temperatur
 
     b = sum_a pi(a) Q(a) is the counterfactual baseline. Arguments as in `expected_policy_loss`.
     """
-    drawn = taken(log_prob, actions)
+    drawn = gather_actions(log_prob, actions)
     with torch.no_grad():
-        advantage = taken(q, actions) - (log_prob.exp() * q).sum(dim=1)
+        advantage = gather_actions(q, actions) - (log_prob.exp() * q).sum(dim=1)
         cost = temperature * drawn - advantage
     return (drawn * cost).mean(dim=1).sum()
 

@@ -2,78 +2,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from pkgutil import resolve_name
 
 import torch
 
-from innerattn.config.run import NetworkConfig
+from innerattn.config import NetworkConfig
+from innerattn.config.registry import attentions
 from innerattn.learn.types import Team
 from innerattn.nn import (
     Actor,
     Critic,
     EntityColumns,
-    InnerAttention,
     JointCritic,
-    UniformAttention,
+    TeammateAttention,
     share_by_kind,
 )
-
-_ATTENTIONS: dict[str, type[InnerAttention] | type[UniformAttention]] = {
-    "inner": InnerAttention,
-    "uniform": UniformAttention,
-}
 
 
 def draw_networks(
     team: Team,
     network: NetworkConfig,
     generator: torch.Generator,
-    critic_outputs: int | None,
-    entities: EntityColumns | None,
-    kinds: Sequence[str] | None = None,
+    critic_outputs: int | None = None,
 ) -> tuple[Actor, Critic | JointCritic]:
     """Actors and critics with initial parameters, float32 on the CPU.
 
+    A critic without attention takes observations as they are and shares nothing between robots: its
+    input is the same for all.
+
     Args:
-        team: Sizes of the team.
+        team: What is known of the team.
         network: Sizes and kind of the networks.
         generator: Source of the parameters, on the CPU.
         critic_outputs: Values that the critic gives for each robot; None: one for each action.
-        entities: To whom the columns of an observation belong; heeded only where `network.encoder`
-            is "entities". The critic without attention takes observations as they are.
-        kinds: Kind of each robot, R words; heeded only where `network.parameter_sharing` is "kind".
-            The critic without attention stays each robot's own: its input is the same for all.
 
     Raises:
-        ValueError: `network.encoder` is "entities" and the columns are not those of an observation,
-            or `network.parameter_sharing` is "kind" and ``kinds`` are not those of the team.
+        ValueError: `network.encoder` is "entities" and `team.entities` are not the columns of an
+            observation, or `network.parameter_sharing` is "kind" and `team.kinds` are not those of
+            the team.
     """
-    if network.encoder == "flat":
-        entities = None
-    elif entities is None or entities.width != team.obs_width:
+    entities = _entities(team) if network.encoder == "entities" else None
+    kinds = _kinds(team) if network.parameter_sharing == "kind" else None
+    robots, obs_width, num_actions, *_ = team
+    width = network.hidden_width
+    if network.attention == "none":
+        actor = Actor(robots, obs_width, num_actions, width, generator, entities)
+        outputs = critic_outputs or num_actions
+        critic: Critic | JointCritic = JointCritic(robots, obs_width, outputs, width, generator)
+    else:
+        kind: type[TeammateAttention] = resolve_name(attentions()[network.attention])
+        attention = kind(width, network.attention_heads, generator)
+        actor = Actor(robots, obs_width, num_actions, width, generator, entities)
+        critic = Critic(
+            robots, obs_width, num_actions, attention, generator, critic_outputs, entities
+        )
+        if kinds is not None:
+            share_by_kind(critic, kinds)
+    if kinds is not None:
+        share_by_kind(actor, kinds)
+    return actor, critic
+
+
+def _entities(team: Team) -> EntityColumns:
+    if team.entities is None or team.entities.width != team.obs_width:
         raise ValueError(
-            f"entities = {entities}: network.encoder = 'entities' needs the "
+            f"entities = {team.entities}: network.encoder = 'entities' needs the "
             f"{team.obs_width} columns of an observation"
         )
-    shared = network.parameter_sharing == "kind"
-    if shared and (kinds is None or len(kinds) != team.num_robots):
+    return team.entities
+
+
+def _kinds(team: Team) -> tuple[str, ...]:
+    if team.kinds is None or len(team.kinds) != team.num_robots:
         raise ValueError(
-            f"kinds = {kinds}: network.parameter_sharing = 'kind' needs those of "
+            f"kinds = {team.kinds}: network.parameter_sharing = 'kind' needs those of "
             f"{team.num_robots} robots"
         )
-    width = network.hidden_width
-    attention = None
-    if network.attention != "none":
-        attention = _ATTENTIONS[network.attention](width, network.attention_heads, generator)
-    actor = Actor(*team, width, generator, entities)
-    critic: Critic | JointCritic
-    if attention is None:
-        outputs = critic_outputs or team.num_actions
-        critic = JointCritic(team.num_robots, team.obs_width, outputs, width, generator)
-    else:
-        critic = Critic(*team, attention, generator, critic_outputs, entities)
-    if shared and kinds is not None:
-        share_by_kind(actor, kinds)
-        if attention is not None:
-            share_by_kind(critic, kinds)
-    return actor, critic
+    return team.kinds

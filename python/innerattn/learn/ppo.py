@@ -6,19 +6,19 @@ Sources: Schulman et al. 2017; the baseline of Iqbal & Sha 2019, section 3.3.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from innerattn.config.run import NetworkConfig, PPOConfig
+from innerattn.config import NetworkConfig, PPOConfig
 from innerattn.learn import losses
-from innerattn.learn.actor_critic import ActorCritic
+from innerattn.learn.actor_critic import ActorCritic, Networks
+from innerattn.learn.adam import Forward
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
-from innerattn.learn.descent import Network
+from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
 from innerattn.learn.types import Team, Transitions
-from innerattn.nn import EntityColumns, sample_actions
+from innerattn.nn import sample_actions
 
 _METRICS = (
     "critic_loss",
@@ -54,9 +54,6 @@ class PPO(ActorCritic):
         seed: int,
         device: torch.device,
         dtype: torch.dtype = torch.float32,
-        availability_column: int | None = None,
-        entities: EntityColumns | None = None,
-        kinds: Sequence[str] | None = None,
     ) -> None:
         """Build networks and optimisers; arguments as in `ActorCritic`, numbers in ``ppo``.
 
@@ -72,13 +69,9 @@ class PPO(ActorCritic):
             seed=seed,
             device=device,
             dtype=dtype,
-            availability_column=availability_column,
-            entities=entities,
-            kinds=kinds,
             critic_outputs=None if ppo.advantage == "counterfactual" else 1,
         )
         self._config = ppo
-        self._step = self._update_all
         self._shuffle = torch.Generator().manual_seed(self._data_seed)
         self._steps: list[tuple[Transitions, Tensor]] = []
         self._steps_of_frozen = False
@@ -131,10 +124,11 @@ class PPO(ActorCritic):
         Returns:
             (8,) the values that `learn` names, in that order.
         """
-        return self._update(*rows, self._rate())
+        return self._update(*rows)
 
-    def _update_all(
+    def _update_networks(
         self,
+        nets: Networks,
         obs: Tensor,
         actions: Tensor,
         log_prob: Tensor,
@@ -143,42 +137,64 @@ class PPO(ActorCritic):
         target: Tensor,
         rate: Tensor,
     ) -> Tensor:
-        critic_values = self._update_critic(obs, actions, value, target, rate)
-        actor_values = self._update_actor(obs, actions, log_prob, advantage, rate)
-        return torch.stack([*critic_values, *actor_values])
+        critic_figures = self._update_critic(nets, obs, actions, value, target, rate)
+        actor_figures = self._update_actor(nets, obs, actions, log_prob, advantage, rate)
+        return torch.stack([*critic_figures, *actor_figures])
 
     def _update_critic(
-        self, obs: Tensor, actions: Tensor, before: Tensor, target: Tensor, rate: Tensor
+        self,
+        nets: Networks,
+        obs: Tensor,
+        actions: Tensor,
+        before: Tensor,
+        target: Tensor,
+        rate: Tensor,
     ) -> tuple[Tensor, ...]:
+        """One step of the critic towards the targets: loss, mean value, gradient norm."""
         config = self._config
 
-        def loss_of(critic: Network) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+        def loss_of(critic: Forward) -> tuple[Tensor, tuple[Tensor, Tensor]]:
             output = critic(obs, actions, self._available(obs))
             value = self._of_taken(output.q, actions)
             if config.value_clip is None:
                 loss = losses.critic_loss(value, target)
             else:
                 loss = losses.clipped_value_loss(value, before, target, config.value_clip)
-            loss = loss + self._attention_penalty(output, config.attention_logit_penalty)
+            loss = loss + losses.attention_logit_regularisation(
+                output.attended, config.attention_logit_penalty
+            )
             return loss, (loss.detach(), value.detach().mean())
 
-        norm, (loss, mean) = self._step_critic(loss_of, rate, config.critic_grad_clip)
+        gradients, (loss, mean) = nets.critic.gradients(loss_of)
+        average_over_robots(gradients, self._team.num_robots)
+        norm = clip_norm(gradients, config.critic_grad_clip)
+        nets.critic.step(gradients, rate)
         return loss, mean, norm
 
     def _update_actor(
-        self, obs: Tensor, actions: Tensor, before: Tensor, advantage: Tensor, rate: Tensor
+        self,
+        nets: Networks,
+        obs: Tensor,
+        actions: Tensor,
+        before: Tensor,
+        advantage: Tensor,
+        rate: Tensor,
     ) -> tuple[Tensor, ...]:
+        """One step of the policies: loss, entropy, mean gradient norm, KL, clipped share."""
         config = self._config
 
-        def loss_of(actor: Network) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
+        def loss_of(actor: Forward) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
             log_prob = actor(obs).log_softmax(dim=1)
-            taken = losses.taken(log_prob, actions)
+            taken = losses.gather_actions(log_prob, actions)
             entropy = losses.entropy(log_prob).mean(dim=1)
             surrogate = losses.clipped_policy_loss(taken, before, advantage, config.clip)
             loss = surrogate - config.entropy_weight * entropy.sum()
             return loss, (loss.detach(), entropy.detach().mean(), taken.detach() - before)
 
-        norms, (loss, entropy, change) = self._step_actor(loss_of, rate, config.actor_grad_clip)
+        gradients, (loss, entropy, change) = nets.actor.gradients(loss_of)
+        norms = clip_norm_by_robot(gradients, config.actor_grad_clip)
+        if not self.actor_frozen:
+            nets.actor.step(gradients, rate)
         ratio = change.exp()
         kl = (ratio - 1.0 - change).mean()
         clipped = ((ratio - 1.0).abs() > config.clip).to(kl.dtype).mean()
@@ -194,8 +210,8 @@ class PPO(ActorCritic):
         reward = torch.stack([batch.reward.to(self._device).t() for batch in batches])
         terminated = torch.stack([batch.terminated.to(self._device) for batch in batches])
         ended = terminated | torch.stack([flags.to(self._device) for flags in cut])
-        self.scale.see(reward, ended)
-        deviation = self.scale.deviation(config.return_deviation_floor).unsqueeze(1)
+        self.scale.update(reward, ended)
+        deviation = self.scale.std(config.return_deviation_floor).unsqueeze(1)
         reward = (reward / deviation).to(self._dtype)
 
         flat_obs, flat_actions = _rows(obs), _rows(actions)
@@ -222,7 +238,7 @@ class PPO(ActorCritic):
         return Rollout(
             obs=flat_obs,
             actions=flat_actions,
-            log_prob=losses.taken(log_prob, flat_actions),
+            log_prob=losses.gather_actions(log_prob, flat_actions),
             value=taken,
             advantage=centred / (spread + 1e-8),
             target=target,
@@ -247,7 +263,7 @@ class PPO(ActorCritic):
     def _of_taken(self, q: Tensor, actions: Tensor) -> Tensor:
         """(R, B) the values that are fitted: of the actions taken, or of the state."""
         if self._config.advantage == "counterfactual":
-            return losses.taken(q, actions)
+            return losses.gather_actions(q, actions)
         return q.squeeze(1)
 
     def _running(self) -> dict[str, Tensor]:

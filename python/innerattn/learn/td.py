@@ -7,18 +7,19 @@ the paper and Iqbal & Sha 2019, sections 3.1-3.3 ("MAAC").
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
-from innerattn.config.run import NetworkConfig, TDConfig
+from innerattn.config import NetworkConfig, TDConfig
 from innerattn.learn import losses
-from innerattn.learn.actor_critic import ActorCritic
-from innerattn.learn.descent import Network, values_of
+from innerattn.learn.actor_critic import ActorCritic, Networks
+from innerattn.learn.adam import Forward, Network
+from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
 from innerattn.learn.replay import Replay
 from innerattn.learn.types import Team, Transitions
-from innerattn.nn import EntityColumns, sample_actions
+from innerattn.nn import sample_actions
 
 _TARGETS = {"consistent": losses.consistent_target, "maac": losses.maac_target}
 _POLICY_LOSSES = {
@@ -33,6 +34,14 @@ _METRICS = (
     "policy_entropy",
     "actor_grad_norm",
 )
+
+
+@dataclass(frozen=True)
+class TDNetworks(Networks):
+    """The networks of an update, with the slow copies that targets are computed by."""
+
+    target_actor: Network
+    target_critic: Network
 
 
 class TD(ActorCritic):
@@ -53,22 +62,16 @@ class TD(ActorCritic):
         seed: int,
         device: torch.device,
         dtype: torch.dtype = torch.float32,
-        availability_column: int | None = None,
-        entities: EntityColumns | None = None,
-        kinds: Sequence[str] | None = None,
     ) -> None:
         """Build networks, optimisers and replay.
 
         Args:
-            team: Sizes of the team.
+            team: What is known of the team.
             network: Sizes and kind of the networks.
             td: Numbers of the algorithm.
             seed: Seed of the initial weights and of every draw.
             device: Where networks and replay live.
             dtype: Floating-point type of the networks.
-            availability_column: As in `ActorCritic`.
-            entities: As in `ActorCritic`.
-            kinds: As in `ActorCritic`.
 
         Raises:
             ValueError: As in `ActorCritic`.
@@ -82,22 +85,20 @@ class TD(ActorCritic):
             seed=seed,
             device=device,
             dtype=dtype,
-            availability_column=availability_column,
-            entities=entities,
-            kinds=kinds,
         )
         self._config = td
-        self._step = self._update_all
         self._temperature = 1.0 / td.reward_scale
-        self._target = _TARGETS[td.entropy_target]
+        self._target_form = _TARGETS[td.entropy_target]
         self._policy_loss = _POLICY_LOSSES[td.policy_gradient]
         self.replay = Replay(td.replay_capacity, team, self._data_seed, device)
         self.target_actor = copy.deepcopy(self.actor).requires_grad_(False)
         self.target_critic = copy.deepcopy(self.critic).requires_grad_(False)
-        self._values |= {
-            "target_actor": values_of(self.target_actor),
-            "target_critic": values_of(self.target_critic),
-        }
+        self._networks: TDNetworks = TDNetworks(
+            self._actor_adam,
+            self._critic_adam,
+            Network(self.target_actor),
+            Network(self.target_critic),
+        )
         self._unpaid_env_steps = 0
 
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
@@ -114,9 +115,8 @@ class TD(ActorCritic):
         The critic's targets are then of the policies that imitate. See `Learner.imitate`.
         """
         loss = super().imitate(obs, actions, learning_rate)
-        torch._foreach_copy_(
-            list(self._values["target_actor"].values()), list(self._values["actor"].values())
-        )
+        slow, fast = self._networks.target_actor.values, self._networks.actor.values
+        torch._foreach_copy_(list(slow.values()), list(fast.values()))
         return loss
 
     def learn(self) -> dict[str, float] | None:
@@ -145,8 +145,9 @@ class TD(ActorCritic):
         Returns:
             (6,) the values that `learn` names, in that order.
         """
-        deviation = self.replay.reward_std.clamp_min(self._config.reward_std_floor)
-        reward = (batch.reward.to(self._device) - self.replay.reward_mean) / deviation
+        floor = self._config.reward_std_floor
+        reward = batch.reward.to(self._device) - self.replay.reward_mean
+        reward = reward / self.replay.reward_std.clamp_min(floor)
         continues = ~batch.terminated.to(self._device)
         shape = (self._team.num_robots, self._team.num_actions, len(batch.obs))
         return self._update(
@@ -157,15 +158,11 @@ class TD(ActorCritic):
             self._config.gamma * continues.to(self._dtype),
             self._draw(shape),
             self._draw(shape),
-            self._rate(),
         )
 
-    def _networks(self) -> dict[str, nn.Module]:
-        targets = {"target_actor": self.target_actor, "target_critic": self.target_critic}
-        return super()._networks() | targets
-
-    def _update_all(
+    def _update_networks(
         self,
+        nets: TDNetworks,
         obs: Tensor,
         actions: Tensor,
         reward: Tensor,
@@ -175,49 +172,67 @@ class TD(ActorCritic):
         noise: Tensor,
         rate: Tensor,
     ) -> Tensor:
-        target = self._targets(reward, next_obs, discount, next_noise)
-        critic_values = self._update_critic(obs, actions, target, rate)
-        actor_values = self._update_actor(obs, noise, rate)
-        for name in ("actor", "critic"):
+        target = self._targets(nets, reward, next_obs, discount, next_noise)
+        critic_figures = self._update_critic(nets, obs, actions, target, rate)
+        actor_figures = self._update_actor(nets, obs, noise, rate)
+        for slow, fast in ((nets.target_actor, nets.actor), (nets.target_critic, nets.critic)):
             torch._foreach_lerp_(
-                list(self._values[f"target_{name}"].values()),
-                list(self._values[name].values()),
-                self._config.polyak,
+                list(slow.values.values()), list(fast.values.values()), self._config.polyak
             )
-        return torch.stack([*critic_values, *actor_values])
+        return torch.stack([*critic_figures, *actor_figures])
+
+    def _targets(
+        self, nets: TDNetworks, reward: Tensor, next_obs: Tensor, discount: Tensor, noise: Tensor
+    ) -> Tensor:
+        """The targets (R, B) of a batch; the next actions are drawn from the target policy."""
+        log_prob = nets.target_actor(next_obs).log_softmax(dim=1)
+        actions = sample_actions(log_prob, noise)
+        q = nets.target_critic(next_obs, actions, self._available(next_obs)).q
+        entropy_term = self._temperature * losses.gather_actions(log_prob, actions)
+        next_value = losses.gather_actions(q, actions)
+        return self._target_form(reward, next_value, entropy_term, discount)
 
     def _update_critic(
-        self, obs: Tensor, actions: Tensor, target: Tensor, rate: Tensor
+        self, nets: TDNetworks, obs: Tensor, actions: Tensor, target: Tensor, rate: Tensor
     ) -> tuple[Tensor, ...]:
+        """One step of the critic towards the targets: loss, mean value, gradient norm."""
         config = self._config
 
-        def loss_of(critic: Network) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+        def loss_of(critic: Forward) -> tuple[Tensor, tuple[Tensor, Tensor]]:
             output = critic(obs, actions, self._available(obs))
-            q_taken = losses.taken(output.q, actions)
+            q_taken = losses.gather_actions(output.q, actions)
             loss = losses.critic_loss(q_taken, target)
-            loss = loss + self._attention_penalty(output, config.attention_logit_penalty)
+            loss = loss + losses.attention_logit_regularisation(
+                output.attended, config.attention_logit_penalty
+            )
             return loss, (loss.detach(), q_taken.detach().mean())
 
-        norm, (loss, q_mean) = self._step_critic(loss_of, rate, config.critic_grad_clip)
+        gradients, (loss, q_mean) = nets.critic.gradients(loss_of)
+        average_over_robots(gradients, self._team.num_robots)
+        norm = clip_norm(gradients, config.critic_grad_clip)
+        nets.critic.step(gradients, rate)
         return loss, q_mean, norm
 
-    def _update_actor(self, obs: Tensor, noise: Tensor, rate: Tensor) -> tuple[Tensor, ...]:
-        def loss_of(actor: Network) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+    def _update_actor(
+        self, nets: TDNetworks, obs: Tensor, noise: Tensor, rate: Tensor
+    ) -> tuple[Tensor, ...]:
+        """One step of the policies by the new critic: loss, entropy, mean gradient norm."""
+
+        def loss_of(actor: Forward) -> tuple[Tensor, tuple[Tensor, Tensor]]:
             log_prob = actor(obs).log_softmax(dim=1)
             with torch.no_grad():
                 actions = sample_actions(log_prob, noise)
-                q = self._run("critic", obs, actions, self._available(obs)).q
+                q = nets.critic(obs, actions, self._available(obs)).q
                 entropy = losses.entropy(log_prob).mean()
             loss = self._policy_loss(log_prob, q, actions, self._temperature)
             return loss, (loss.detach(), entropy)
 
-        norms, (loss, entropy) = self._step_actor(loss_of, rate, self._config.actor_grad_clip)
+        gradients, (loss, entropy) = nets.actor.gradients(loss_of)
+        norms = clip_norm_by_robot(gradients, self._config.actor_grad_clip)
+        if not self.actor_frozen:
+            nets.actor.step(gradients, rate)
         return loss, entropy, norms.mean()
 
-    def _targets(self, reward: Tensor, next_obs: Tensor, discount: Tensor, noise: Tensor) -> Tensor:
-        """The targets (R, B) of a batch; the next actions are drawn from the target policy."""
-        log_prob = self._run("target_actor", next_obs).log_softmax(dim=1)
-        actions = sample_actions(log_prob, noise)
-        q = self._run("target_critic", next_obs, actions, self._available(next_obs)).q
-        entropy_term = self._temperature * losses.taken(log_prob, actions)
-        return self._target(reward, losses.taken(q, actions), entropy_term, discount)
+    def _modules(self) -> dict[str, nn.Module]:
+        targets = {"target_actor": self.target_actor, "target_critic": self.target_critic}
+        return super()._modules() | targets

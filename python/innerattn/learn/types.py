@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
+import torch
 from torch import Tensor
+
+from innerattn.config import NetworkConfig
+from innerattn.nn import EntityColumns
 
 
 class Team(NamedTuple):
-    """Sizes of a team.
+    """What a learner knows of a team.
 
     Attributes:
         num_robots: R.
         obs_width: D, columns of one robot's observation.
         num_actions: A, discrete actions of one robot.
+        kinds: Kind of each robot, R words; needed only where `network.parameter_sharing` is "kind".
+        availability_column: Column of a robot's observation that says whether the robot is
+            available (above 0.5); needed only where `network.mask_unavailable` is set.
+        entities: To whom the columns of an observation belong; needed only where `network.encoder`
+            is "entities".
     """
 
     num_robots: int
     obs_width: int
     num_actions: int
+    kinds: tuple[str, ...] | None = None
+    availability_column: int | None = None
+    entities: EntityColumns | None = None
 
 
 class Transitions(NamedTuple):
@@ -82,7 +94,7 @@ class Learner(Protocol):
             The cross-entropy before the step, its mean over robots [nats].
         """
 
-    def reach(self, share: float) -> None:
+    def set_progress(self, share: float) -> None:
         """Take note of how far training is; whatever changes over a run follows it.
 
         Args:
@@ -126,4 +138,30 @@ class Learner(Protocol):
 
         Raises:
             ValueError: A name, shape or dtype is wrong; the learner is left unchanged.
+        """
+
+
+class LearnerClass(Protocol):
+    """How a registered learner is built; see `innerattn.config.Algorithm.learner`."""
+
+    def __call__(
+        self,
+        team: Team,
+        network: NetworkConfig,
+        config: Any,
+        *,
+        seed: int,
+        device: torch.device,
+    ) -> Learner:
+        """Build a learner with initial weights.
+
+        Args:
+            team: What is known of the team.
+            network: Sizes and kind of the networks.
+            config: The algorithm's section, an instance of `innerattn.config.Algorithm.config`.
+            seed: Seed of the initial weights and of every draw.
+            device: Where the networks live.
+
+        Raises:
+            ValueError: The team lacks something that the configuration needs.
         """

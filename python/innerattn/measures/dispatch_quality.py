@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.measures.cooperation import shared_abilities
+from innerattn.measures.measure import Measure
 from innerattn.policies.scripted.steering import Steering
 from innerattn.records.record import Record
+from innerattn.stats import Estimate
 from innerattn.stats.clusters import ratio_interval, share_interval
-from innerattn.stats.intervals import Interval
 
-_NEEDED = ("positions", "velocities", "victims")
+_NEEDS = ("positions", "velocities", "victims")
 _EQUAL_S = 1e-9
 
 
@@ -35,9 +36,9 @@ class DispatchQuality:
     """
 
     choices: int
-    sooner: Interval | None
+    sooner: Estimate | None
     sooner_by_chance: float | None
-    regret_s: Interval | None
+    regret_s: Estimate | None
     regret_by_chance_s: float | None
 
 
@@ -66,7 +67,7 @@ def choices_of(record: Record) -> Choices:
     Raises:
         ValueError: positions, velocities or victims were not recorded.
     """
-    missing = [name for name in _NEEDED if name not in record.steps]
+    missing = [name for name in _NEEDS if name not in record.steps]
     if missing:
         raise ValueError(f"record of {record.policy!r} lacks {', '.join(missing)}: record them")
     scenario, rescues = record.scenario, record.rescues
@@ -120,3 +121,43 @@ def _times(record: Record, events: NDArray[np.void]) -> NDArray[np.float64]:
     positions = record.steps["positions"][episode, appeared]
     velocities = record.steps["velocities"][episode, appeared]
     return Steering(record.scenario).arrival_times(positions, velocities, places)[..., 0]
+
+
+MEASURES = (
+    Measure(
+        name="choices",
+        unit="choices",
+        meaning="needs of rescued victims that several robots could have met",
+        of=lambda record: dispatch_quality(record).choices,
+        needs=_NEEDS,
+        is_count=True,
+    ),
+    Measure(
+        name="sooner",
+        unit="share of choices",
+        meaning="how often no other able robot would have arrived sooner than the helper",
+        of=lambda record: dispatch_quality(record).sooner,
+        needs=_NEEDS,
+    ),
+    Measure(
+        name="sooner_by_chance",
+        unit="share of choices",
+        meaning="the same for a helper drawn at random from the able robots",
+        of=lambda record: dispatch_quality(record).sooner_by_chance,
+        needs=_NEEDS,
+    ),
+    Measure(
+        name="regret_s",
+        unit="s",
+        meaning="arrival time of the helper minus that of the soonest able robot",
+        of=lambda record: dispatch_quality(record).regret_s,
+        needs=_NEEDS,
+    ),
+    Measure(
+        name="regret_by_chance_s",
+        unit="s",
+        meaning="the same for a helper drawn at random from the able robots",
+        of=lambda record: dispatch_quality(record).regret_by_chance_s,
+        needs=_NEEDS,
+    ),
+)

@@ -1,10 +1,10 @@
-"""From records to the figures that are reported; it runs nothing and prints nothing."""
+"""From records to the summary of an evaluation; it runs nothing and prints nothing."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,15 +12,19 @@ from numpy.typing import NDArray
 
 from innerattn.measures.attention import Entropy, entropy_of
 from innerattn.measures.cooperation import count_cooperation, count_pairs, pair_rates
+from innerattn.measures.measure import Value
+from innerattn.measures.registry import measures_of
 from innerattn.policies import SCRIPTED
 from innerattn.records.record import Record
-from innerattn.stats.intervals import Interval, mean_interval, score_interval
+from innerattn.stats import Estimate
+from innerattn.stats.estimate import as_json
+from innerattn.stats.intervals import mean_interval, score_interval
 
 SCHEMA_VERSION = 1
 
 
 @dataclass(frozen=True)
-class Figures:
+class Performance:
     """What is measured at one length of episodes.
 
     Attributes:
@@ -29,13 +33,15 @@ class Figures:
         rescues_per_episode: of the policy.
         score: 0 is random play, 1 scripted dispatch; None where dispatch is not surely better.
         scripted: rescues per episode of the scripted policies, by name, in the same worlds.
+        measures: of the policy and of the scripted ones, by policy and by the names of `MEASURES`.
     """
 
     episodes: int
     episode_steps: int
-    rescues_per_episode: Interval
-    score: Interval | None
-    scripted: dict[str, Interval]
+    rescues_per_episode: Estimate
+    score: Estimate | None
+    scripted: dict[str, Estimate]
+    measures: dict[str, dict[str, Value]] = field(default_factory=dict)
 
     def script_score(self, name: str) -> float | None:
         """The score of a scripted policy; None where the policy has none."""
@@ -47,7 +53,7 @@ class Figures:
 
 @dataclass(frozen=True)
 class Summary:
-    """All figures of one evaluation.
+    """The results of one evaluation.
 
     Attributes:
         policy: the run or the scripted policy that was asked for.
@@ -55,8 +61,8 @@ class Summary:
         situation: of the worlds.
         seed: of the worlds.
         episodes: how many episodes cooperation and attention were recorded in.
-        standard: figures at the scenario's own length.
-        long: figures at the second length.
+        standard: results at the scenario's own length.
+        long: results at the second length.
         cooperation: rescues by task and robot, where there was a choice of robots.
         cooperation_rates: eq. 5 by robot i and teammate j, for i that ever helped with another.
         attention_entropy: by robot and head [nats]; empty where there is no attention.
@@ -69,8 +75,8 @@ class Summary:
     situation: str
     seed: int
     episodes: int
-    standard: Figures
-    long: Figures
+    standard: Performance
+    long: Performance
     cooperation: dict[str, dict[str, int]]
     cooperation_rates: dict[str, dict[str, float]]
     attention_entropy: dict[str, list[float]]
@@ -79,7 +85,7 @@ class Summary:
 
     def to_json(self) -> dict[str, Any]:
         """The document that `evaluate --json` and a run folder's summary.json hold."""
-        standard = asdict(self.standard)
+        standard = as_json(self.standard)
         return {
             "schema_version": SCHEMA_VERSION,
             "policy": self.policy,
@@ -93,7 +99,8 @@ class Summary:
             "rescues_per_episode": standard["rescues_per_episode"],
             "score": standard["score"],
             "scripted": standard["scripted"],
-            "long": asdict(self.long),
+            "measures": standard["measures"],
+            "long": as_json(self.long),
             "cooperation": self.cooperation,
             "cooperation_rates": self.cooperation_rates,
             "attention_entropy": self.attention_entropy,
@@ -108,7 +115,7 @@ def summarise(
     long: Mapping[str, Sequence[Record]],
     warm_start: str = "none",
 ) -> Summary:
-    """The figures of one policy.
+    """The summary of one policy's evaluation.
 
     Args:
         policy: what it was asked for as.
@@ -126,8 +133,8 @@ def summarise(
         situation=scenario.situation,
         seed=recorded.seed,
         episodes=recorded.num_episodes,
-        standard=_figures(recorded.policy, standard, recorded.seed),
-        long=_figures(recorded.policy, long, recorded.seed),
+        standard=_performance(recorded.policy, standard, recorded.seed),
+        long=_performance(recorded.policy, long, recorded.seed),
         cooperation=count_cooperation(recorded.rescues, scenario),
         cooperation_rates=_rates(recorded),
         attention_entropy=_rows(names, entropy),
@@ -136,18 +143,19 @@ def summarise(
     )
 
 
-def _figures(method: str, records: Mapping[str, Sequence[Record]], seed: int) -> Figures:
+def _performance(method: str, records: Mapping[str, Sequence[Record]], seed: int) -> Performance:
     counts = {
         name: np.concatenate([part.rescue_counts() for part in parts])
         for name, parts in records.items()
     }
     means = {name: mean_interval(values, seed) for name, values in counts.items()}
-    return Figures(
+    return Performance(
         episodes=len(counts[method]),
         episode_steps=records[method][0].scenario.episode_steps,
         rescues_per_episode=means[method],
         score=score_interval(counts[method], counts["random"], counts["hungarian"], seed),
         scripted={name: means[name] for name in SCRIPTED},
+        measures={name: measures_of(*parts) for name, parts in records.items()},
     )
 
 

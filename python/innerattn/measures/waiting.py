@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from innerattn.measures.measure import Measure
 from innerattn.records.record import Record
+from innerattn.stats import Estimate
 from innerattn.stats.clusters import ratio_interval
-from innerattn.stats.intervals import Interval
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ class Waiting:
 
     rescued: int
     left: int
-    time_to_rescue_s: Interval | None
-    time_per_rescue_s: Interval | None
+    time_to_rescue_s: Estimate | None
+    time_per_rescue_s: Estimate | None
 
 
 def waiting(record: Record) -> Waiting:
@@ -58,3 +59,39 @@ def waiting(record: Record) -> Waiting:
         time_to_rescue_s=ratio_interval(times, counts),
         time_per_rescue_s=ratio_interval(waited, counts),
     )
+
+
+_NEEDS = ("victims",)
+
+MEASURES = (
+    Measure(
+        name="rescued",
+        unit="victims",
+        meaning="victims that were rescued",
+        of=lambda record: waiting(record).rescued,
+        needs=_NEEDS,
+        is_count=True,
+    ),
+    Measure(
+        name="left",
+        unit="victims",
+        meaning="victims that still waited when their episode ended",
+        of=lambda record: waiting(record).left,
+        needs=_NEEDS,
+        is_count=True,
+    ),
+    Measure(
+        name="time_to_rescue_s",
+        unit="s",
+        meaning="mean time from the appearance of a rescued victim to its rescue",
+        of=lambda record: waiting(record).time_to_rescue_s,
+        needs=_NEEDS,
+    ),
+    Measure(
+        name="time_per_rescue_s",
+        unit="s",
+        meaning="time that all victims waited, divided by the number of rescues",
+        of=lambda record: waiting(record).time_per_rescue_s,
+        needs=_NEEDS,
+    ),
+)

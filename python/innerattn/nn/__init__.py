@@ -5,7 +5,12 @@ It knows nothing of environments, losses or files.
 """
 
 from innerattn.nn.actor import Actor, action_noise, sample_actions
-from innerattn.nn.attention import Attended, InnerAttention, UniformAttention
+from innerattn.nn.attention import (
+    Attended,
+    InnerAttention,
+    TeammateAttention,
+    UniformAttention,
+)
 from innerattn.nn.critic import Critic, CriticOutput
 from innerattn.nn.encoder import EntityColumns, EntityEncoder
 from innerattn.nn.joint_critic import JointCritic
@@ -22,6 +27,7 @@ __all__ = [
     "InnerAttention",
     "JointCritic",
     "PerRobotLinear",
+    "TeammateAttention",
     "UniformAttention",
     "action_noise",
     "sample_actions",

@@ -34,31 +34,33 @@ class Attended(NamedTuple):
     visible: Tensor
 
 
-def visible_teammates(like: Tensor, available: Tensor | None) -> Tensor:
+def visible_teammates(num_robots: int, available: Tensor | None, device: torch.device) -> Tensor:
     """Which teammates each robot sees: the others, as far as they are available.
 
     Args:
-        like: (R, B, ...) a tensor whose number of robots and device are taken.
+        num_robots: R.
         available: (B, R) bool, or None where all are.
+        device: Where the result lies.
 
     Returns:
         (1 or B, R, R) bool, row i, column j.
     """
-    num_robots = like.shape[0]
-    others = ~torch.eye(num_robots, dtype=torch.bool, device=like.device).unsqueeze(0)
+    others = ~torch.eye(num_robots, dtype=torch.bool, device=device).unsqueeze(0)
     return others if available is None else others & available.unsqueeze(1)
 
 
-class _TeammateAttention(nn.Module):
-    """The parameters that both kinds of attention hold; all are shared by the robots.
+class TeammateAttention(nn.Module):
+    """Base of all attentions: from encodings of the team to what each robot makes of its teammates.
+
+    The critic's optimiser takes parameters of an attention for shared by the robots.
 
     Attributes:
-        query: (W, W), rows h*d..(h+1)*d belong to head h; likewise `key` and `value`.
-        value_bias: (W,).
+        width: W.
+        heads: H.
     """
 
     def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
-        """Draw the parameters.
+        """Check the sizes; a subclass draws its parameters.
 
         Args:
             width: W, width of the encodings and of the mixed values.
@@ -71,7 +73,31 @@ class _TeammateAttention(nn.Module):
         super().__init__()
         if width % heads:
             raise ValueError(f"width = {width}: must be a multiple of the {heads} attention heads")
-        self.heads = heads
+        del generator
+        self.width, self.heads = width, heads
+
+    def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
+        """Attend to teammates.
+
+        Args:
+            own: (R, B, W) state-only encodings, the source of queries.
+            others: (R, B, W) state-action encodings, the source of keys and values.
+            available: (B, R) bool; no robot attends to an unavailable one. None: all are available.
+        """
+        raise NotImplementedError
+
+
+class _SharedMatrices(TeammateAttention):
+    """The parameters of inner and uniform attention.
+
+    Attributes:
+        query: (W, W), rows h*d..(h+1)*d belong to head h; likewise `key` and `value`.
+        value_bias: (W,).
+    """
+
+    def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
+        """Draw the parameters; arguments as in `TeammateAttention`."""
+        super().__init__(width, heads, generator)
         self.query = uniform_parameter((width, width), width, generator)
         self.key = uniform_parameter((width, width), width, generator)
         self.value = uniform_parameter((width, width), width, generator)
@@ -81,89 +107,100 @@ class _TeammateAttention(nn.Module):
         return functional.leaky_relu_(functional.linear(others, self.value, self.value_bias))
 
 
-class InnerAttention(_TeammateAttention):
-    """Learnt attention: alpha_ij = softmax over j != i of q_i . k_j / sqrt(d), per head."""
+class InnerAttention(_SharedMatrices):
+    """Learnt attention: alpha_ij = softmax over j != i of q_i . k_j / sqrt(d), per head.
 
-    def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
-        """Attend to teammates.
-
-        Args:
-            own: (R, B, W) state-only encodings, the source of queries.
-            others: (R, B, W) state-action encodings, the source of keys and values.
-            available: (B, R) bool; an unavailable robot is attended to by none. None: all are.
-        """
-        if torch.compiler.is_compiling():
-            return self._fused(own, others, available)
-        robots, batch, width = own.shape
-        queries = self._by_head(functional.linear(own, self.query))
-        keys = self._by_head(functional.linear(others, self.key))
-        values = self._by_head(self._values(others))
-        # Teammates before robots: a softmax along the middle dimension of such small matrices is
-        # much faster than one along the last, and no product below needs a copy of its operands.
-        shape = (batch, self.heads, robots, robots)
-        scores = torch.bmm(keys, queries.transpose(1, 2)).view(shape)
-        visible = visible_teammates(own, available)
-        seen = visible.transpose(1, 2).unsqueeze(1)
-        # The least finite number instead of -inf keeps a robot without teammates free of NaN.
-        lowest = torch.finfo(scores.dtype).min
-        hidden = torch.zeros_like(seen, dtype=scores.dtype).masked_fill_(~seen, lowest)
-        weights = torch.add(hidden, scores, alpha=(width // self.heads) ** -0.5).softmax(dim=2)
-        if robots == 1 or available is not None:
-            weights = weights * seen  # where nobody is seen, the softmax found equal weights
-        mixed = torch.bmm(weights.flatten(0, 1).transpose(1, 2), values)
-        return Attended(
-            mixed.transpose(0, 1).reshape(robots, batch, width),
-            weights.transpose(2, 3),
-            scores.transpose(2, 3),
-            visible,
-        )
-
-    def _fused(self, own: Tensor, others: Tensor, available: Tensor | None) -> Attended:
-        """The same as sums over broadcast products, which a compiler fuses into a few loops."""
-        robots, batch, width = own.shape
-        shape = (robots, batch, self.heads, width // self.heads)
-        queries = functional.linear(own, self.query).view(shape)
-        keys = functional.linear(others, self.key).view(shape)
-        values = self._values(others).view(shape)
-        scores = (queries.unsqueeze(1) * keys.unsqueeze(0)).sum(4)  # (R, R, B, H)
-        visible = visible_teammates(own, available)
-        seen = visible.permute(1, 2, 0).unsqueeze(3)
-        lowest = torch.finfo(scores.dtype).min
-        weights = (scores * shape[3] ** -0.5).masked_fill(~seen, lowest).softmax(dim=1)
-        if robots == 1 or available is not None:
-            weights = weights * seen
-        mixed = (weights.unsqueeze(4) * values.unsqueeze(0)).sum(1).view(robots, batch, width)
-        return Attended(mixed, weights.permute(2, 3, 0, 1), scores.permute(2, 3, 0, 1), visible)
-
-    def _by_head(self, x: Tensor) -> Tensor:
-        """View (R, B, W) as (B*H, R, d) without a copy."""
-        robots, batch, width = x.shape
-        return x.view(robots, batch * self.heads, width // self.heads).transpose(0, 1)
-
-
-class UniformAttention(_TeammateAttention):
-    """The baseline: alpha_ij = 1/(N-1) for every teammate seen; query and key go unused."""
+    Attributes:
+        attend: From queries, keys and values to what each robot makes of its teammates.
+    """
 
     def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
-        """Draw the same parameters as `InnerAttention`; those unused are not trained."""
+        """Draw the parameters; arguments as in `TeammateAttention`."""
+        super().__init__(width, heads, generator)
+        self.attend = dot_product_attention
+
+    def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
+        """Attend to teammates; arguments as in `TeammateAttention.forward`."""
+        queries = functional.linear(own, self.query)
+        keys = functional.linear(others, self.key)
+        return self.attend(queries, keys, self._values(others), self.heads, available)
+
+
+class UniformAttention(_SharedMatrices):
+    """The baseline: alpha_ij = 1/(N-1) for every teammate seen; query and key go unused.
+
+    It holds the parameters of `InnerAttention` and trains 2 W^2 fewer: 32,768 at a width of 128.
+
+    Attributes:
+        attend: From values to what each robot makes of its teammates.
+    """
+
+    def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
+        """Draw the parameters; arguments as in `TeammateAttention`."""
         super().__init__(width, heads, generator)
         self.query.requires_grad_(False)
         self.key.requires_grad_(False)
+        self.attend = mean_attention
 
     def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
-        """Average over teammates; arguments as in `InnerAttention.forward`."""
-        values = self._values(others)
-        visible = visible_teammates(own, available)
-        weights = visible.to(values.dtype)
-        weights = weights / weights.sum(dim=2, keepdim=True).clamp_min(1.0)
-        if torch.compiler.is_compiling():
-            mixed = (weights.permute(1, 2, 0).unsqueeze(3) * values.unsqueeze(0)).sum(1)
-        else:
-            mixed = torch.bmm(weights.expand(own.shape[1], -1, -1), values.transpose(0, 1))
-            mixed = mixed.transpose(0, 1)
-        return Attended(
-            mixed.contiguous(),
-            weights.unsqueeze(1).expand(own.shape[1], self.heads, -1, -1),
-            None,
-            visible,
-        )
+        """Average over teammates; arguments as in `TeammateAttention.forward`."""
+        del own
+        return self.attend(self._values(others), self.heads, available)
+
+
+def dot_product_attention(
+    queries: Tensor, keys: Tensor, values: Tensor, heads: int, available: Tensor | None
+) -> Attended:
+    """x_i = sum over j != i of alpha_ij v_j, with alpha_ij = softmax of q_i . k_j / sqrt(d).
+
+    Args:
+        queries: (R, B, W), columns h*d..(h+1)*d belong to head h; likewise keys and values.
+        keys: (R, B, W).
+        values: (R, B, W).
+        heads: H.
+        available: (B, R) bool; no robot attends to an unavailable one. None: all are available.
+    """
+    robots, batch, width = queries.shape
+    visible = visible_teammates(robots, available, queries.device)
+    queries, keys, values = (_by_head(x, heads) for x in (queries, keys, values))
+    # Teammates before robots: a softmax along the middle dimension of such small matrices is
+    # much faster than one along the last, and no product below needs a copy of its operands.
+    scores = torch.bmm(keys, queries.transpose(1, 2)).view(batch, heads, robots, robots)
+    seen = visible.transpose(1, 2).unsqueeze(1)
+    # The least finite number instead of -inf keeps a robot without teammates free of NaN.
+    lowest = torch.finfo(scores.dtype).min
+    hidden = torch.zeros_like(seen, dtype=scores.dtype).masked_fill_(~seen, lowest)
+    weights = torch.add(hidden, scores, alpha=(width // heads) ** -0.5).softmax(dim=2)
+    if robots == 1 or available is not None:
+        weights = weights * seen  # where nobody is seen, the softmax found equal weights
+    mixed = torch.bmm(weights.flatten(0, 1).transpose(1, 2), values)
+    return Attended(
+        mixed.transpose(0, 1).reshape(robots, batch, width),
+        weights.transpose(2, 3),
+        scores.transpose(2, 3),
+        visible,
+    )
+
+
+def mean_attention(values: Tensor, heads: int, available: Tensor | None) -> Attended:
+    """x_i = the mean of v_j over the teammates j that robot i sees.
+
+    Args:
+        values: (R, B, W).
+        heads: H.
+        available: As in `dot_product_attention`.
+    """
+    robots, batch, _ = values.shape
+    visible = visible_teammates(robots, available, values.device)
+    weights = visible.to(values.dtype)
+    weights = weights / weights.sum(dim=2, keepdim=True).clamp_min(1.0)
+    mixed = torch.bmm(weights.expand(batch, -1, -1), values.transpose(0, 1)).transpose(0, 1)
+    return Attended(
+        mixed.contiguous(), weights.unsqueeze(1).expand(batch, heads, -1, -1), None, visible
+    )
+
+
+def _by_head(x: Tensor, heads: int) -> Tensor:
+    """View (R, B, W) as (B*H, R, d) without a copy."""
+    robots, batch, width = x.shape
+    return x.view(robots, batch * heads, width // heads).transpose(0, 1)

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from innerattn.nn.attention import Attended, InnerAttention, UniformAttention
+from innerattn.nn.attention import Attended, TeammateAttention
 from innerattn.nn.encoder import EntityColumns, observation_encoder
 from innerattn.nn.linear import PerRobotLinear
 
@@ -38,7 +38,7 @@ class Critic(nn.Module):
         num_robots: int,
         obs_width: int,
         num_actions: int,
-        attention: InnerAttention | UniformAttention,
+        attention: TeammateAttention,
         generator: torch.Generator,
         outputs: int | None = None,
         entities: EntityColumns | None = None,
@@ -55,7 +55,7 @@ class Critic(nn.Module):
             entities: Columns of the entities that are encoded apart; None: none are.
         """
         super().__init__()
-        width = attention.query.shape[0]
+        width = attention.width
         self.num_actions = num_actions
         self.state_encoder = observation_encoder(num_robots, obs_width, width, generator, entities)
         self.action_encoder = observation_encoder(

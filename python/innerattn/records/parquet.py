@@ -12,18 +12,23 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
-from innerattn.records.record import FIELDS, Record, rescue_dtype
+from innerattn.records.record import FIELDS, Length, Record, rescue_dtype
+from innerattn.records.run_folder import plain_file
 
 FORMAT = "innerattn.records"
 SCHEMA_VERSION = 1
 
 RECORD_FILES = _EPISODES, _RESCUES = "episodes.parquet", "rescues.parquet"
+
+_SUMS = ("record", "episode", "steps", "rescues", "reward")
+"""Columns of ``episodes.parquet`` that every record needs; the others are labels and steps."""
 
 
 def write_records(records: Sequence[Record], folder: Path) -> None:
@@ -45,20 +50,33 @@ def write_records(records: Sequence[Record], folder: Path) -> None:
     )
 
 
-def read_records(folder: str | Path) -> list[Record]:
+def read_records(
+    folder: str | Path, *, policy: str | None = None, steps: bool = True
+) -> list[Record]:
     """The records that `write_records` wrote, in their order.
 
+    Args:
+        folder: where they lie.
+        policy: whose records; None: everybody's.
+        steps: whether to read what was recorded step by step, which is most of the file.
+
     Raises:
-        RunError: a file is missing, not Parquet, or not of this format and version, or the two do
-            not belong together.
+        RunError: a file is missing, a link, not Parquet, or not of this format and version, or the
+            two do not belong together.
     """
     folder = Path(folder)
-    episodes, heads = _read(folder / _EPISODES)
+    episodes, heads = _read(folder / _EPISODES, None if steps else _SUMS)
     rescues, others = _read(folder / _RESCUES)
     if heads != others:
         raise RunError(f"{folder}: {_EPISODES} and {_RESCUES} are of different episodes")
     try:
-        return [_record(i, head, episodes, rescues) for i, head in enumerate(heads)]
+        lengths = _lengths(heads, episodes)
+        scenarios: dict[str, Scenario] = {}
+        return [
+            _record(i, head, lengths[i], episodes, rescues, steps, scenarios)
+            for i, head in enumerate(heads)
+            if policy in (None, head["policy"])
+        ]
     except (LookupError, ValueError, TypeError, AttributeError, pa.ArrowException) as error:
         raise RunError(f"{folder}: records do not fit their description ({error})") from error
 
@@ -70,6 +88,7 @@ def _head(record: Record) -> dict[str, Any]:
         "scenario": record.scenario.model_dump(mode="json"),
         "robot_names": list(record.robot_names),
         "seed": record.seed,
+        "length": record.length,
         "reward_names": list(record.reward_names),
         "steps": {
             name: {"dtype": _dtype_text(values.dtype), "shape": list(values.shape[1:])}
@@ -150,13 +169,18 @@ def _write(tables: list[pa.Table], records: Sequence[Record], path: Path) -> Non
     write_whole(path, sink.getvalue().to_pybytes())
 
 
-def _read(path: Path) -> tuple[pa.Table, list[dict[str, Any]]]:
+def _read(
+    path: Path, columns: Sequence[str] | None = None
+) -> tuple[pa.Table, list[dict[str, Any]]]:
+    """Some columns of a file, or all, and what it says of its records."""
     if not path.exists():
         raise RunError(f"{path}: no such file")
+    plain_file(path)
     try:
-        table = pq.read_table(path)
-        head = json.loads((table.schema.metadata or {})[FORMAT.encode()])
-        version, records = head["schema_version"], list(head["records"])
+        with pq.ParquetFile(path) as file:
+            head = json.loads((file.schema_arrow.metadata or {})[FORMAT.encode()])
+            version, records = head["schema_version"], list(head["records"])
+            table = file.read(columns)
     except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
         raise RunError(f"{path}: not a file of {FORMAT}") from error
     if version != SCHEMA_VERSION:
@@ -164,10 +188,38 @@ def _read(path: Path) -> tuple[pa.Table, list[dict[str, Any]]]:
     return table, records
 
 
-def _record(index: int, head: dict[str, Any], episodes: pa.Table, rescues: pa.Table) -> Record:
-    rows = episodes.filter(pa.compute.equal(episodes["record"], index))
-    events = rescues.filter(pa.compute.equal(rescues["record"], index))
-    scenario = Scenario.model_validate(head["scenario"])
+def _lengths(heads: Sequence[dict[str, Any]], episodes: pa.Table) -> list[Length]:
+    """Which length of an evaluation each record is of.
+
+    Files that are older than this label hold, of each policy, the standard length first: a record
+    that begins at episode 0 again is of the second one.
+    """
+    begun: set[str] = set()
+    lengths: list[Length] = []
+    for index, head in enumerate(heads):
+        name = head["policy"]
+        rows = episodes.filter(pc.equal(episodes["record"], index))
+        again = name in begun and int(_numbers(rows["episode"])[0]) == 0
+        lengths.append(head.get("length", "long" if again else "standard"))
+        begun.add(name)
+    return lengths
+
+
+def _record(
+    index: int,
+    head: dict[str, Any],
+    length: Length,
+    episodes: pa.Table,
+    rescues: pa.Table,
+    steps: bool,
+    scenarios: dict[str, Scenario],
+) -> Record:
+    rows = episodes.filter(pc.equal(episodes["record"], index))
+    events = rescues.filter(pc.equal(rescues["record"], index))
+    described = json.dumps(head["scenario"])
+    if described not in scenarios:
+        scenarios[described] = Scenario.model_validate(head["scenario"])
+    scenario = scenarios[described]
     names, reward_names = tuple(head["robot_names"]), tuple(head["reward_names"])
     lengths = _numbers(rows["steps"])
     record = Record(
@@ -180,10 +232,11 @@ def _record(index: int, head: dict[str, Any], episodes: pa.Table, rescues: pa.Ta
         rescues=_events(events, scenario, names),
         reward_names=reward_names,
         rewards_total=_arrays(rows["reward"]).reshape(len(rows), len(names), len(reward_names)),
+        length=length,
         steps={
             name: _steps(name, head["steps"][name], rows)
             for name in FIELDS
-            if name in head["steps"]
+            if steps and name in head["steps"]
         },
     )
     listed, counted = record.rescue_counts(), _numbers(rows["rescues"])

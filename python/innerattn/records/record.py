@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,10 @@ FIELDS = (
     "attention",
 )
 """What can be recorded step by step."""
+
+
+Length = Literal["standard", "long"]
+"""The scenario's own length of an episode, or the second one that policies are measured at."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,7 @@ class Record:
             helper_k filled the task's need k, -1 beyond its last need.
         reward_names: C names of reward components.
         rewards_total: (E, R, C) float64 sum over the episode.
+        length: which of an evaluation's two lengths of episodes this is.
         steps: by name, arrays (E, T, ...): obs (R, D) float32, actions (R,) int64 or (R, 2)
             float32, rewards (R, C) float32, positions and velocities (R, 2) float32, victims (V,)
             structured, faults (R,) structured, attention (H, R, R) float32.
@@ -49,6 +54,7 @@ class Record:
     rescues: NDArray[np.void]
     reward_names: tuple[str, ...]
     rewards_total: NDArray[np.float64]
+    length: Length = "standard"
     steps: dict[str, NDArray[Any]] = field(default_factory=dict)
 
     @property

@@ -10,7 +10,7 @@ import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from innerattn.config import RunConfig, read_toml
 from innerattn.errors import RunError
@@ -43,6 +43,23 @@ class RunInfo:
     weights_sha256: str | None = None
 
 
+def run_info(document: Any) -> RunInfo:
+    """What the document of a ``run.json`` says.
+
+    Raises:
+        ValueError: it is not the record of a run, or of another version.
+    """
+    try:
+        info = RunInfo(**document)
+    except TypeError as error:
+        raise ValueError("not the record of a run") from error
+    if info.schema_version != SCHEMA_VERSION:
+        raise ValueError(f"schema version {info.schema_version}, only {SCHEMA_VERSION} is known")
+    if info.state not in get_args(State):
+        raise ValueError(f"state {info.state!r} is not one of {get_args(State)}")
+    return info
+
+
 def read_info(run: str | Path) -> RunInfo:
     """What ``run.json`` says.
 
@@ -52,18 +69,15 @@ def read_info(run: str | Path) -> RunInfo:
     path = Path(run)
     if not path.is_dir():
         raise RunError(f"{path}: no such run folder")
+    file = path / "run.json"
     try:
-        info = RunInfo(**json.loads(plain_file(path / "run.json").read_text("utf-8")))
-    except (OSError, ValueError, TypeError, RecursionError) as error:
-        raise RunError(f"{path / 'run.json'}: not the record of a run") from error
-    if info.schema_version != SCHEMA_VERSION:
-        raise RunError(
-            f"{path / 'run.json'}: schema version {info.schema_version}, "
-            f"only {SCHEMA_VERSION} is known"
-        )
-    if info.state not in get_args(State):
-        raise RunError(f"{path / 'run.json'}: state {info.state!r} is not one of {get_args(State)}")
-    return info
+        document = json.loads(plain_file(file).read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise RunError(f"{file}: not the record of a run") from error
+    try:
+        return run_info(document)
+    except ValueError as error:
+        raise RunError(f"{file}: {error}") from error
 
 
 def read_config(run: str | Path) -> RunConfig:
@@ -78,27 +92,16 @@ def read_config(run: str | Path) -> RunConfig:
     return read_toml(plain_file(path / "config.toml"))
 
 
-def _is_copy(run: Path) -> bool:
-    """Whether a run was kept in small, with the digest of its weights instead of these."""
-    try:
-        known = read_info(run).weights_sha256 is not None
-        return known and not os.path.lexists(run / "checkpoints")
-    except RunError:
-        return False
-
-
 def newest_weights(run: Path) -> Path:
     """The weights file that ``checkpoints/latest`` names; a name is a plain number.
 
     Raises:
-        RunError: there is none (yet, or in a small copy of a run), or what is there was not made by
-            training.
+        RunError: there is none (yet), or what is there was not made by training.
     """
     checkpoints = run / "checkpoints"
     latest = checkpoints / "latest"
     if checkpoints.is_symlink() or not checkpoints.is_dir() or not os.path.lexists(latest):
-        without = "was kept without its weights" if _is_copy(run) else "holds no checkpoint yet"
-        raise RunError(f"{run}: {without}")
+        raise RunError(f"{run}: holds no checkpoint yet")
     try:
         name = plain_file(latest).read_text("ascii").strip()
     except ValueError:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from innerattn.experiments.run import StudyRun
-from innerattn.experiments.scan import FinishedRun
+from innerattn.experiments.run import FinishedRun
 from innerattn.report.crossed.write import FILES as CROSSED_FILES
 from innerattn.report.crossed.write import write_crossed
 from innerattn.report.paper.write import PARTS, write_report
@@ -48,10 +47,5 @@ def make_outputs(
     elif target == "crossed":
         write_crossed(runs, out, budget, left_out)
     else:
-        listed = [StudyRun(*_label(run), run.folder) for run in runs]
-        write_report(listed, out, budget, parts, left_out)
+        write_report(runs, out, budget, parts, left_out)
     return [path for path in files if path.exists()]
-
-
-def _label(run: FinishedRun) -> tuple[str, str, int]:
-    return run.case.situation, run.case.method, run.case.seed

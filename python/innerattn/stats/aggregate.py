@@ -13,7 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from innerattn.stats.intervals import Interval, percentile_interval
+from innerattn.stats.estimate import Estimate
+from innerattn.stats.resampling import percentile_interval
 
 Array = NDArray[np.float64]
 
@@ -32,7 +33,7 @@ def interquartile_mean(values: ArrayLike) -> float:
     return float(_trimmed(_values(values, 1)[None])[0])
 
 
-def iqm_interval(strata: Sequence[ArrayLike], seed: int) -> Interval:
+def iqm_interval(strata: Sequence[ArrayLike], seed: int) -> Estimate:
     """The interquartile mean over all runs, by a percentile bootstrap within strata.
 
     Args:
@@ -50,7 +51,7 @@ def iqm_interval(strata: Sequence[ArrayLike], seed: int) -> Interval:
     return percentile_interval(mean, _trimmed(np.concatenate(resampled, 1)))
 
 
-def improvement_interval(x: Sequence[ArrayLike], y: Sequence[ArrayLike], seed: int) -> Interval:
+def improvement_interval(x: Sequence[ArrayLike], y: Sequence[ArrayLike], seed: int) -> Estimate:
     """How probably a run of method X is better than one of method Y, ``P(X > Y) + P(X = Y) / 2``.
 
     It is the mean over strata of the share of pairs of runs (Mann and Whitney's U / n m), by a

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.stats.intervals import Interval, percentile_interval
+from innerattn.stats.estimate import Estimate
+from innerattn.stats.resampling import percentile_interval
 
 
 class Comparison(NamedTuple):
@@ -52,7 +53,7 @@ def compare(positive: NDArray[np.float64], negative: NDArray[np.float64]) -> Com
     return Comparison(wins, np.outer(*sizes).astype(np.float64))
 
 
-def areas(comparison: Comparison, draws: NDArray[np.float64]) -> tuple[Interval, ...]:
+def areas(comparison: Comparison, draws: NDArray[np.float64]) -> tuple[Estimate, ...]:
     """Areas under the ROC curves: how often a positive score is above a negative one.
 
     ``AUC = (number of pairs won + half the ties) / number of pairs``, which is Mann and Whitney's

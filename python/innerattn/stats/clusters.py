@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtr, stdtrit
 
-from innerattn.stats.intervals import Interval
+from innerattn.stats.estimate import Estimate
 
 
 @dataclass(frozen=True)
@@ -101,10 +101,10 @@ def share_of(hits: ArrayLike, events: ArrayLike) -> Share | None:
     return Share(share, share * (1.0 - share) / variance, k)
 
 
-def share_interval(hits: ArrayLike, events: ArrayLike) -> Interval | None:
+def share_interval(hits: ArrayLike, events: ArrayLike) -> Estimate | None:
     """The share of events that are hits and its 95 % interval; see `share_of`."""
     share = share_of(hits, events)
-    return None if share is None else Interval(share.value, *share.interval())
+    return None if share is None else Estimate(share.value, *share.interval())
 
 
 def ratio_intervals(
@@ -132,11 +132,11 @@ def ratio_intervals(
     return mean, mean - half, mean + half
 
 
-def ratio_interval(sums: ArrayLike, events: ArrayLike) -> Interval | None:
+def ratio_interval(sums: ArrayLike, events: ArrayLike) -> Estimate | None:
     """One mean over events, see `ratio_intervals`; None below two episodes with events."""
     found = ratio_intervals(np.asarray(sums, np.float64), np.asarray(events, np.float64))
     mean, low, high = map(float, found)
-    return None if math.isnan(low) else Interval(mean, low, high)
+    return None if math.isnan(low) else Estimate(mean, low, high)
 
 
 def _counts(name: str, values: ArrayLike) -> NDArray[np.int64]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtri, gammaln, nctdtrinc, stdtr, stdtrit
 
-from innerattn.stats.intervals import Interval
+from innerattn.stats.estimate import Estimate
 
 ALPHA = 0.05
 """Level of every test."""
@@ -38,13 +38,13 @@ class Contrast:
             the noncentral t.
     """
 
-    difference: Interval
+    difference: Estimate
     dof: float
     p: float
     margin: float
     equivalence_p: float
     equivalent: bool
-    hedges_g: Interval
+    hedges_g: Estimate
 
 
 def contrast(values: ArrayLike, weights: Sequence[float], margin: float) -> Contrast | None:
@@ -102,7 +102,7 @@ def _judged(difference: float, error: float, dof: float, margin: float) -> dict[
     half = float(stdtrit(dof, 1.0 - ALPHA / 2.0)) * error
     equivalence_p = float(stdtr(dof, -(margin - abs(difference)) / error))
     return {
-        "difference": Interval(difference, difference - half, difference + half),
+        "difference": Estimate(difference, difference - half, difference + half),
         "dof": dof,
         "p": float(2.0 * stdtr(dof, -abs(difference) / error)),
         "margin": margin,
@@ -111,7 +111,7 @@ def _judged(difference: float, error: float, dof: float, margin: float) -> dict[
     }
 
 
-def _hedges_g(effect: float, scale: float, dof: int) -> Interval:
+def _hedges_g(effect: float, scale: float, dof: int) -> Estimate:
     """The corrected standardised difference; ``effect / scale`` is the t of ``dof`` degrees."""
     correction = math.exp(gammaln(dof / 2) - gammaln((dof - 1) / 2)) / math.sqrt(dof / 2)
     t, quantiles = effect / scale, (1.0 - ALPHA / 2.0, ALPHA / 2.0)
@@ -120,7 +120,7 @@ def _hedges_g(effect: float, scale: float, dof: int) -> Interval:
         ends = [float(nctdtrinc(dof, quantile, t)) * scale for quantile in quantiles]
     else:
         ends = [effect * math.sqrt(chdtri(dof, quantile) / dof) for quantile in quantiles]
-    return Interval(correction * effect, min(ends), max(ends))
+    return Estimate(correction * effect, min(ends), max(ends))
 
 
 def _check_margin(margin: float) -> None:

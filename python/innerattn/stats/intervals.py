@@ -7,27 +7,16 @@ bootstrap resamples. Runs are too few for that; their interval is Student's.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
-_RESAMPLES = 4000
-_CHUNK = 2**21  # indices drawn at once, 16 MB
-_LOW, _HIGH = 2.5, 97.5
+from innerattn.stats.estimate import Estimate
+from innerattn.stats.resampling import percentile_interval, resampled_means
 
 
-@dataclass(frozen=True)
-class Interval:
-    """A mean, or a ratio of means, and its 95 % interval."""
-
-    mean: float
-    low: float
-    high: float
-
-
-def student_interval(values: ArrayLike) -> Interval:
+def student_interval(values: ArrayLike) -> Estimate:
     """The mean over independent runs, by Student's t.
 
     ``mean ± t s / sqrt(n)``, with s the deviation of the sample and t the 97.5 % quantile of
@@ -44,11 +33,11 @@ def student_interval(values: ArrayLike) -> Interval:
     if n < 2:
         raise ValueError(f"{n} value: an interval over runs needs at least 2")
     mean = float(column.mean())
-    half = float(stdtrit(n - 1, _HIGH / 100.0) * column.std(ddof=1) / math.sqrt(n))
-    return Interval(mean, mean - half, mean + half)
+    half = float(stdtrit(n - 1, 0.975) * column.std(ddof=1) / math.sqrt(n))
+    return Estimate(mean, mean - half, mean + half)
 
 
-def mean_interval(values: ArrayLike, seed: int) -> Interval:
+def mean_interval(values: ArrayLike, seed: int) -> Estimate:
     """The mean over episodes, by a percentile bootstrap.
 
     Args:
@@ -65,7 +54,7 @@ def mean_interval(values: ArrayLike, seed: int) -> Interval:
 
 def score_interval(
     method: ArrayLike, random: ArrayLike, hungarian: ArrayLike, seed: int
-) -> Interval | None:
+) -> Estimate | None:
     """How far a method is from random play (0) to scripted dispatch (1).
 
     ``(mean(method) - mean(random)) / (mean(hungarian) - mean(random))``; the three are paired:
@@ -92,54 +81,6 @@ def score_interval(
     if h <= r or denominator.min() <= 0.0:
         return None
     return percentile_interval((m - r) / (h - r), numerator / denominator)
-
-
-def resampled_means(
-    columns: NDArray[np.float64], seed: int, resamples: int = _RESAMPLES
-) -> NDArray[np.float64]:
-    """Means of resampled rows; a row is drawn as a whole, so columns stay paired.
-
-    Args:
-        columns: (n, C) one row per episode.
-        seed: seed of the resampling.
-        resamples: how many.
-
-    Returns:
-        (resamples, C) float64.
-    """
-    n = len(columns)
-    rng = np.random.default_rng(seed)
-    means = np.empty((resamples, columns.shape[1]))
-    step = max(1, _CHUNK // n)
-    for start in range(0, resamples, step):
-        rows = rng.integers(0, n, (min(step, resamples - start), n))
-        for column, values in enumerate(columns.T):
-            means[start : start + step, column] = values[rows].mean(1)
-    return means
-
-
-def resampled_counts(n: int, seed: int, resamples: int = _RESAMPLES) -> NDArray[np.float64]:
-    """How often each of ``n`` episodes is drawn in each resample of a bootstrap.
-
-    The mean of a resample is ``counts @ values / n``. It is faster than `resampled_means` where
-    many figures are of the same episodes, and keeps them all paired.
-
-    Args:
-        n: number of episodes.
-        seed: seed of the resampling.
-        resamples: how many, S.
-
-    Returns:
-        (S, n) float64 whole numbers; every row sums to n.
-    """
-    drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1.0 / n), resamples)
-    return drawn.astype(np.float64)
-
-
-def percentile_interval(mean: float, resampled: NDArray[np.float64]) -> Interval:
-    """A mean, and the middle 95 % of what resampling (S,) made of it."""
-    low, high = np.percentile(resampled, (_LOW, _HIGH))
-    return Interval(float(mean), float(low), float(high))
 
 
 def _columns(*values: ArrayLike) -> NDArray[np.float64]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from innerattn.stats.estimate import Estimate
 from innerattn.stats.intervals import student_interval
 
 Array = NDArray[np.float64]
@@ -25,23 +26,6 @@ BAND_NAMES: dict[BandKind, str] = {
     "none": "no band",
 }
 """How a band is named in a legend."""
-
-
-@dataclass(frozen=True)
-class SeedEstimate:
-    """A mean over runs and Student's 95 % interval; the run is the unit.
-
-    Attributes:
-        mean: of the runs that have the figure.
-        low: low end; None of a single run.
-        high: high end.
-        runs: how many have the figure.
-    """
-
-    mean: float
-    low: float | None
-    high: float | None
-    runs: int
 
 
 @dataclass(frozen=True)
@@ -68,15 +52,15 @@ class SeedCurve:
         return {"band": self.kind, **shown, "runs": self.runs.tolist()}
 
 
-def seed_estimate(values: Sequence[float | None]) -> SeedEstimate | None:
+def seed_estimate(values: Sequence[float | None]) -> Estimate | None:
     """The mean over runs; None where no run has the figure."""
     found = [value for value in values if value is not None and math.isfinite(value)]
     if not found:
         return None
     if len(found) == 1:
-        return SeedEstimate(found[0], None, None, 1)
+        return Estimate(found[0], runs=1)
     interval = student_interval(found)
-    return SeedEstimate(interval.mean, interval.low, interval.high, len(found))
+    return replace(interval, runs=len(found))
 
 
 def seed_curve(values: Array) -> SeedCurve:

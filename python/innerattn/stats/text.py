@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from innerattn.stats.intervals import Interval
-from innerattn.stats.seeds import SeedEstimate
+from innerattn.stats.estimate import Estimate
 
 NONE = "–"
-"""What stands where there is no figure."""
+"""What stands where there is no value."""
 
 
-def shown(value: SeedEstimate | Interval | None, decimals: int = 2) -> str:
+def shown(value: Estimate | None, decimals: int = 2) -> str:
     """A mean with its interval, where it has one."""
     if value is None:
         return NONE
     mean = fixed(value.mean, decimals)
-    if value.low is None or value.high is None:
+    if not value.bounded:
         return mean
     return f"{mean} [{fixed(value.low, decimals)}, {fixed(value.high, decimals)}]"
 

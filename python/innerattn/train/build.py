@@ -6,17 +6,16 @@ import ctypes
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pkgutil import resolve_name
 
 import torch
 
 from innerattn.config import RunConfig
-from innerattn.config.run import on_policy
+from innerattn.config.registry import methods
 from innerattn.cores import usable_cores
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
-from innerattn.learn.ppo import PPO
-from innerattn.learn.td import TD
-from innerattn.learn.types import Learner, Team
+from innerattn.learn.types import Learner, LearnerClass, Team
 from innerattn.train.columns import entity_columns
 
 
@@ -31,33 +30,22 @@ def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
             "scenario.actions = 'continuous': learning needs 'discrete'; "
             "continuous worlds are for scripted policies"
         )
-    team = Team(env.num_robots, env.obs_width, env.num_actions)
-    device = _device(config.train.device)
     names = env.observation_names()
-    column = names.index("own.available")
-    entities = entity_columns(names) if config.network.encoder == "entities" else None
-    kinds = [robot.kind for robot in config.scenario.robots]
-    seed = config.train.seed
-    if on_policy(config.train.method):
-        return PPO(
-            team,
-            config.network,
-            config.ppo,
-            seed=seed,
-            device=device,
-            availability_column=column,
-            entities=entities,
-            kinds=kinds,
-        )
-    return TD(
+    team = Team(
+        env.num_robots,
+        env.obs_width,
+        env.num_actions,
+        kinds=tuple(robot.kind for robot in config.scenario.robots),
+        availability_column=names.index("own.available"),
+        entities=entity_columns(names) if config.network.encoder == "entities" else None,
+    )
+    learner: LearnerClass = resolve_name(methods()[config.train.method].algorithm.learner)
+    return learner(
         team,
         config.network,
-        config.td,
-        seed=seed,
-        device=device,
-        availability_column=column,
-        entities=entities,
-        kinds=kinds,
+        config.algorithm,
+        seed=config.train.seed,
+        device=_device(config.train.device),
     )
 
 
@@ -70,9 +58,7 @@ def thread_count(config: RunConfig) -> int:
     A second thread gains little on small batches, and torch's threads wait for each other: where
     another program takes one of the cores, two are many times slower than one.
     """
-    ppo = on_policy(config.train.method)
-    rows = config.ppo.minibatch_size if ppo else config.td.batch_size
-    worth = max(1, rows // _ROWS_PER_THREAD)
+    worth = max(1, config.algorithm.rows_per_update // _ROWS_PER_THREAD)
     return config.train.threads or min(worth, usable_cores())
 
 

@@ -8,7 +8,6 @@ import torch
 from torch import Tensor
 
 from innerattn.config import RunConfig
-from innerattn.config.run import on_policy
 
 _log = logging.getLogger(__name__)
 
@@ -25,21 +24,16 @@ def compiles(config: RunConfig) -> bool:
     choice = config.train.compile
     if choice == "off":
         return False
-    worth = config.train.device == "cpu" and _rows(config) >= _WORTH_ROWS
+    worth = (
+        config.train.device == "cpu"
+        and config.algorithm.rows_of_training(config.train.env_steps) >= _WORTH_ROWS
+    )
     if choice == "auto" and not worth:
         return False
     problem = _problem(config.train.device)
     if problem is not None:
         _log.warning("Updates run uncompiled, which is slower: no working compiler %s", problem)
     return problem is None
-
-
-def _rows(config: RunConfig) -> int:
-    """Transitions that all updates of the run go through, counted as often as they are used."""
-    steps = config.train.env_steps
-    if on_policy(config.train.method):
-        return steps * config.ppo.epochs
-    return steps // config.td.update_every_env_steps * config.td.batch_size
 
 
 def _problem(device: str) -> str | None:

@@ -179,7 +179,7 @@ class _Loop:
         """Collect and learn, with ``share`` of the budget spent."""
         transitions, truncated = self._collector.step()
         self._learner.observe(transitions, truncated)
-        self._learner.reach(share)
+        self._learner.set_progress(share)
         return transitions, self._learner.learn()
 
     def _log(self, newest: Transitions) -> None:

@@ -1,10 +1,11 @@
 //! `_core.Batch`: the batch of worlds as a Python class. Every array is checked here once.
 
+use std::sync::Arc;
+
 use innerattn_env::batch::{Autoreset, Batch as Worlds, Options};
-use innerattn_env::fault::{KINDS, NUM_KINDS};
-use innerattn_env::reward::COMPONENTS;
+use innerattn_env::fault::NUM_KINDS;
 use innerattn_env::robot::Commands;
-use innerattn_env::scenario::{Actions, Scenario};
+use innerattn_env::scenario::Actions;
 use innerattn_env::task::Rescue;
 use innerattn_env::world::World;
 use numpy::{
@@ -16,6 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::arrays::Arrays;
+use crate::rules::Rules;
 use crate::value_error;
 
 type Stepped = (
@@ -46,10 +48,10 @@ pub struct Batch {
 #[pymethods]
 impl Batch {
     #[new]
-    #[pyo3(signature = (scenario_json, num_envs, seed, num_threads, first_env, autoreset))]
+    #[pyo3(signature = (rules, num_envs, seed, num_threads, first_env, autoreset))]
     fn new(
         py: Python,
-        scenario_json: &str,
+        rules: &Rules,
         num_envs: usize,
         seed: u64,
         num_threads: Option<usize>,
@@ -58,9 +60,8 @@ impl Batch {
     ) -> PyResult<Self> {
         let autoreset = if autoreset { Autoreset::SameStep } else { Autoreset::Disabled };
         let options = Options { num_envs, seed, num_threads, first_env, autoreset };
-        let worlds = py
-            .detach(|| Worlds::new(Scenario::from_json(scenario_json)?, options))
-            .map_err(|error| value_error(&error))?;
+        let rules = Arc::clone(&rules.0);
+        let worlds = py.detach(|| Worlds::new(rules, options)).map_err(|error| value_error(&error))?;
         let (robots, width) = (worlds.rules().team.len(), worlds.rules().layout.width());
         let set = || Arrays::new(py, num_envs, robots, width);
         let rescue_dtype = rescue_dtype(py, worlds.rules().scenario.max_needs())?;
@@ -86,11 +87,6 @@ impl Batch {
 
     fn observation_names(&self) -> Vec<String> {
         self.worlds.rules().layout.names()
-    }
-
-    #[staticmethod]
-    fn reward_component_names() -> Vec<&'static str> {
-        COMPONENTS.to_vec()
     }
 
     #[pyo3(signature = (seed, mask))]
@@ -207,16 +203,10 @@ impl Batch {
         self.worlds.set_motion(&positions, &velocities).map_err(|error| value_error(&error))
     }
 
-    #[staticmethod]
-    fn fault_kinds() -> Vec<&'static str> {
-        KINDS.iter().map(|kind| kind.name()).collect()
-    }
-
     fn fault_state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let robots = self.worlds.rules().team.len();
-        let of = |world: &'_ World| {
-            (0..robots).flat_map(|robot| world.condition.levels(robot)).collect::<Vec<_>>()
-        };
+        let of =
+            |world: &'_ World| (0..robots).flat_map(|robot| world.faults.levels(robot)).collect::<Vec<_>>();
         let numbers = self.worlds.worlds().flat_map(of);
         shaped(py, numbers.collect(), [self.worlds.num_envs(), robots, NUM_KINDS])
     }

@@ -99,3 +99,11 @@ fn an_obstacle_has_the_measures_of_its_shape() {
     assert!(obstacle(Shape::Box, None, Some([0.0, 0.1]), None).is_err());
     assert!(obstacle(Shape::Disc, Some(0.1), None, Some([1.5, 0.0])).is_err());
 }
+
+#[test]
+fn what_could_stand_nowhere_is_refused() {
+    let narrow = refusal(|scenario| scenario.wall_clearance_m = 1.0);
+    assert!(narrow.starts_with("scenario.wall_clearance_m = 1: must be below"), "{narrow}");
+    let wide = refusal(|scenario| scenario.robots[3].radius_m = 0.5);
+    assert!(wide.starts_with("scenario.robots[3].radius_m = 0.5: must be below"), "{wide}");
+}

@@ -1,26 +1,24 @@
-//! The rules that a valid scenario obeys.
+//! The rules that a scenario's values obey, all of them, but for whether everything finds a place in the
+//! arena, which [`crate::rules::Rules::new`] tries out.
 
+use super::check::{broken, counts, named, within};
 use super::{
     Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_NEEDS, MAX_OBSTACLES, MAX_ROBOTS, MAX_VICTIMS,
     Robot, Scenario, Shape,
 };
-use crate::check::{broken, counts, named, within};
 use crate::error::Result;
-use crate::fault::Fault;
+use crate::fault::{Fault, Spec};
 use crate::matching::fillable;
 
 impl Scenario {
-    /// Checks every value and every rule between values, but for whether all fits into the arena, see
-    /// [`crate::place::Placing::new`].
-    ///
-    /// # Errors
-    /// [`Error::Scenario`] for the first rule that is broken.
-    pub fn validate(&self) -> Result<()> {
+    /// Checks every value and every rule between values.
+    pub(crate) fn validate(&self) -> Result<()> {
         self.validate_numbers()?;
         self.validate_robots()?;
         self.validate_tasks()?;
         self.validate_obstacles()?;
-        self.validate_faults()
+        self.validate_faults()?;
+        self.validate_sizes()
     }
 
     fn validate_numbers(&self) -> Result<()> {
@@ -101,11 +99,32 @@ impl Scenario {
 
     fn validate_faults(&self) -> Result<()> {
         counts("faults (their number)", self.faults.len(), 0, MAX_FAULTS)?;
-        let names: Vec<&str> = self.robots.iter().map(|robot| robot.name.as_str()).collect();
-        let checked = |(index, fault): (usize, &Fault)| {
-            fault.validate(&format!("faults[{index}]"), &names, self.episode_steps)
-        };
-        self.faults.iter().enumerate().try_for_each(checked)
+        for (index, fault) in self.faults.iter().enumerate() {
+            self.validate_fault(fault, |name: &str| format!("faults[{index}].{name}"))?;
+        }
+        Ok(())
+    }
+
+    fn validate_fault(&self, fault: &Fault, key: impl Fn(&str) -> String) -> Result<()> {
+        let robots: Vec<&str> = self.robots.iter().map(|robot| robot.name.as_str()).collect();
+        if !robots.contains(&fault.robot.as_str()) {
+            let rule = format!("no such robot; the team has {}", robots.join(", "));
+            return broken(&key("robot"), &format!("{:?}", fault.robot), &rule);
+        }
+        let Spec { name, range: (low, high), unit, .. } = fault.kind.spec();
+        within(&key(&format!("value ({name})")), fault.value, *low, *high, unit)?;
+        if fault.onset_step >= self.episode_steps {
+            let steps = self.episode_steps;
+            let rule = format!("must be before the end of the episode of {steps} control steps");
+            return broken(&key("onset_step"), &fault.onset_step, &rule);
+        }
+        if let Some(rate) = fault.onset_rate_hz {
+            within(&key("onset_rate_hz"), rate, 1e-6, 1000.0, "1/s")?;
+        }
+        match fault.duration_steps {
+            Some(steps) => counts(&key("duration_steps"), steps as usize, 1, 1_000_000),
+            None => Ok(()),
+        }
     }
 
     fn validate_obstacles(&self) -> Result<()> {
@@ -131,6 +150,21 @@ impl Scenario {
                 within(&key("position_m[0]"), x, -self.arena_half_width_m, self.arena_half_width_m, "m")?;
                 within(&key("position_m[1]"), y, -self.arena_half_width_m, self.arena_half_width_m, "m")?;
             }
+        }
+        Ok(())
+    }
+
+    /// Refuses sizes that leave no victim and no robot a place even in an empty arena.
+    fn validate_sizes(&self) -> Result<()> {
+        let half = self.arena_half_width_m;
+        if self.wall_clearance_m >= half {
+            let rule = format!("must be below arena_half_width_m = {half} m");
+            return broken("wall_clearance_m", &self.wall_clearance_m, &rule);
+        }
+        let wide = |robot: &Robot| robot.radius_m * 2.0 >= half;
+        if let Some(index) = self.robots.iter().position(wide) {
+            let rule = format!("must be below half of arena_half_width_m = {half} m");
+            return broken(&format!("robots[{index}].radius_m"), &self.robots[index].radius_m, &rule);
         }
         Ok(())
     }

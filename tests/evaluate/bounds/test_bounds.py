@@ -14,9 +14,9 @@ from plain_critic import D, W, generator, make_actor, make_critic, make_states
 from innerattn.errors import RunError
 from innerattn.evaluate.bounds import disturb, inequalities
 from innerattn.evaluate.bounds import measure as bounds
-from innerattn.evaluate.bounds.figures import Bounds
 from innerattn.evaluate.bounds.measure import bounds_of_run, measure_bounds, played_states
 from innerattn.evaluate.bounds.perturbation import random_directions, rms_norm
+from innerattn.evaluate.bounds.results import Bounds
 from innerattn.nn import Critic, JointCritic, UniformAttention
 from innerattn.train import load_policy
 

@@ -15,7 +15,7 @@ from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
 from innerattn.measures.faults.shift_results import FaultAttention
 from innerattn.records.record import Record
-from innerattn.stats.intervals import Interval
+from innerattn.stats import Estimate
 
 SOME = ("motor_gain", "blackout")
 
@@ -53,7 +53,7 @@ def test_a_run(tmp_path: Path) -> None:
         assert kind.effect.mean.mean == pytest.approx(np.mean(effects))
         assert len(kind.effect.heads) == len(kind.auc.heads) == 4
         for shift in kind.robots:
-            assert shift.effect_curve[:4] == (Interval(0.0, 0.0, 0.0),) * 4
+            assert shift.effect_curve[:4] == (Estimate(0.0, 0.0, 0.0),) * 4
     effects = [kind.effect.mean.mean for kind in found.kinds]
     assert found.effect.mean.mean == pytest.approx(np.mean(effects))
     areas = [kind.auc.mean.mean for kind in found.kinds]
@@ -105,15 +105,15 @@ def test_seeds_where_actions_are_drawn(tmp_path: Path) -> None:
     assert one == same
     assert one.kinds != other.kinds
     for shift in one.kinds[0].robots:
-        assert shift.effect_curve[:4] == (Interval(0.0, 0.0, 0.0),) * 4
+        assert shift.effect_curve[:4] == (Estimate(0.0, 0.0, 0.0),) * 4
         assert shift.effect.mean.mean != 0.0
 
 
 def test_even_attention_does_not_move(tmp_path: Path) -> None:
     found = small(make_run(tmp_path / "run", run_config("td-uniform")), kinds=SOME)
     assert found.attention == "uniform"
-    assert found.effect.mean == Interval(0.0, 0.0, 0.0)
-    assert found.auc.mean == Interval(0.5, 0.5, 0.5)
+    assert found.effect.mean == Estimate(0.0, 0.0, 0.0)
+    assert found.auc.mean == Estimate(0.5, 0.5, 0.5)
     assert {shift.p_value for kind in found.kinds for shift in kind.robots} == {1.0}
 
 
@@ -121,7 +121,7 @@ def test_a_masked_robot_gets_no_weight(tmp_path: Path) -> None:
     config = run_config("td-uniform", **{"network.mask_unavailable": True})
     found = small(make_run(tmp_path / "run", config), kinds=("unavailable",))
     for shift in found.kinds[0].robots:
-        assert shift.after.mean == Interval(0.0, 0.0, 0.0)
+        assert shift.after.mean == Estimate(0.0, 0.0, 0.0)
         assert shift.effect.mean.mean == pytest.approx(-1 / 3)
         assert shift.auc.mean == 0.0
 

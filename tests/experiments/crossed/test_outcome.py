@@ -7,11 +7,11 @@ import pytest
 
 from innerattn.errors import RunError
 from innerattn.experiments.crossed.outcome import outcome_of
-from innerattn.experiments.run import StudyRun, read_measured
+from innerattn.experiments.run import FinishedRun
 
 
-def test_outcome_against_a_plain_loop(runs: list[StudyRun]) -> None:
-    measured = read_measured(runs[0])
+def test_outcome_against_a_plain_loop(runs: list[FinishedRun]) -> None:
+    measured = runs[0]
     found = outcome_of(measured)
     scenario = measured.recorded.scenario
     by_index = dict(enumerate(task.name for task in scenario.tasks))
@@ -32,11 +32,11 @@ def test_outcome_against_a_plain_loop(runs: list[StudyRun]) -> None:
     assert found.entropy_share == pytest.approx(shares.mean())
 
 
-def test_a_task_that_two_robots_do_not_share_is_refused(runs: list[StudyRun]) -> None:
-    measured = read_measured(runs[0])
+def test_a_task_that_two_robots_do_not_share_is_refused(runs: list[FinishedRun]) -> None:
+    measured = runs[0]
     robots = measured.recorded.scenario.robots
     third = robots[0].model_copy(update={"name": "food_2"})
     changed = measured.recorded.scenario.replace(robots=[*robots, third])
     scored = tuple(replace(record, scenario=changed) for record in measured.scored)
     with pytest.raises(RunError, match="is shared by 3 robots; must be two"):
-        outcome_of(replace(measured, scored=scored))
+        outcome_of(replace(measured, read=lambda: scored))

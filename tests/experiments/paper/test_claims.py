@@ -16,9 +16,10 @@ from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence, evidence
 from innerattn.experiments.paper.sharing_claims import judged, sharing_claims
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
-from innerattn.experiments.run import StudyRun, read_measured
+from innerattn.experiments.run import FinishedRun
 from innerattn.measures.sharing.evenness import evenness, evenness_of_runs
-from innerattn.stats.seeds import SeedEstimate, seed_estimate
+from innerattn.stats import Estimate
+from innerattn.stats.seeds import seed_estimate
 
 EVEN, UNEVEN = (0.5, 0.51, 0.49), (0.8, 0.82, 0.79)
 
@@ -37,7 +38,7 @@ def made_row(method: str, task: str, shares: tuple[float, ...]) -> Row:
 
 def made_competence(method: str, imbalance: list[float]) -> Competence:
     each = tuple(dict.fromkeys(COMPETENCE, 0.5) | {"imbalance": value} for value in imbalance)
-    nothing: dict[str, SeedEstimate | None] = dict.fromkeys(COMPETENCE)
+    nothing: dict[str, Estimate | None] = dict.fromkeys(COMPETENCE)
     seeds = tuple(range(len(each)))
     return Competence("mixed", method, seeds, ({},) * len(each), each, nothing)
 
@@ -116,8 +117,8 @@ def test_claims_about_entropy(
 
 
 @pytest.fixture(scope="module")
-def found(runs: list[StudyRun]) -> Evidence:
-    found = evidence([read_measured(runs[0])])
+def found(runs: list[FinishedRun]) -> Evidence:
+    found = evidence([runs[0]])
     assert found is not None
     return found
 
@@ -125,15 +126,15 @@ def found(runs: list[StudyRun]) -> Evidence:
 @pytest.mark.parametrize(
     ("change", "moves"),
     [
-        (SeedEstimate(0.2, 0.1, 0.3, 3), "yes"),
-        (SeedEstimate(0.03, 0.01, 0.045, 3), "no"),
-        (SeedEstimate(-0.03, -0.1, 0.04, 3), "no"),
-        (SeedEstimate(0.1, -0.1, 0.3, 3), "undecided"),
-        (SeedEstimate(0.2, None, None, 1), "undecided"),
+        (Estimate(0.2, 0.1, 0.3, 3), "yes"),
+        (Estimate(0.03, 0.01, 0.045, 3), "no"),
+        (Estimate(-0.03, -0.1, 0.04, 3), "no"),
+        (Estimate(0.1, -0.1, 0.3, 3), "undecided"),
+        (Estimate(0.2, runs=1), "undecided"),
         (None, "undecided"),
     ],
 )
-def test_whether_attention_moves(change: SeedEstimate | None, moves: Holds) -> None:
+def test_whether_attention_moves(change: Estimate | None, moves: Holds) -> None:
     assert handoff_moves(change) == moves
 
 

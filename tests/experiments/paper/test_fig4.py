@@ -11,24 +11,24 @@ import pytest
 
 from innerattn.errors import RunError
 from innerattn.experiments.paper.fig4 import PRINTED_NATS, EntropyCourse, fig4, fig4_json
-from innerattn.experiments.run import StudyRun
+from innerattn.experiments.run import FinishedRun
 from innerattn.report.paper.fig4 import fig4_csv, fig4_lines
 from innerattn.report.plots.entropy import draw_entropy
 from innerattn.stats.intervals import student_interval
 
 
 @pytest.fixture(scope="module")
-def courses(runs: list[StudyRun]) -> list[EntropyCourse]:
+def courses(runs: list[FinishedRun]) -> list[EntropyCourse]:
     return fig4(runs)
 
 
-def logged(run: StudyRun) -> list[dict[str, dict[str, list[float]]]]:
+def logged(run: FinishedRun) -> list[dict[str, dict[str, list[float]]]]:
     lines = (run.folder / "metrics.jsonl").read_text().splitlines()
     return [json.loads(line) for line in lines]
 
 
 def test_means_and_bands_against_plain_loops(
-    runs: list[StudyRun], courses: list[EntropyCourse]
+    runs: list[FinishedRun], courses: list[EntropyCourse]
 ) -> None:
     course, tables = courses[0], [logged(run) for run in runs[:3]]
     mean, by_robot, by_head = course.mean(), course.by_robot(), course.by_head()
@@ -96,7 +96,7 @@ def test_csv_and_json_hold_the_same_numbers(courses: list[EntropyCourse]) -> Non
     assert {(line["low"], line["band"]) for line in single} == {("", "none")}
 
 
-def test_runs_logged_at_other_times_are_refused(runs: list[StudyRun]) -> None:
+def test_runs_logged_at_other_times_are_refused(runs: list[FinishedRun]) -> None:
     folder = runs[0].folder.with_name("other-times")
     folder.mkdir()
     text = (runs[0].folder / "metrics.jsonl").read_text().replace('00, "att', '50, "att')

@@ -15,7 +15,7 @@ from innerattn.experiments.paper.fig5 import (
     with_bystander,
 )
 from innerattn.experiments.paper.scene import choose_scene, scene_json
-from innerattn.experiments.run import Measured, StudyRun, read_measured
+from innerattn.experiments.run import FinishedRun
 from innerattn.measures.sharing.handoff import handoffs
 from innerattn.measures.sharing.handoff_attention import handoff_attention
 from innerattn.report.paper.fig5 import evidence_lines
@@ -24,18 +24,18 @@ from innerattn.report.plots.handoff import draw_handoff
 
 
 @pytest.fixture(scope="module")
-def inner(runs: list[StudyRun]) -> list[Measured]:
-    return [read_measured(runs[index]) for index in (1, 2, 0)]
+def inner(runs: list[FinishedRun]) -> list[FinishedRun]:
+    return [runs[index] for index in (1, 2, 0)]
 
 
 @pytest.fixture(scope="module")
-def found(inner: list[Measured]) -> Evidence:
+def found(inner: list[FinishedRun]) -> Evidence:
     found = evidence(inner)
     assert found is not None
     return found
 
 
-def changes(measured: Measured, role: str, *, bystander: bool) -> list[float]:
+def changes(measured: FinishedRun, role: str, *, bystander: bool) -> list[float]:
     """Mean weight after the first rescue minus that up to it, of each handoff."""
     weights, values = measured.recorded.steps["attention"], []
     for row in all_handoffs(measured.recorded):
@@ -49,7 +49,7 @@ def changes(measured: Measured, role: str, *, bystander: bool) -> list[float]:
 
 
 def test_changes_of_robot_and_control_against_plain_loops(
-    inner: list[Measured], found: Evidence
+    inner: list[FinishedRun], found: Evidence
 ) -> None:
     for parts, bystander in ((found.robot, False), (found.control, True)):
         for role, name in (("to_be", "after"), ("before", "before")):
@@ -75,9 +75,9 @@ def test_changes_of_robot_and_control_against_plain_loops(
     assert found.p_by_run != found.control_p_by_run
 
 
-def test_a_run_without_handoffs_does_not_count(inner: list[Measured]) -> None:
+def test_a_run_without_handoffs_does_not_count(inner: list[FinishedRun]) -> None:
     record = inner[2].recorded
-    without = replace(inner[2], recorded=replace(record, rescues=record.rescues[:0]))
+    without = replace(inner[2], read=lambda: [replace(record, rescues=record.rescues[:0])])
     found, of_two = evidence([*inner[:2], without]), evidence(inner[:2])
     assert found is not None
     assert of_two is not None
@@ -92,7 +92,7 @@ def test_a_run_without_handoffs_does_not_count(inner: list[Measured]) -> None:
     assert {claim.runs for claim in handoff_claims([found])} == {2}
 
 
-def test_the_control_takes_no_part(inner: list[Measured]) -> None:
+def test_the_control_takes_no_part(inner: list[FinishedRun]) -> None:
     record = inner[0].recorded
     own = all_handoffs(record)
     control = with_bystander(record, own)
@@ -102,11 +102,11 @@ def test_the_control_takes_no_part(inner: list[Measured]) -> None:
         assert (control[name] == own[name]).all()
 
 
-def test_even_attention_gives_no_evidence(runs: list[StudyRun]) -> None:
-    assert evidence([read_measured(run) for run in runs[3:5]]) is None
+def test_even_attention_gives_no_evidence(runs: list[FinishedRun]) -> None:
+    assert evidence(runs[3:5]) is None
 
 
-def test_the_scene_follows_its_rule(inner: list[Measured]) -> None:
+def test_the_scene_follows_its_rule(inner: list[FinishedRun]) -> None:
     scene, record = choose_scene(inner), inner[0].recorded
     assert scene is not None
     best = max(
@@ -121,7 +121,7 @@ def test_the_scene_follows_its_rule(inner: list[Measured]) -> None:
     assert len(document["steps"]) == len(document["weights_by_step_head_robot"])
 
 
-def test_the_scene_is_drawn_as_panels_a_b_and_c(inner: list[Measured]) -> None:
+def test_the_scene_is_drawn_as_panels_a_b_and_c(inner: list[FinishedRun]) -> None:
     scene = choose_scene(inner)
     assert scene is not None
     figure = draw_handoff(scene)

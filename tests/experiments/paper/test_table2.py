@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,9 +11,9 @@ import numpy as np
 import pytest
 
 from innerattn.errors import RunError
-from innerattn.experiments.archive import keep
+from innerattn.experiments.archive import read_archive, write_archive
 from innerattn.experiments.paper.table2 import Table2, table2
-from innerattn.experiments.run import Measured, StudyRun, by_method, read_configs, read_measured
+from innerattn.experiments.run import FinishedRun, by_method, read_run, refuse_unlike
 from innerattn.measures.dispatch_quality import dispatch_quality
 from innerattn.measures.waiting import waiting
 from innerattn.records.parquet import read_records
@@ -22,20 +23,20 @@ from innerattn.stats.text import fixed
 
 
 @pytest.fixture(scope="module")
-def groups(runs: list[StudyRun]) -> list[list[Measured]]:
-    return [[read_measured(run) for run in group] for group in by_method(runs).values()]
+def groups(runs: list[FinishedRun]) -> list[list[FinishedRun]]:
+    return list(by_method(runs).values())
 
 
 @pytest.fixture(scope="module")
-def table(groups: list[list[Measured]]) -> Table2:
+def table(groups: list[list[FinishedRun]]) -> Table2:
     return table2(groups)
 
 
-def counted(measured: Measured, task: int, episodes: int) -> tuple[int, int]:
+def counted(measured: FinishedRun, task: int, episodes: int) -> tuple[int, int]:
     """Rescues of a task by food_0 and food_1 in the first episodes, by plain loops."""
-    records = read_records(measured.run.folder / "evaluation")
+    records = read_records(measured.folder / "evaluation")
     first, second = 0, 0
-    for record in [r for r in records if r.policy == measured.run.method][:2]:
+    for record in [r for r in records if r.policy == measured.method][:2]:
         for event in record.rescues:
             if event["episode"] < episodes and event["task"] == task:
                 helpers = {int(event["helper_0"]), int(event["helper_1"])}
@@ -44,7 +45,7 @@ def counted(measured: Measured, task: int, episodes: int) -> tuple[int, int]:
     return first, second
 
 
-def test_rows_against_hand_counts(groups: list[list[Measured]], table: Table2) -> None:
+def test_rows_against_hand_counts(groups: list[list[FinishedRun]], table: Table2) -> None:
     assert [(row.situation, row.method, row.task, row.seeds) for row in table.rows] == [
         ("mixed", "td-inner", "task_1", (0, 1, 2)),
         ("mixed", "td-inner", "task_2", (0, 1, 2)),
@@ -75,7 +76,9 @@ def test_printed_rows_stand_beside_mixed_runs_only(table: Table2) -> None:
     assert printed == [0.36, 1.44, 81.9, 81.9, None, None]
 
 
-def test_competence_is_that_of_the_same_runs(groups: list[list[Measured]], table: Table2) -> None:
+def test_competence_is_that_of_the_same_runs(
+    groups: list[list[FinishedRun]], table: Table2
+) -> None:
     part, measured = table.competence[0], groups[0][1]
     figures, counts = part.each[1], part.counts[1]
     quality, waited = dispatch_quality(measured.recorded), waiting(measured.recorded)
@@ -91,17 +94,17 @@ def test_competence_is_that_of_the_same_runs(groups: list[list[Measured]], table
     assert mean is not None
     scores = [run["score"] for run in part.each]
     assert mean.mean == pytest.approx(np.mean([score for score in scores if score is not None]))
-    assert table.competence[2].mean["sooner"].low is None  # type: ignore[union-attr]
+    assert not table.competence[2].mean["sooner"].bounded  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("name", ["random", "greedy", "hungarian"])
-def test_scripted_policies_are_played_in_the_worlds_of_the_runs(
-    name: str, groups: list[list[Measured]], table: Table2
+def test_scripted_policies_stand_beside_the_runs_as_their_evaluations_found(
+    name: str, groups: list[list[FinishedRun]], table: Table2
 ) -> None:
     (part,) = [c for c in table.competence if (c.situation, c.method) == ("mixed", name)]
     assert part.seeds == (0, 1, 2)
     for measured, figures, counts in zip(groups[0], part.each, part.counts, strict=True):
-        of_all = read_records(measured.run.folder / "evaluation")
+        of_all = read_records(measured.folder / "evaluation")
         recorded = next(record for record in of_all if record.policy == name)
         assert figures["rescues_per_episode"] == pytest.approx(len(recorded.rescues) / 60)
         helped = [0 in (event["helper_0"], event["helper_1"]) for event in recorded.rescues]
@@ -121,23 +124,28 @@ def test_scripted_policies_are_played_in_the_worlds_of_the_runs(
     assert text.count(f"| {name} | 0 |") == 1  # of the single run in single
 
 
-def test_small_copies_of_runs_are_enough_for_sharing_and_scores(
-    runs: list[StudyRun], table: Table2, tmp_path: Path
+def test_archived_runs_are_enough_for_sharing_and_scores(
+    runs: list[FinishedRun], table: Table2, tmp_path: Path
 ) -> None:
-    small = []
-    for run in runs[:3]:
-        keep(run, tmp_path / run.folder.name)
-        small.append(replace(run, folder=tmp_path / run.folder.name))
-    ordered = [
-        read_measured(run, step_by_step=False) for run in by_method(small)["mixed", "td-inner"]
-    ]
-    of_copies = table2([ordered])
+    write_archive(runs[:3], tmp_path / "archive.parquet")
+    archived = read_archive(tmp_path / "archive.parquet")
+    of_copies = table2(list(by_method(archived).values()))
     assert [row.to_json() for row in of_copies.rows] == [row.to_json() for row in table.rows[:2]]
     for whole, copy in zip(table.competence[0].each, of_copies.competence[0].each, strict=True):
-        for name in ("rescues_per_episode", "score", "imbalance"):
-            assert copy[name] == whole[name]
-        assert copy["sooner"] is copy["regret_s"] is copy["time_to_rescue_s"] is None
-    assert of_copies.competence[1:] == table.competence[3:6]  # scripted policies are played again
+        assert copy == whole
+    assert of_copies.competence[1:] == table.competence[3:6]  # scripted policies
+
+
+def test_evaluations_without_measures_leave_them_out(groups: list[list[FinishedRun]]) -> None:
+    older = []
+    for run in groups[0]:
+        summary = {name: value for name, value in run.summary.items() if name != "measures"}
+        records = [replace(record, steps={}) for record in run.scored]
+        older.append(replace(run, summary=summary, read=lambda records=records: records))
+    (part,) = table2([older]).competence
+    for run, values in zip(older, part.each, strict=True):
+        assert values["rescues_per_episode"] == run.summary["rescues_per_episode"]["mean"]
+        assert values["sooner"] is values["regret_s"] is values["time_to_rescue_s"] is None
 
 
 def test_text_and_csv_hold_every_seed_and_real_counts(table: Table2) -> None:
@@ -166,30 +174,24 @@ def test_cells_of_text() -> None:
     assert [fixed(-0.004), fixed(-0.006), fixed(0.125, 1)] == ["0.00", "-0.01", "0.1"]
 
 
-def test_runs_that_are_not_one_study_are_refused(runs: list[StudyRun]) -> None:
+def test_runs_that_are_not_one_study_are_refused(runs: list[FinishedRun]) -> None:
     with pytest.raises(RunError, match="at least one run"):
         by_method([])
     with pytest.raises(RunError, match="both are mixed, td-inner, seed 0"):
         by_method([*runs, runs[1]])
-    assert [config.train.seed for config in read_configs(runs[:3])] == [2, 0, 1]
+    refuse_unlike(runs)
     with pytest.raises(RunError, match=r"train\.seed = 2, but it is listed as 5"):
-        read_configs([replace(runs[0], seed=5)])
-    other = changed(runs[5])
+        refuse_unlike([replace(runs[0], case=replace(runs[0].case, seed=5))])
+    ppo = runs[5].config.ppo.model_copy(update={"clip": 0.3})
+    other = replace(runs[5], config=runs[5].config.model_copy(update={"ppo": ppo}))
     with pytest.raises(RunError, match="listed as the same but for the seed, and differ in ppo"):
-        read_configs([runs[5], other])
+        refuse_unlike([runs[5], other])
 
 
-def changed(run: StudyRun) -> StudyRun:
-    """The same run, trained with another clip."""
-    folder = run.folder.with_name("changed")
-    folder.mkdir()
-    text = (run.folder / "config.toml").read_text()
-    (folder / "config.toml").write_text(text.replace("\nclip = 0.2", "\nclip = 0.3"))
-    return replace(run, folder=folder)
-
-
-def test_a_run_without_an_evaluation_is_refused(runs: list[StudyRun]) -> None:
-    with pytest.raises(RunError, match=r"summary.json: no finished evaluation"):
-        read_measured(replace(runs[0], folder=runs[0].folder / "checkpoints"))
+def test_a_run_without_an_evaluation_is_refused(runs: list[FinishedRun], tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(runs[0].folder, tmp_path / "run"))
     with pytest.raises(RunError, match="holds no episodes of ppo-inner"):
-        read_measured(replace(runs[0], method="ppo-inner"))
+        _ = replace(runs[0], case=replace(runs[0].case, method="ppo-inner")).scored
+    (folder / "evaluation" / "summary.json").unlink()
+    with pytest.raises(RunError, match=r"summary\.json: missing"):
+        read_run(runs[0].case, folder)

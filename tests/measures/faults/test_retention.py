@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from innerattn.measures.faults.retention import Estimate, area, retention
-from innerattn.stats.intervals import resampled_counts
+from innerattn.measures.faults.retention import area, retention
+from innerattn.stats.resampling import Resampled, resampled_counts
 
 
 def test_ratios_by_hand() -> None:
@@ -35,7 +35,7 @@ def test_intervals_cover_what_they_should() -> None:
     for seed in range(300):
         clean = rng.poisson(5.0, 60)
         faulty = rng.binomial(clean, 0.7)
-        interval = retention(faulty, clean, resampled_counts(60, seed, 500))[()].interval()
+        interval = retention(faulty, clean, resampled_counts(60, seed, 500))[()].estimate()
         misses += not interval.low <= 0.7 <= interval.high
     assert 0.02 < misses / 300 < 0.10
 
@@ -47,7 +47,7 @@ def test_nobody_rescued_is_no_number() -> None:
 
 
 def test_the_area_by_hand() -> None:
-    kept = Estimate(np.array([[0.8, 0.2], [1.0, 1.0]]), np.ones((2, 2, 5)))
+    kept = Resampled(np.array([[0.8, 0.2], [1.0, 1.0]]), np.ones((2, 2, 5)))
     under = area(kept, np.array([0.5, 1.0]), axis=1)
     np.testing.assert_allclose(under.value, [0.5 * 0.9 + 0.5 * 0.5, 1.0])
     np.testing.assert_allclose(under.resampled, 1.0)
@@ -60,13 +60,13 @@ def test_differences_are_paired() -> None:
     faulty = rng.binomial(clean, 0.6)
     weights = resampled_counts(50, 0)
     one = retention(faulty, clean, weights)
-    nothing = (one - retention(faulty, clean, weights)).interval()
+    nothing = (one - retention(faulty, clean, weights)).estimate()
     assert (nothing.mean, nothing.low, nothing.high) == (0.0, 0.0, 0.0)
-    assert one.interval().low < one.interval().high
+    assert one.estimate().low < one.estimate().high
 
 
 def test_parts_and_means_keep_the_resamples() -> None:
-    kept = Estimate(np.arange(6.0).reshape(2, 3), np.arange(24.0).reshape(2, 3, 4))
+    kept = Resampled(np.arange(6.0).reshape(2, 3), np.arange(24.0).reshape(2, 3, 4))
     assert kept[1, 2].value == 5.0
     np.testing.assert_array_equal(kept[1, 2].resampled, [20, 21, 22, 23])
     assert kept.mean(0).value == pytest.approx([1.5, 2.5, 3.5])

@@ -13,7 +13,8 @@ from innerattn.measures.faults.shift import (
     shift_of,
 )
 from innerattn.measures.faults.shift_results import CURVE_STEPS, ByHead, Shift
-from innerattn.stats.intervals import Interval, resampled_counts
+from innerattn.stats import Estimate
+from innerattn.stats.resampling import resampled_counts
 
 
 def made_up(
@@ -82,7 +83,7 @@ def test_against_plain_loops(steps: int, onset: int) -> None:
     found = measured(twins)
     for heads, pick in (([0, 1], -1), ([0], 0), ([1], 1)):
 
-        def of(figure: ByHead, pick: int = pick) -> Interval:
+        def of(figure: ByHead, pick: int = pick) -> Estimate:
             return figure.mean if pick < 0 else figure.heads[pick]
 
         before = plain_means(twins, True, onset - width, onset, heads)
@@ -190,11 +191,11 @@ def test_even_weights_do_not_move_at_all() -> None:
     found = measured(PairedRollouts(0, 5, even, even, np.ones((7, 10), bool)))
     third = float(np.float32(1 / 3))
     for interval in (found.before.mean, found.after.mean, *found.curve):
-        assert interval == Interval(third, third, third)
+        assert interval == Estimate(third, third, third)
     for interval in (found.change.mean, found.effect.mean, *found.effect.heads, found.shuffled):
-        assert interval == Interval(0.0, 0.0, 0.0)
+        assert interval == Estimate(0.0, 0.0, 0.0)
     assert found.p_value == 1.0
-    assert found.auc == Interval(0.5, 0.5, 0.5)
+    assert found.auc == Estimate(0.5, 0.5, 0.5)
 
 
 def test_robots_and_kinds_together() -> None:

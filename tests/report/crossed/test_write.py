@@ -8,8 +8,7 @@ from markdown_rows import rows_of
 
 from innerattn.experiments.crossed.arms import arm_of
 from innerattn.experiments.crossed.outcome import outcome_of
-from innerattn.experiments.run import StudyRun, read_measured
-from innerattn.experiments.scan import FinishedRun
+from innerattn.experiments.run import FinishedRun
 from innerattn.report.crossed.write import FILES, write_crossed
 from innerattn.stats.text import shown
 from innerattn.train.weights import digest_of
@@ -48,8 +47,8 @@ def test_every_run_has_a_line(crossed_study: Crossed) -> None:
         assert row["folder"] == of_json["folder"]
         case = by_folder[row["folder"]]
         arm = arm_of(case)
-        own = StudyRun(case.situation, case.method, case.seed, out / of_json["folder"])
-        expected = outcome_of(read_measured(own))
+        (own,) = [run for run in runs if run.folder == out / of_json["folder"]]
+        expected = outcome_of(own)
         penalty = "" if arm.penalty is None else str(arm.penalty)
         assert (row["method"], row["credit"], row["penalty"]) == (arm.method, arm.credit, penalty)
         assert (row["seed"], row["shared"]) == (str(case.seed), str(arm.shared))

@@ -10,7 +10,7 @@ import pytest
 
 from innerattn.config import read_toml
 from innerattn.errors import RunError
-from innerattn.experiments.run import StudyRun, read_configs
+from innerattn.experiments.run import FinishedRun, read_run, refuse_unlike
 from innerattn.experiments.smoke import smoke_note
 from innerattn.report.paper.write import write_report
 from innerattn.train.weights import digest_of
@@ -23,14 +23,14 @@ FILES = {
 
 
 @pytest.fixture(scope="module")
-def folder(runs: list[StudyRun], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(runs: list[FinishedRun], tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("study") / "report"
     write_report(runs, path, "quick")
     return path
 
 
 def test_all_files_are_written_and_the_same_twice(
-    runs: list[StudyRun], folder: Path, tmp_path: Path
+    runs: list[FinishedRun], folder: Path, tmp_path: Path
 ) -> None:
     assert {path.name for path in folder.iterdir()} == FILES
     write_report(runs, tmp_path, "quick")
@@ -44,7 +44,7 @@ def test_all_files_are_written_and_the_same_twice(
 
 
 def test_the_report_opens_with_claims_and_ends_with_the_runs(
-    runs: list[StudyRun], folder: Path
+    runs: list[FinishedRun], folder: Path
 ) -> None:
     text = (folder / "report.md").read_text()
     assert text.index("| claim |") < text.index("## Table II") < text.index("## Fig. 4")
@@ -61,7 +61,7 @@ def test_the_report_opens_with_claims_and_ends_with_the_runs(
 
 
 def test_every_file_of_a_smoke_run_says_so(
-    runs: list[StudyRun], folder: Path, tmp_path: Path
+    runs: list[FinishedRun], folder: Path, tmp_path: Path
 ) -> None:
     write_report(runs, tmp_path, "short")
     note = smoke_note("quick") or ""
@@ -81,7 +81,9 @@ def _rows(path: Path) -> list[list[str]]:
     return list(csv.reader(path.read_text().splitlines()))
 
 
-def test_runs_within_the_study_are_named_from_there(runs: list[StudyRun], tmp_path: Path) -> None:
+def test_runs_within_the_study_are_named_from_there(
+    runs: list[FinishedRun], tmp_path: Path
+) -> None:
     run = runs[0]
     inside = tmp_path / "runs" / "one"
     shutil.copytree(run.folder, inside)
@@ -92,7 +94,7 @@ def test_runs_within_the_study_are_named_from_there(runs: list[StudyRun], tmp_pa
     assert str(tmp_path) not in text
 
 
-def test_parts_can_be_asked_for_alone(runs: list[StudyRun], tmp_path: Path) -> None:
+def test_parts_can_be_asked_for_alone(runs: list[FinishedRun], tmp_path: Path) -> None:
     findings = write_report(runs[3:5], tmp_path, "short", ("table2", "fig4"))
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {
@@ -114,7 +116,7 @@ def test_parts_can_be_asked_for_alone(runs: list[StudyRun], tmp_path: Path) -> N
 
 
 def test_a_figure_that_is_not_drawn_leaves_none_of_other_runs(
-    runs: list[StudyRun], folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    runs: list[FinishedRun], folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("innerattn.report.paper.write.choose_scene", lambda _: None)
     shutil.copytree(folder, tmp_path / "study")
@@ -124,23 +126,20 @@ def test_a_figure_that_is_not_drawn_leaves_none_of_other_runs(
 
 
 def test_it_is_said_where_all_seeds_were_measured_in_the_same_worlds(
-    runs: list[StudyRun], folder: Path, tmp_path: Path
+    runs: list[FinishedRun], folder: Path, tmp_path: Path
 ) -> None:
     said = "**Runs of different seeds were measured in the same worlds.**"
-    assert said in (folder / "report.md").read_text()
-    moved = []
-    for run in runs[:2]:  # of different seeds
-        own = tmp_path / run.folder.name
-        shutil.copytree(run.folder, own)
-        text = (own / "config.toml").read_text()
-        assert text.count("seed = 12345") == 1
-        (own / "config.toml").write_text(text.replace("seed = 12345", f"seed = {run.seed}"))
-        moved.append(replace(run, folder=own))
+    assert said not in (folder / "report.md").read_text()
+    evaluate = runs[0].config.evaluate.model_copy(update={"seed": 7})
+    moved = [
+        replace(run, config=run.config.model_copy(update={"evaluate": evaluate}))
+        for run in runs[:2]  # of different seeds
+    ]
     write_report(moved, tmp_path / "report", "short", ("table2",))
-    assert said not in (tmp_path / "report" / "report.md").read_text()
+    assert said in (tmp_path / "report" / "report.md").read_text()
     (other,) = [run for run in runs if (run.method, run.seed) == ("td-uniform", moved[1].seed)]
     with pytest.raises(RunError, match=r"of one seed, and evaluate\.seed is .*: must be the same"):
-        read_configs([moved[1], other])
+        refuse_unlike([moved[1], other])
 
 
 def test_both_attentions_are_compared_where_both_are_there(folder: Path) -> None:
@@ -153,7 +152,7 @@ def test_both_attentions_are_compared_where_both_are_there(folder: Path) -> None
 
 
 def test_runs_with_and_without_a_warm_start_are_not_one_method(
-    runs: list[StudyRun], tmp_path: Path
+    runs: list[FinishedRun], tmp_path: Path
 ) -> None:
     warm = tmp_path / "warm"
     shutil.copytree(runs[0].folder, warm)
@@ -161,15 +160,13 @@ def test_runs_with_and_without_a_warm_start_are_not_one_method(
     text = config.read_text()
     assert 'warm_start = "none"' in text
     config.write_text(text.replace('warm_start = "none"', 'warm_start = "greedy"'))
-    for pair in (
-        [replace(runs[0], folder=warm), runs[1]],
-        [runs[1], replace(runs[0], folder=warm)],
-    ):
+    started = read_run(runs[0].case, warm)
+    for pair in ([started, runs[1]], [runs[1], started]):
         with pytest.raises(RunError, match=r"listed as the same but for the seed.*train"):
-            read_configs(pair)
+            refuse_unlike(pair)
 
 
-def test_nothing_is_written_where_a_run_is_missing(runs: list[StudyRun], tmp_path: Path) -> None:
+def test_nothing_is_written_where_a_run_is_missing(runs: list[FinishedRun], tmp_path: Path) -> None:
     with pytest.raises(RunError, match="seed 0; must be one run of each seed"):
         write_report([runs[1], runs[1]], tmp_path / "none", "short")
     assert not (tmp_path / "none").exists()

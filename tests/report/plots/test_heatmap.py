@@ -8,17 +8,17 @@ import pytest
 from innerattn.config import Scenario
 from innerattn.errors import RunError
 from innerattn.evaluate.faults.grid import Grid, Retention
-from innerattn.measures.faults.retention import Estimate
 from innerattn.report.plots.drawing import check_format
 from innerattn.report.plots.heatmap import draw_heatmap, write_heatmap
+from innerattn.stats.resampling import Resampled
 
 GRID = Grid(Scenario(), kinds=("motor_gain", "blackout"), severities=(0.5, 1.0))
 
 
 def some_kept() -> Retention:
     value = np.linspace(0, 1.1, 32).reshape(2, 2, 4, 2)
-    cells = Estimate(value, value[..., None])
-    nothing = Estimate(np.zeros(()), np.zeros(1))
+    cells = Resampled(value, value[..., None])
+    nothing = Resampled(np.zeros(()), np.zeros(1))
     return Retention(nothing, cells, nothing, nothing, nothing)
 
 

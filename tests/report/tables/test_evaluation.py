@@ -6,28 +6,28 @@ from dataclasses import replace
 from rich.console import Console
 
 from innerattn.config import Scenario
-from innerattn.evaluate import Figures, Interval, Summary
+from innerattn.evaluate import Estimate, Performance, Summary
 from innerattn.experiments.score_means import seed_scores
 from innerattn.report.tables.evaluation import print_seeds, print_summary
 
-SCORE = Interval(0.5, 0.4, 0.61)
+SCORE = Estimate(0.5, 0.4, 0.61)
 
 
-def figures(steps: int, *, score: Interval | None = SCORE) -> Figures:
+def figures(steps: int, *, score: Estimate | None = SCORE) -> Performance:
     means = {"random": 1.0, "greedy": 2.5, "hungarian": 5.0}
-    return Figures(
+    return Performance(
         episodes=1000,
         episode_steps=steps,
-        rescues_per_episode=Interval(3.0, 2.9, 3.12),
+        rescues_per_episode=Estimate(3.0, 2.9, 3.12),
         score=score,
-        scripted={name: Interval(mean, mean - 0.1, mean + 0.1) for name, mean in means.items()},
+        scripted={name: Estimate(mean, mean - 0.1, mean + 0.1) for name, mean in means.items()},
     )
 
 
 def summary(
     method: str = "td-inner",
     *,
-    standard: Figures | None = None,
+    standard: Performance | None = None,
     cooperation: dict[str, dict[str, int]] | None = None,
     entropy: dict[str, list[float]] | None = None,
 ) -> Summary:
@@ -139,8 +139,8 @@ def test_what_was_not_measured_is_not_mentioned() -> None:
 
 def of_seed(rescues: float, score: float | None) -> Summary:
     """Figures whose own intervals over episodes are narrow."""
-    found = figures(25, score=None if score is None else Interval(score, score, score))
-    return summary(standard=replace(found, rescues_per_episode=Interval(rescues, rescues, rescues)))
+    found = figures(25, score=None if score is None else Estimate(score, score, score))
+    return summary(standard=replace(found, rescues_per_episode=Estimate(rescues, rescues, rescues)))
 
 
 def test_seeds_have_a_row_each_and_a_mean() -> None:

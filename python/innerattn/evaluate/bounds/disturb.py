@@ -5,7 +5,7 @@ Random changes are drawn by the caller; changes that aim at a logit begin at the
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, cast
 
 import torch
 from torch import Tensor
@@ -132,7 +132,7 @@ class _Logits:
     """The logits of inner attention in given states."""
 
     def __init__(self, critic: Critic, states: States) -> None:
-        attention = critic.attention
+        attention = cast(InnerAttention, critic.attention)
         query, key, heads = attention.query, attention.key, attention.heads
         self._critic, self._states = critic, states
         self._own, self._others = critic.encode(states.obs, states.actions)

@@ -19,10 +19,10 @@ from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.evaluate.bounds.disturb import Changed, Direction, disturb
-from innerattn.evaluate.bounds.figures import Attention, Bounds, Level, level_of
 from innerattn.evaluate.bounds.inequalities import head_norms
 from innerattn.evaluate.bounds.perturbation import random_directions, rms_norm
 from innerattn.evaluate.bounds.response import States
+from innerattn.evaluate.bounds.results import Attention, Bounds, Level, level_of
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import TrainedPolicy
 from innerattn.learn.actor_critic import ActorCritic

@@ -138,7 +138,7 @@ def _response(
         matrices = (*rows, *old.weights.shape[1:])  # (R, M, B, H, R, R)
         weights = new.weights.reshape(matrices) - old.weights
         if old.scores is not None and new.scores is not None:
-            head_width = len(critic.attention.query) // critic.attention.heads
+            head_width = critic.attention.width // critic.attention.heads
             logits = (new.scores.reshape(matrices) - old.scores) * head_width**-0.5
     return Response(
         logits=None if logits is None else _of_changed(logits, 5),

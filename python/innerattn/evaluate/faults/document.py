@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any
 
 from innerattn.evaluate.faults.grid import ONSETS, Grid, Retention
 from innerattn.evaluate.faults.severity import fault_of
-from innerattn.measures.faults.retention import Estimate
-from innerattn.stats.intervals import Interval
+from innerattn.stats import Estimate
+from innerattn.stats.resampling import Resampled
 
 SCHEMA_VERSION = 1
 
@@ -49,22 +48,22 @@ def robustness_document(grid: Grid, found: Mapping[str, Retention], runs: Mappin
     }
 
 
-def worst_robot(grid: Grid, kept: Retention, kind: int, onset: int = 0) -> tuple[str, Interval]:
+def worst_robot(grid: Grid, kept: Retention, kind: int, onset: int = 0) -> tuple[str, Estimate]:
     """The robot whose fault of a kind, at the last severity, costs most; and what is kept then."""
     row = kept.cells[kind, -1, :, onset]
     robot = int(row.value.argmin())
-    return grid.scenario.robots[robot].name, row[robot].interval()
+    return grid.scenario.robots[robot].name, row[robot].estimate()
 
 
-def number(interval: Interval) -> dict[str, float] | None:
-    """An interval as plain numbers; None where it, or one of its ends, is not defined."""
-    numbers = asdict(interval)
-    return numbers if all(map(math.isfinite, numbers.values())) else None
+def number(estimate: Estimate) -> dict[str, float | int | None] | None:
+    """An estimate as a JSON object; None where it, or an end of its interval, is not defined."""
+    defined = estimate.bounded and math.isfinite(estimate.mean)
+    return estimate.to_json() if defined else None
 
 
 def _policy(grid: Grid, kept: Retention) -> dict[str, Any]:
     return {
-        "rescues_per_episode": number(kept.clean.interval()),
+        "rescues_per_episode": number(kept.clean.estimate()),
         "by_kind": _by_kind(grid, kept.by_kind()),
         "worst": [
             {"kind": kind, "onset": onset, "robot": worst[0], "retention": number(worst[1])}
@@ -74,9 +73,9 @@ def _policy(grid: Grid, kept: Retention) -> dict[str, Any]:
         ],
         "after_onset": {
             kind: {
-                "early": number(kept.early.mean((1, 2))[k].interval()),
-                "late": number(kept.late.mean((1, 2))[k].interval()),
-                "late_minus_early": number((kept.late - kept.early).mean((1, 2))[k].interval()),
+                "early": number(kept.early.mean((1, 2))[k].estimate()),
+                "late": number(kept.late.mean((1, 2))[k].estimate()),
+                "late_minus_early": number((kept.late - kept.early).mean((1, 2))[k].estimate()),
             }
             for k, kind in enumerate(grid.kinds)
         },
@@ -85,7 +84,7 @@ def _policy(grid: Grid, kept: Retention) -> dict[str, Any]:
             for k, kind in enumerate(grid.kinds)
             for r, robot in enumerate(grid.scenario.robots)
             for o, onset in enumerate(ONSETS)
-            for area in [kept.areas[k, r, o].interval()]
+            for area in [kept.areas[k, r, o].estimate()]
         ],
         "cells": [
             {
@@ -94,7 +93,7 @@ def _policy(grid: Grid, kept: Retention) -> dict[str, Any]:
                 "value": fault_of(grid.scenario, r, kind, severity).value,
                 "robot": robot.name,
                 "onset": onset,
-                "retention": number(kept.cells[k, s, r, o].interval()),
+                "retention": number(kept.cells[k, s, r, o].estimate()),
             }
             for k, kind in enumerate(grid.kinds)
             for s, severity in enumerate(grid.severities)
@@ -104,6 +103,6 @@ def _policy(grid: Grid, kept: Retention) -> dict[str, Any]:
     }
 
 
-def _by_kind(grid: Grid, estimate: Estimate) -> dict[str, Any]:
-    each = {kind: number(estimate[k].interval()) for k, kind in enumerate(grid.kinds)}
-    return {**each, "all": number(estimate.mean(0).interval())}
+def _by_kind(grid: Grid, estimate: Resampled) -> dict[str, Any]:
+    each = {kind: number(estimate[k].estimate()) for k, kind in enumerate(grid.kinds)}
+    return {**each, "all": number(estimate.mean(0).estimate())}

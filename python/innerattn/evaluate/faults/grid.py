@@ -18,10 +18,10 @@ from innerattn.config import Scenario
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.evaluate.faults.severity import fault_of
 from innerattn.evaluate.play import run_episodes
-from innerattn.measures.faults.retention import Estimate, area, retention
+from innerattn.measures.faults.retention import area, retention
 from innerattn.policies import Policy
 from innerattn.records.record import Record
-from innerattn.stats.intervals import resampled_counts
+from innerattn.stats.resampling import Resampled, resampled_counts
 
 SEVERITIES = (0.25, 0.5, 0.75, 1.0)
 """From harmless (0, which needs no measuring) to the worst (1)."""
@@ -138,13 +138,13 @@ class Retention:
         late: (K, S, R) retention in the second half of it.
     """
 
-    clean: Estimate
-    cells: Estimate
-    areas: Estimate
-    early: Estimate
-    late: Estimate
+    clean: Resampled
+    cells: Resampled
+    areas: Resampled
+    early: Resampled
+    late: Resampled
 
-    def by_kind(self) -> Estimate:
+    def by_kind(self) -> Resampled:
         """Mean of the areas over robots and onsets, (K,)."""
         return self.areas.mean((1, 2))
 
@@ -155,17 +155,17 @@ def kept(played: Played, grid: Grid) -> Retention:
     steps = played.clean.shape[1]
     half = grid.middle + (steps - grid.middle) // 2
 
-    def since(first: int, last: int, onset: slice | int) -> Estimate:
+    def since(first: int, last: int, onset: slice | int) -> Resampled:
         faulty = played.faulty[:, :, :, onset, :, first:last].sum(-1)
         return retention(faulty, played.clean[:, first:last].sum(-1), weights)
 
     parts = [since(0, steps, 0), since(grid.middle, steps, 1)]
-    cells = Estimate(
+    cells = Resampled(
         np.stack([part.value for part in parts], 3), np.stack([part.resampled for part in parts], 3)
     )
     totals = played.clean.sum(1)
     return Retention(
-        clean=Estimate(np.asarray(totals.mean()), weights @ totals / grid.episodes),
+        clean=Resampled(np.asarray(totals.mean()), weights @ totals / grid.episodes),
         cells=cells,
         areas=area(cells, np.asarray(grid.severities), axis=1),
         early=since(grid.middle, half, 1),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from innerattn.evaluate.faults.document import worst_robot
 from innerattn.evaluate.faults.grid import Grid, Retention
 from innerattn.measures.faults.shift_results import KindShift
-from innerattn.stats.intervals import Interval
+from innerattn.stats import Estimate
 
 
 @dataclass(frozen=True)
@@ -26,13 +26,13 @@ class KindOverview:
     """
 
     kind: str
-    retention: Interval
+    retention: Estimate
     by_severity: tuple[float, ...]
     worst_robot: str
-    worst: Interval
-    early: Interval
-    late: Interval
-    change: Interval
+    worst: Estimate
+    early: Estimate
+    late: Estimate
+    change: Estimate
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class Overview:
         retention: mean over the kinds.
     """
 
-    rescues: Interval
+    rescues: Estimate
     kinds: tuple[KindOverview, ...]
-    retention: Interval
+    retention: Estimate
 
 
 def overview(grid: Grid, found: Retention) -> Overview:
@@ -60,16 +60,16 @@ def overview(grid: Grid, found: Retention) -> Overview:
         kinds.append(
             KindOverview(
                 kind=kind,
-                retention=areas[k].interval(),
+                retention=areas[k].estimate(),
                 by_severity=tuple(found.cells.value[k, :, :, 0].mean(1).tolist()),
                 worst_robot=robot,
                 worst=worst,
-                early=early[k].interval(),
-                late=late[k].interval(),
-                change=(late[k] - early[k]).interval(),
+                early=early[k].estimate(),
+                late=late[k].estimate(),
+                change=(late[k] - early[k]).estimate(),
             )
         )
-    return Overview(found.clean.interval(), tuple(kinds), areas.mean(0).interval())
+    return Overview(found.clean.estimate(), tuple(kinds), areas.mean(0).estimate())
 
 
 def weight_without_fault(found: KindShift) -> float:

@@ -18,8 +18,9 @@ from innerattn.experiments.crossed.effects import (
 )
 from innerattn.experiments.crossed.outcome import IDLE, Outcomes, by_seed
 from innerattn.experiments.paper.claims import EVEN_ENTROPY, Holds
+from innerattn.stats import Estimate
 from innerattn.stats.comparison import Contrast, contrast
-from innerattn.stats.seeds import SeedEstimate, seed_estimate
+from innerattn.stats.seeds import seed_estimate
 from innerattn.stats.text import NONE, shown
 
 LEAST_WITHOUT_IDLE = 10
@@ -122,14 +123,14 @@ def idle_seeds(outcomes: Outcomes, arms: Sequence[Arm]) -> tuple[int, int]:
     return int((least < IDLE).sum()), len(least)
 
 
-def _mean(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> SeedEstimate | None:
+def _mean(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> Estimate | None:
     """The mean over seeds of a result that is averaged over the arms."""
     return seed_estimate(by_seed(outcomes, arms, figure).mean(axis=1).tolist())
 
 
-def _ends(mean: SeedEstimate | None) -> tuple[float, float]:
+def _ends(mean: Estimate | None) -> tuple[float, float]:
     """The interval of a mean over enough seeds; else all numbers."""
-    if mean is None or mean.low is None or mean.high is None or mean.runs < LEAST_SEEDS:
+    if mean is None or mean.runs < LEAST_SEEDS:
         return -math.inf, math.inf
     return mean.low, mean.high
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from innerattn.experiments.crossed.arms import Arm
 from innerattn.experiments.paper.workload import rescues_by_task, workload_imbalance
-from innerattn.experiments.run import Measured
+from innerattn.experiments.run import FinishedRun
 
 IDLE = 0.2
 """A food robot with a smaller share of the rescues than this counts as idle."""
@@ -42,7 +42,7 @@ Outcomes = Mapping[Arm, Mapping[int, Outcome]]
 """What the runs of each arm show, by their seeds."""
 
 
-def outcome_of(measured: Measured) -> Outcome:
+def outcome_of(measured: FinishedRun) -> Outcome:
     """The figures of a run, sharing over all its episodes of the standard length.
 
     Raises:

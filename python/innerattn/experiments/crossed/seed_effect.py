@@ -15,7 +15,7 @@ from scipy.stats import f as fisher
 
 from innerattn.experiments.crossed.arms import CREDITS, CROSSED, Credit
 from innerattn.experiments.crossed.outcome import Outcomes, by_seed
-from innerattn.stats.intervals import Interval
+from innerattn.stats import Estimate
 
 LEAST_SEEDS = 3
 """A correlation needs so many seeds that have a run of each arm."""
@@ -37,7 +37,7 @@ class SeedEffect:
     credit: Credit
     arms: int
     seeds: int
-    correlation: Interval | None
+    correlation: Estimate | None
     least: float | None
     most: float | None
 
@@ -56,7 +56,7 @@ def _seed_effect(credit: Credit, outcomes: Outcomes) -> SeedEffect:
     return SeedEffect(credit, len(arms), len(shares), correlation, least, most)
 
 
-def intraclass_correlation(values: ArrayLike) -> Interval | None:
+def intraclass_correlation(values: ArrayLike) -> Estimate | None:
     """How alike the runs of one seed are, each arm's mean taken away: 1 the same, 0 not alike.
 
     ICC(3,1) of Shrout & Fleiss (1979), "Intraclass correlations: uses in assessing rater
@@ -87,4 +87,4 @@ def intraclass_correlation(values: ArrayLike) -> Interval | None:
     ratio = between / error
     low = ratio / float(fisher.ppf(0.975, free, free_left))
     high = ratio * float(fisher.ppf(0.975, free_left, free))
-    return Interval(*((r - 1.0) / (r + k - 1.0) for r in (ratio, low, high)))
+    return Estimate(*((r - 1.0) / (r + k - 1.0) for r in (ratio, low, high)))

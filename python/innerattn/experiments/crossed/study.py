@@ -4,35 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from innerattn.experiments.crossed.arms import ARMS, Arm, arm_of
 from innerattn.experiments.crossed.claims import Answer, answers
 from innerattn.experiments.crossed.effects import Effect, effects
 from innerattn.experiments.crossed.outcome import OUTCOMES, Outcome, outcome_of
 from innerattn.experiments.crossed.seed_effect import SeedEffect, seed_effects
-from innerattn.experiments.run import Digests, StudyRun, digests, read_measured
-from innerattn.experiments.scan import FinishedRun
-from innerattn.stats.seeds import SeedEstimate, seed_estimate
+from innerattn.experiments.run import FinishedRun
+from innerattn.stats import Estimate
+from innerattn.stats.seeds import seed_estimate
 
 
 @dataclass(frozen=True)
 class CrossedRun:
-    """A run of the design.
-
-    Attributes:
-        arm: how it was trained.
-        seed: of its training.
-        folder: the run folder.
-        digests: what tells it from any other.
-        outcome: what it shows.
-    """
+    """A run of the design: how it was trained, and what it shows."""
 
     arm: Arm
-    seed: int
-    folder: Path
-    digests: Digests
+    run: FinishedRun
     outcome: Outcome
+
+    @property
+    def seed(self) -> int:
+        """The seed of its training."""
+        return self.run.seed
 
 
 @dataclass(frozen=True)
@@ -50,7 +44,7 @@ class Situation:
 
     name: str
     runs: tuple[CrossedRun, ...]
-    means: dict[Arm, dict[str, SeedEstimate | None]]
+    means: dict[Arm, dict[str, Estimate | None]]
     effects: tuple[Effect, ...]
     answers: tuple[Answer, ...]
     seeds: tuple[SeedEffect, ...]
@@ -67,8 +61,7 @@ def read_situations(runs: Sequence[FinishedRun]) -> list[Situation]:
         runs: finished runs of the design, in any order.
 
     Raises:
-        RunError: a run's evaluation is missing or is not one of two food robots.
-        ConfigError: a configuration cannot be read.
+        RunError: records cannot be read, or a run's team has not two food robots.
     """
     names = list(dict.fromkeys(run.case.situation for run in runs))
     return [_situation(name, [run for run in runs if run.case.situation == name]) for name in names]
@@ -76,7 +69,8 @@ def read_situations(runs: Sequence[FinishedRun]) -> list[Situation]:
 
 def _situation(name: str, own: Sequence[FinishedRun]) -> Situation:
     order = {arm: index for index, arm in enumerate(ARMS)}
-    found = sorted(map(_run, own), key=lambda run: (order[run.arm], run.seed))
+    found = [CrossedRun(arm_of(run.case), run, outcome_of(run)) for run in own]
+    found.sort(key=lambda one: (order[one.arm], one.seed))
     outcomes = _by_arm(found)
     means = {
         arm: {
@@ -92,10 +86,3 @@ def _situation(name: str, own: Sequence[FinishedRun]) -> Situation:
 
 def _by_arm(runs: Sequence[CrossedRun]) -> dict[Arm, dict[int, Outcome]]:
     return {arm: {run.seed: run.outcome for run in runs if run.arm == arm} for arm in ARMS}
-
-
-def _run(run: FinishedRun) -> CrossedRun:
-    case = run.case
-    labelled = StudyRun(case.situation, case.method, case.seed, run.folder)
-    outcome = outcome_of(read_measured(labelled, step_by_step=False))
-    return CrossedRun(arm_of(case), case.seed, run.folder, digests(run.folder), outcome)

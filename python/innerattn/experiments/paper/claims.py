@@ -15,7 +15,7 @@ from innerattn.experiments.paper.fig4 import PRINTED_NATS, EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION
 from innerattn.measures.sharing.evenness import MARGIN
-from innerattn.stats.seeds import SeedEstimate
+from innerattn.stats import Estimate
 from innerattn.stats.text import NONE, shown
 
 Holds = Literal["yes", "no", "undecided"]
@@ -34,8 +34,8 @@ EVEN_ENTROPY = 1.0 - ENTROPY_MARGIN
 
 RULES = f"""\
 A claim is undecided for a method with less than two runs. Intervals are Student's 95 % over runs,
-also where they reach beyond what is possible (a share above 1, an imbalance below 0). Every claim is
-judged by itself at 5 %; nothing is adjusted for their number.
+also where they reach beyond what is possible (a share above 1, an imbalance below 0). Every claim
+is judged by itself at 5 %; nothing is adjusted for their number.
 
 - *A task is shared* evenly where the runs' mean share is (its 90 % interval lies within {MARGIN[0]}
   to {MARGIN[1]}) and no run is uneven by itself; unevenly where the mean share is (its 95 %
@@ -143,9 +143,9 @@ def handoff_claims(found: Sequence[Evidence]) -> list[Claim]:
     return claims
 
 
-def handoff_moves(change: SeedEstimate | None) -> Holds:
+def handoff_moves(change: Estimate | None) -> Holds:
     """Whether the weight on the partner-to-be rises, by `RULES`."""
-    if change is None or change.low is None or change.high is None:
+    if change is None:
         return "undecided"
     if change.low > 0.0 and change.mean >= LEAST_MOVE:
         return "yes"
@@ -155,7 +155,7 @@ def handoff_moves(change: SeedEstimate | None) -> Holds:
 def handoff_is_own(found: Evidence) -> Holds:
     """Whether most of the rise is of the robot that hands over, by `RULES`."""
     own, beyond_half = found.own_part, found.own_part_beyond_half
-    if own is None or own.low is None or beyond_half is None or beyond_half.high is None:
+    if own is None or beyond_half is None:
         return "undecided"
     if own.low > 0.0 and beyond_half.mean >= 0.0:
         return "yes"
@@ -177,18 +177,14 @@ def _claim(
     )
 
 
-def _decided(value: SeedEstimate, yes_below: float) -> Holds:
+def _decided(value: Estimate, yes_below: float) -> Holds:
     """Yes below, no above."""
-    if value.low is None or value.high is None:
-        return "undecided"
     if value.high < yes_below:
         return "yes"
     return "no" if value.low > yes_below else "undecided"
 
 
-def _falls(change: SeedEstimate, least: float) -> Holds:
-    if change.low is None or change.high is None:
-        return "undecided"
+def _falls(change: Estimate, least: float) -> Holds:
     if change.high < 0.0 and change.mean <= -least:
         return "yes"
     return "no" if change.low > -least else "undecided"

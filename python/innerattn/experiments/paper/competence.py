@@ -7,33 +7,29 @@ a dispatch can be depends on the situation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from innerattn.evaluate.play import run_episodes
-from innerattn.experiments.paper.workload import workload_imbalance
-from innerattn.experiments.run import Measured
-from innerattn.measures.dispatch_quality import dispatch_quality
-from innerattn.measures.waiting import waiting
-from innerattn.policies import SCRIPTED, scripted_policy
-from innerattn.stats.intervals import Interval
-from innerattn.stats.seeds import SeedEstimate, seed_estimate
+from innerattn.experiments.paper.workload import rescues_by_task
+from innerattn.experiments.run import FinishedRun
+from innerattn.measures.registry import MEASURES, measures_of
+from innerattn.policies import SCRIPTED
+from innerattn.stats import Estimate
+from innerattn.stats.seeds import seed_estimate
 
 COMPETENCE = {
     "rescues_per_episode": "",
     "score": "0 random play, 1 scripted dispatch",
-    "imbalance": "distance of a share from 0.5",
-    "sooner": "share of choices",
-    "sooner_by_chance": "share of choices",
-    "regret_s": "s",
-    "regret_by_chance_s": "s",
-    "time_to_rescue_s": "s",
-    "time_per_rescue_s": "s",
+    **{
+        name: measure.unit
+        for name, measure in MEASURES.items()
+        if not measure.is_count and name != "rescues_per_episode"
+    },
 }
-"""Figures of competence and their units; the first three are of all episodes, the others of those
-recorded step by step, which with scripted policies are all, too. See `Summary`, `imbalance`,
-`DispatchQuality` and `Waiting`."""
+"""Values of competence and their units: the score (see `measures.summary.Performance`) and
+all `MEASURES` that are no counts. What needs steps is of the episodes recorded step by step, which
+with scripted policies are all."""
 
-_STEPS = ("positions", "velocities", "victims")
+_COUNTS = tuple(name for name, measure in MEASURES.items() if measure.is_count)
 
 
 @dataclass(frozen=True)
@@ -55,69 +51,83 @@ class Competence:
     seeds: tuple[int, ...]
     counts: tuple[dict[str, int], ...]
     each: tuple[dict[str, float | None], ...]
-    mean: dict[str, SeedEstimate | None]
+    mean: dict[str, Estimate | None]
 
 
-def competence(group: Sequence[Measured]) -> Competence:
+def competence(group: Sequence[FinishedRun]) -> Competence:
     """How well runs of one situation and method do."""
-    run = group[0].run
-    counts, each = zip(*(_competence_of(measured) for measured in group), strict=True)
-    mean = {name: seed_estimate([figures[name] for figures in each]) for name in COMPETENCE}
-    seeds = tuple(measured.run.seed for measured in group)
-    return Competence(run.situation, run.method, seeds, counts, each, mean)
+    counts, each = zip(*(_of_run(run) for run in group), strict=True)
+    return _over_runs(group, group[0].method, counts, each)
 
 
-def scripted_competence(group: Sequence[Measured]) -> list[Competence]:
-    """How well the scripted policies do in the worlds of some runs; they are played here."""
-    return [competence([_played(name, measured) for measured in group]) for name in SCRIPTED]
+def scripted_competence(group: Sequence[FinishedRun]) -> list[Competence]:
+    """How well the scripted policies do in the worlds of some runs, as their evaluations found.
+
+    Evaluations that are older than these measures say nothing of scripts; they are left out.
+    """
+    known = [run for run in group if SCRIPTED[0] in run.summary.get("measures", {})]
+    found = []
+    for name in SCRIPTED if known else ():
+        counts, each = zip(*(_of_script(name, run) for run in known), strict=True)
+        found.append(_over_runs(known, name, counts, each))
+    return found
 
 
-def _played(name: str, measured: Measured) -> Measured:
-    """What a run's evaluation would have recorded of a scripted policy instead."""
-    own, summary = measured.recorded, measured.summary
-    policy = scripted_policy(name, own.scenario, own.seed)
-    count = sum(part.num_episodes for part in measured.scored)
-    recorded = run_episodes(policy, own.scenario, count, own.seed, record=_STEPS)
-    mean = {other: float(of["mean"]) for other, of in summary["scripted"].items()}
-    least, span = mean["random"], mean["hungarian"] - mean["random"]
-    return Measured(
-        replace(measured.run, method=name),
-        recorded,
-        (recorded,),
-        {
-            "score_episodes": summary["score_episodes"],
-            "rescues_per_episode": summary["scripted"][name],
-            "score": {"mean": (mean[name] - least) / span} if summary["score"] else None,
-        },
+def _over_runs(
+    group: Sequence[FinishedRun],
+    method: str,
+    counts: tuple[dict[str, int], ...],
+    each: tuple[dict[str, float | None], ...],
+) -> Competence:
+    mean = {name: seed_estimate([values[name] for values in each]) for name in COMPETENCE}
+    seeds = tuple(run.seed for run in group)
+    return Competence(group[0].situation, method, seeds, counts, each, mean)
+
+
+def _of_run(run: FinishedRun) -> tuple[dict[str, int], dict[str, float | None]]:
+    """One run's counts and values.
+
+    Raises:
+        RunError: a task is not one that two robots share.
+    """
+    rescues_by_task(run)
+    measured = _stored(run, run.method)
+    own = {name: _mean(value) for name, value in measures_of(*run.scored).items()}
+    known = {name: value for name, value in own.items() if value is not None}
+    score = run.summary["score"]
+    return _joined(
+        run,
+        run.recorded.num_episodes,
+        {**measured, **known, "score": None if score is None else float(score["mean"])},
     )
 
 
-def _competence_of(measured: Measured) -> tuple[dict[str, int], dict[str, float | None]]:
-    """One run's counts and figures."""
-    score = measured.summary["score"]
-    counts = {
-        "score_episodes": int(measured.summary["score_episodes"]),
-        "episodes": measured.recorded.num_episodes,
-    }
-    figures: dict[str, float | None] = dict.fromkeys(COMPETENCE)
-    figures |= {
-        "rescues_per_episode": float(measured.summary["rescues_per_episode"]["mean"]),
-        "score": None if score is None else float(score["mean"]),
-        "imbalance": workload_imbalance(measured),
-    }
-    if not measured.recorded.steps:  # a small copy of a run
-        return counts, figures
-    choice, waited = dispatch_quality(measured.recorded), waiting(measured.recorded)
-    counts |= {"choices": choice.choices, "rescued": waited.rescued, "left": waited.left}
-    return counts, figures | {
-        "sooner": _mean(choice.sooner),
-        "sooner_by_chance": choice.sooner_by_chance,
-        "regret_s": _mean(choice.regret_s),
-        "regret_by_chance_s": choice.regret_by_chance_s,
-        "time_to_rescue_s": _mean(waited.time_to_rescue_s),
-        "time_per_rescue_s": _mean(waited.time_per_rescue_s),
+def _of_script(name: str, run: FinishedRun) -> tuple[dict[str, int], dict[str, float | None]]:
+    """A script's counts and values in the worlds of a run."""
+    mean = {other: float(of["mean"]) for other, of in run.summary["scripted"].items()}
+    least, span = mean["random"], mean["hungarian"] - mean["random"]
+    score = (mean[name] - least) / span if run.summary["score"] else None
+    episodes = int(run.summary["score_episodes"])
+    return _joined(run, episodes, {**_stored(run, name), "score": score})
+
+
+def _joined(
+    run: FinishedRun, episodes: int, values: dict[str, float | None]
+) -> tuple[dict[str, int], dict[str, float | None]]:
+    """Counts and values; what was not measured is None."""
+    counts = {"score_episodes": int(run.summary["score_episodes"]), "episodes": episodes}
+    counts |= {name: int(value) for name in _COUNTS if (value := values.get(name)) is not None}
+    return counts, {name: values.get(name) for name in COMPETENCE}
+
+
+def _stored(run: FinishedRun, policy: str) -> dict[str, float | None]:
+    """What a run's evaluation stored of a policy's measures at the standard length."""
+    stored = run.summary.get("measures", {}).get(policy, {})
+    return {
+        name: float(value["mean"]) if isinstance(value, dict) else value
+        for name, value in stored.items()
     }
 
 
-def _mean(interval: Interval | None) -> float | None:
-    return None if interval is None else interval.mean
+def _mean(value: Estimate | float | int | None) -> float | None:
+    return value.mean if isinstance(value, Estimate) else value

@@ -9,15 +9,16 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.errors import RunError
-from innerattn.experiments.run import StudyRun, by_method
-from innerattn.stats.seeds import Array, SeedCurve, SeedEstimate, seed_curve, seed_estimate
+from innerattn.experiments.run import FinishedRun, by_method
+from innerattn.stats import Estimate
+from innerattn.stats.seeds import Array, SeedCurve, seed_curve, seed_estimate
 
 SCHEMA_VERSION = 1
 
@@ -50,9 +51,9 @@ class EntropyCourse:
     robots: tuple[str, ...]
     env_steps: NDArray[np.int64]
     nats: Array
-    begin: SeedEstimate
-    end: SeedEstimate
-    change: SeedEstimate
+    begin: Estimate
+    end: Estimate
+    change: Estimate
 
     @property
     def even_nats(self) -> float:
@@ -85,11 +86,11 @@ class EntropyCourse:
             "nats_by_seed_time_robot_head": self.nats.tolist(),
             "mean": self.mean().to_json(),
             "by_robot": self.by_robot().to_json(),
-            **{name: asdict(getattr(self, name)) for name in ("begin", "end", "change")},
+            **{name: getattr(self, name).to_json() for name in ("begin", "end", "change")},
         }
 
 
-def fig4(runs: Sequence[StudyRun]) -> list[EntropyCourse]:
+def fig4(runs: Sequence[FinishedRun]) -> list[EntropyCourse]:
     """Entropy courses of all methods with attention.
 
     Returns:
@@ -112,7 +113,7 @@ def fig4_json(courses: Sequence[EntropyCourse]) -> dict[str, Any]:
     }
 
 
-def _course(group: Sequence[StudyRun]) -> EntropyCourse | None:
+def _course(group: Sequence[FinishedRun]) -> EntropyCourse | None:
     tables = [_entropies(run) for run in group]
     if not all(tables):
         return None
@@ -139,7 +140,7 @@ def _course(group: Sequence[StudyRun]) -> EntropyCourse | None:
     )
 
 
-def _entropies(run: StudyRun) -> dict[int, dict[str, list[float]]]:
+def _entropies(run: FinishedRun) -> dict[int, dict[str, list[float]]]:
     """Entropy by env-steps, robot and head; empty where the method has none."""
     path = run.folder / "metrics.jsonl"
     try:

@@ -9,14 +9,14 @@ from the victims that are there, not from who hands over.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import permutations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.experiments.run import Measured
+from innerattn.experiments.run import FinishedRun
 from innerattn.measures.cooperation import shared_abilities
 from innerattn.measures.sharing.handoff import HANDOFF, handoffs
 from innerattn.measures.sharing.handoff_attention import (
@@ -25,7 +25,8 @@ from innerattn.measures.sharing.handoff_attention import (
     handoff_attention,
 )
 from innerattn.records.record import Record
-from innerattn.stats.seeds import Array, SeedCurve, SeedEstimate, seed_curve, seed_estimate
+from innerattn.stats import Estimate
+from innerattn.stats.seeds import Array, SeedCurve, seed_curve, seed_estimate
 
 SCHEMA_VERSION = 2
 
@@ -47,14 +48,14 @@ class RoleEvidence:
     """
 
     weight: SeedCurve
-    change: SeedEstimate | None
+    change: Estimate | None
     change_by_run: tuple[float | None, ...]
 
     def to_json(self) -> dict[str, Any]:
         """As a JSON object."""
         return {
             "weight": self.weight.to_json(),
-            "change": asdict(self.change) if self.change else None,
+            "change": self.change.to_json() if self.change else None,
             "change_by_run": list(self.change_by_run),
         }
 
@@ -92,9 +93,9 @@ class Evidence:
     even: float
     robot: dict[str, RoleEvidence]
     control: dict[str, RoleEvidence]
-    own_part: SeedEstimate | None
+    own_part: Estimate | None
     own_part_by_run: tuple[float | None, ...]
-    own_part_beyond_half: SeedEstimate | None
+    own_part_beyond_half: Estimate | None
     p_by_run: tuple[float | None, ...]
     control_p_by_run: tuple[float | None, ...]
 
@@ -111,10 +112,10 @@ class Evidence:
             "offsets": self.offsets.tolist(),
             "robot": {role: found.to_json() for role, found in self.robot.items()},
             "control": {role: found.to_json() for role, found in self.control.items()},
-            "own_part": asdict(self.own_part) if self.own_part else None,
+            "own_part": self.own_part.to_json() if self.own_part else None,
             "own_part_by_run": list(self.own_part_by_run),
             "own_part_beyond_half": (
-                asdict(self.own_part_beyond_half) if self.own_part_beyond_half else None
+                self.own_part_beyond_half.to_json() if self.own_part_beyond_half else None
             ),
             "p_by_run": list(self.p_by_run),
             "control_p_by_run": list(self.control_p_by_run),
@@ -151,7 +152,7 @@ def with_bystander(record: Record, found: NDArray[np.void]) -> NDArray[np.void]:
     return control
 
 
-def evidence(group: Sequence[Measured]) -> Evidence | None:
+def evidence(group: Sequence[FinishedRun]) -> Evidence | None:
     """What attention does around handoffs in runs of one situation and method.
 
     Returns:
@@ -182,9 +183,9 @@ def evidence(group: Sequence[Measured]) -> Evidence | None:
         for part in (1.0, 0.5)
     )
     return Evidence(
-        situation=group[0].run.situation,
-        method=group[0].run.method,
-        seeds=tuple(measured.run.seed for measured in group),
+        situation=group[0].situation,
+        method=group[0].method,
+        seeds=tuple(measured.seed for measured in group),
         handoffs=tuple(run.handoffs if run else 0 for run in seen),
         episodes=tuple(run.episodes if run else 0 for run in seen),
         offsets=known[0].offsets,

@@ -11,7 +11,8 @@ from scipy.stats import t as student
 
 from innerattn.experiments.paper.competence import Competence
 from innerattn.policies import SCRIPTED
-from innerattn.stats.seeds import Array, SeedEstimate
+from innerattn.stats import Estimate
+from innerattn.stats.seeds import Array
 
 _SCRIPT = "hungarian"
 
@@ -64,7 +65,7 @@ def _merit(situation: str, parts: Sequence[Competence]) -> ImbalanceScoreCorrela
     return ImbalanceScoreCorrelation(situation, runs, *_correlation(groups, runs), beside)
 
 
-def _mean(value: SeedEstimate | None) -> float | None:
+def _mean(value: Estimate | None) -> float | None:
     return value.mean if value else None
 
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from innerattn.experiments.paper.claims import LEAST_PAIRS
 from innerattn.experiments.paper.competence import Competence
 from innerattn.measures.sharing.evenness import MARGIN
+from innerattn.stats import Estimate
 from innerattn.stats.aggregate import improvement_interval, iqm_interval
 from innerattn.stats.comparison import Contrast, contrast
-from innerattn.stats.intervals import Interval
-from innerattn.stats.seeds import SeedEstimate, seed_estimate
+from innerattn.stats.seeds import seed_estimate
 
 MARGINS = {"score": 0.05, "imbalance": 0.5 - MARGIN[0]}
 """The figures that are compared, and the largest difference that counts as none."""
@@ -39,8 +39,8 @@ class Pair:
     algorithm: str
     figure: str
     seeds: tuple[int, ...]
-    inner: SeedEstimate | None
-    uniform: SeedEstimate | None
+    inner: Estimate | None
+    uniform: Estimate | None
     found: Contrast | None
 
 
@@ -58,9 +58,9 @@ class Together:
 
     algorithm: str
     situations: tuple[str, ...]
-    inner: Interval
-    uniform: Interval
-    better: Interval
+    inner: Estimate
+    uniform: Estimate
+    better: Estimate
 
 
 def pairs(competence: Sequence[Competence]) -> list[Pair]:

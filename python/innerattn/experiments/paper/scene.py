@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 from innerattn.experiments.paper.fig5 import alike_robots
-from innerattn.experiments.run import Measured
+from innerattn.experiments.run import FinishedRun
 from innerattn.measures.sharing.handoff import handoffs
 
 SCHEMA_VERSION = 1
@@ -64,7 +64,7 @@ class HandoffScene:
         return (self.start, self.first), (self.first, middle), (middle, self.second)
 
 
-def choose_scene(group: Sequence[Measured]) -> HandoffScene | None:
+def choose_scene(group: Sequence[FinishedRun]) -> HandoffScene | None:
     """The handoff that is shown, by `SCENE_RULE`.
 
     Args:
@@ -73,7 +73,7 @@ def choose_scene(group: Sequence[Measured]) -> HandoffScene | None:
     Returns:
         None where the first run has no attention, not two tasks of two needs, or no such handoff.
     """
-    run, record = group[0].run, group[0].recorded
+    run, record = group[0], group[0].recorded
     tasks = [task.name for task in record.scenario.tasks if len(task.needs) == 2]
     alike = alike_robots(record)
     if "attention" not in record.steps or len(tasks) < 2 or not alike:

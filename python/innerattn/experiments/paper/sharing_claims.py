@@ -9,7 +9,7 @@ from innerattn.experiments.paper.pairs import Pair, pairs
 from innerattn.experiments.paper.printed import TEXT, PrintedRow
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import Verdict
-from innerattn.stats.seeds import SeedEstimate
+from innerattn.stats import Estimate
 from innerattn.stats.text import NONE, shown
 
 
@@ -120,5 +120,5 @@ def _distance(printed: PrintedRow) -> str:
     return f"{abs(printed.shares[0] - 0.5):.2f}"
 
 
-def _mean(value: SeedEstimate | None) -> str:
+def _mean(value: Estimate | None) -> str:
     return f"{value.mean:.2f}" if value else NONE

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from innerattn.errors import RunError
 from innerattn.experiments.paper.competence import Competence, competence, scripted_competence
 from innerattn.experiments.paper.printed import CheckedRow, checked_table
-from innerattn.experiments.run import Measured
+from innerattn.experiments.run import FinishedRun
 from innerattn.measures.cooperation import count_cooperation
 from innerattn.measures.sharing.evenness import (
     MARGIN,
@@ -29,6 +29,7 @@ from innerattn.measures.sharing.evenness import (
     evenness_of_runs,
 )
 from innerattn.records.record import Record
+from innerattn.stats.estimate import as_json
 
 SCHEMA_VERSION = 1
 
@@ -117,11 +118,11 @@ class Table2:
             "margin": list(MARGIN),
             "printed_situation": PRINTED_SITUATION,
             "rows": [row.to_json() for row in self.rows],
-            "competence": [asdict(part) for part in self.competence],
+            "competence": as_json(self.competence),
         }
 
 
-def table2(groups: Sequence[Sequence[Measured]]) -> Table2:
+def table2(groups: Sequence[Sequence[FinishedRun]]) -> Table2:
     """Table II.
 
     Args:
@@ -133,7 +134,7 @@ def table2(groups: Sequence[Sequence[Measured]]) -> Table2:
     printed = {(row.row.method, row.row.task): row for row in checked_table()}
     rows: list[Row] = []
     for group in groups:
-        run, first = group[0].run, group[0].recorded
+        run, first = group[0], group[0].recorded
         helped = count_cooperation(first.rescues, first.scenario)
         shared = {task: list(robots) for task, robots in helped.items()}
         recorded = [counts_by_episode(measured.recorded) for measured in group]
@@ -151,7 +152,7 @@ def table2(groups: Sequence[Sequence[Measured]]) -> Table2:
                     method=run.method,
                     task=task,
                     robots=(able[0], able[1]),
-                    seeds=tuple(measured.run.seed for measured in group),
+                    seeds=tuple(measured.seed for measured in group),
                     recorded=_sharing([counts[task] for counts in recorded]),
                     scored=_sharing([counts[task] for counts in scored]),
                     printed=known if run.situation == PRINTED_SITUATION else None,
@@ -159,7 +160,7 @@ def table2(groups: Sequence[Sequence[Measured]]) -> Table2:
             )
     beside = [competence(group) for group in groups]
     for situation in dict.fromkeys(row.situation for row in rows):
-        own = [group for group in groups if group[0].run.situation == situation]
+        own = [group for group in groups if group[0].situation == situation]
         beside += scripted_competence(max(own, key=len))
     return Table2(tuple(rows), tuple(beside))
 

@@ -1,4 +1,4 @@
-"""How far from even the two food robots of a run share its rescues, in one number."""
+"""How the two food robots of a run share its rescues."""
 
 from __future__ import annotations
 
@@ -6,27 +6,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.errors import RunError
-from innerattn.experiments.run import Measured
+from innerattn.experiments.run import FinishedRun
+from innerattn.measures.registry import measures_of
 from innerattn.measures.sharing.evenness import counts_by_episode
 
 
-def rescues_by_task(measured: Measured) -> dict[str, NDArray[np.int64]]:
+def rescues_by_task(run: FinishedRun) -> dict[str, NDArray[np.int64]]:
     """Rescues of each task by food robot, (2,), over all episodes of the standard length.
 
     Raises:
         RunError: a task is not one that two robots share.
     """
-    parts = [counts_by_episode(record) for record in measured.scored]
-    counts = {task: sum(part[task].sum(0) for part in parts) for task in parts[0]}
+    parts = [counts_by_episode(record) for record in run.scored]
+    counts = {task: np.sum([part[task].sum(0) for part in parts], 0) for task in parts[0]}
     for task, by_robot in counts.items():
         if len(by_robot) != 2:
-            raise RunError(
-                f"{measured.run.folder}: {task} is shared by {len(by_robot)} robots; must be two"
-            )
+            raise RunError(f"{run.folder}: {task} is shared by {len(by_robot)} robots; must be two")
     return counts
 
 
-def workload_imbalance(measured: Measured) -> float | None:
+def workload_imbalance(run: FinishedRun) -> float | None:
     """Distance of the first food robot's share from 0.5, a mean over tasks, 0 to 0.5.
 
     Returns:
@@ -35,7 +34,6 @@ def workload_imbalance(measured: Measured) -> float | None:
     Raises:
         RunError: a task is not one that two robots share.
     """
-    counts = list(rescues_by_task(measured).values())
-    if not all(by_robot.sum() for by_robot in counts):
-        return None
-    return float(np.mean([abs(first / (first + second) - 0.5) for first, second in counts]))
+    rescues_by_task(run)
+    value = measures_of(*run.scored)["imbalance"]
+    return value if isinstance(value, float) else None

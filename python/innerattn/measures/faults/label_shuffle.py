@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.stats.intervals import Interval, percentile_interval
+from innerattn.stats import Estimate
+from innerattn.stats.resampling import percentile_interval
 
 SHUFFLES = 4999
 """How often labels are dealt anew; the least p-value is one over one more than that."""
@@ -18,7 +19,7 @@ _ROUNDING = 1e-12
 
 def shuffled_labels(
     change: NDArray[np.float64], robot: int, seed: int, shuffles: int = SHUFFLES
-) -> tuple[Interval, float]:
+) -> tuple[Estimate, float]:
     """The change of the weight on a robot that is called failing by lot.
 
     In every episode one robot is drawn, the failing one as likely as any other, and the mean change

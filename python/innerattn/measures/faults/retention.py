@@ -7,49 +7,15 @@ policies that met the same worlds are paired.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.stats.intervals import Interval, percentile_interval
+from innerattn.stats.resampling import Resampled
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """Numbers and what a bootstrap makes of them.
-
-    Attributes:
-        value: (...) float64.
-        resampled: (..., B) float64, the same of each resample.
-    """
-
-    value: Array
-    resampled: Array
-
-    def __getitem__(self, index: int | slice | tuple[int | slice, ...]) -> Estimate:
-        """The same of a part, by an index into ``value``."""
-        return Estimate(np.asarray(self.value[index]), np.asarray(self.resampled[index]))
-
-    def __sub__(self, other: Estimate) -> Estimate:
-        """The difference; paired, if both come from the same resampling."""
-        return Estimate(self.value - other.value, self.resampled - other.resampled)
-
-    def mean(self, axis: int | tuple[int, ...]) -> Estimate:
-        """The mean along axes of ``value``, counted from the first."""
-        return Estimate(self.value.mean(axis), self.resampled.mean(axis))
-
-    def interval(self) -> Interval:
-        """The value with its 95 % interval, of a single number.
-
-        The ends are NaN where some resample has no value: then nothing limits it.
-        """
-        return percentile_interval(float(self.value), self.resampled)
-
-
-def retention(faulty: Array, clean: Array, weights: Array) -> Estimate:
+def retention(faulty: Array, clean: Array, weights: Array) -> Resampled:
     """Rescues with a fault over rescues without.
 
     Args:
@@ -66,10 +32,10 @@ def retention(faulty: Array, clean: Array, weights: Array) -> Estimate:
     with np.errstate(invalid="ignore", divide="ignore"):
         value = np.where(below > 0.0, above.sum(-1) / below, np.nan)
         ratio = (above @ weights.T) / below_resampled
-    return Estimate(value, np.where(below_resampled > 0.0, ratio, np.nan))
+    return Resampled(value, np.where(below_resampled > 0.0, ratio, np.nan))
 
 
-def area(kept: Estimate, severities: Array, axis: int) -> Estimate:
+def area(kept: Resampled, severities: Array, axis: int) -> Resampled:
     """Mean retention over severities from 0 to the last: the area under the curve by trapezoids.
 
     Args:
@@ -84,4 +50,4 @@ def area(kept: Estimate, severities: Array, axis: int) -> Estimate:
         curve = np.concatenate([np.ones((*values.shape[:-1], 1)), values], -1)
         return np.asarray(np.trapezoid(curve, x, axis=-1) / x[-1])
 
-    return Estimate(under(kept.value), under(kept.resampled))
+    return Resampled(under(kept.value), under(kept.resampled))

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from innerattn.measures.faults.label_shuffle import shuffled_labels
 from innerattn.measures.faults.shift_results import CURVE_STEPS, ByHead, Shift
+from innerattn.stats import Estimate
 from innerattn.stats.auc import Comparison, areas, compare
-from innerattn.stats.intervals import Interval, percentile_interval
+from innerattn.stats.resampling import percentile_interval
 
 
 class PairedRollouts(NamedTuple):
@@ -174,12 +175,12 @@ def _received(
     return columns
 
 
-def _curve(values: NDArray[np.float64], draws: NDArray[np.float64]) -> tuple[Interval | None, ...]:
+def _curve(values: NDArray[np.float64], draws: NDArray[np.float64]) -> tuple[Estimate | None, ...]:
     """The mean over the episodes that go on, step by step of (E, t); None where none does."""
     return tuple(None if np.isnan(step).all() else _mean(step, draws) for step in values.T)
 
 
-def _mean(values: NDArray[np.float64], draws: NDArray[np.float64]) -> Interval:
+def _mean(values: NDArray[np.float64], draws: NDArray[np.float64]) -> Estimate:
     """The mean over episodes (E,), NaN left out; so are resamples without any other value."""
     defined = ~np.isnan(values)
     counts = draws[:, defined].sum(1)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
-from innerattn.stats.intervals import Interval
+from innerattn.stats import Estimate
+from innerattn.stats.estimate import as_json
 
 SCHEMA_VERSION = 1
 
@@ -17,8 +18,8 @@ CURVE_STEPS = 8
 class ByHead:
     """A figure of the weights averaged over heads, and of each head's own."""
 
-    mean: Interval
-    heads: tuple[Interval, ...]
+    mean: Estimate
+    heads: tuple[Estimate, ...]
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,11 @@ class Shift:
     after: ByHead
     change: ByHead
     effect: ByHead
-    curve: tuple[Interval | None, ...]
-    effect_curve: tuple[Interval | None, ...]
-    shuffled: Interval
+    curve: tuple[Estimate | None, ...]
+    effect_curve: tuple[Estimate | None, ...]
+    shuffled: Estimate
     p_value: float
-    auc: Interval
+    auc: Estimate
 
 
 @dataclass(frozen=True)
@@ -108,4 +109,4 @@ class FaultAttention:
 
     def to_json(self) -> dict[str, Any]:
         """A document of plain values."""
-        return {"schema_version": SCHEMA_VERSION, **asdict(self)}
+        return {"schema_version": SCHEMA_VERSION, **as_json(self)}

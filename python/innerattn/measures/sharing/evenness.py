@@ -7,7 +7,7 @@ equivalence test and an interval over whole episodes or runs can show either.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -17,13 +17,11 @@ from scipy.stats import chisquare
 
 from innerattn.measures.cooperation import shared_abilities
 from innerattn.records.record import Record
+from innerattn.stats import Estimate
 from innerattn.stats.clusters import share_of
-from innerattn.stats.intervals import (
-    Interval,
-    percentile_interval,
-    resampled_means,
-    student_interval,
-)
+from innerattn.stats.estimate import as_json
+from innerattn.stats.intervals import student_interval
+from innerattn.stats.resampling import percentile_interval, resampled_means
 
 MARGIN = (0.4, 0.6)
 """Shares between which sharing counts as even, 0.5 ± 0.1."""
@@ -65,14 +63,14 @@ class Evenness:
     rescues: tuple[int, int]
     episodes: int
     chi_squared: ChiSquared | None
-    share: Interval | None
+    share: Estimate | None
     interval_90: tuple[float, float] | None
     equivalence_p: float | None
     verdict: Verdict
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Any:
         """As a JSON object, intervals as mean, low and high."""
-        return asdict(self)
+        return as_json(self)
 
 
 @dataclass(frozen=True)
@@ -102,15 +100,15 @@ class EvennessOfRuns:
     verdicts: dict[Verdict, int]
     rescues: tuple[int, int]
     chi_squared: ChiSquared | None
-    share: Interval | None
+    share: Estimate | None
     interval_90: tuple[float, float] | None
     equivalence_p: float | None
-    pooled_share: Interval | None
+    pooled_share: Estimate | None
     verdict: Verdict
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Any:
         """As a JSON object, intervals as mean, low and high."""
-        return asdict(self)
+        return as_json(self)
 
 
 def counts_by_episode(record: Record) -> dict[str, NDArray[np.int64]]:
@@ -154,7 +152,7 @@ def evenness(counts: ArrayLike) -> Evenness:
         rescues=(first, second),
         episodes=len(by_episode),
         chi_squared=_chi_squared(first, second),
-        share=Interval(share.value, *outer),
+        share=Estimate(share.value, *outer),
         interval_90=inner,
         equivalence_p=max(share.p_above(MARGIN[0]), share.p_below(MARGIN[1])),
         verdict=_verdict(inner, outer),
@@ -217,7 +215,7 @@ def _verdict(inner: tuple[float, float], outer: tuple[float, float]) -> Verdict:
 
 def _over_runs(
     shares: list[float],
-) -> tuple[Interval | None, tuple[float, float] | None, float | None]:
+) -> tuple[Estimate | None, tuple[float, float] | None, float | None]:
     """Student's 95 % and 90 % intervals and the equivalence test of the runs' shares."""
     if len(set(shares)) < 2:
         return None, None, None
@@ -229,7 +227,7 @@ def _over_runs(
     return outer, (mean - half, mean + half), float(stdtr(dof, -nearer / error))
 
 
-def _pooled(runs: list[NDArray[np.int64]], seed: int) -> Interval | None:
+def _pooled(runs: list[NDArray[np.int64]], seed: int) -> Estimate | None:
     """The share in all rescues, by a bootstrap of runs and of the episodes of each drawn."""
     total = np.sum([run.sum(0) for run in runs], 0)
     if not total.sum():

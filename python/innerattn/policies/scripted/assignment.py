@@ -12,7 +12,6 @@ from math import perm
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from innerattn.config import Scenario
 
@@ -140,6 +139,8 @@ def _plans(robots: int, slots: int) -> tuple[NDArray[np.float64], NDArray[np.int
 
 
 def _one_by_one(costs: NDArray[np.float64]) -> NDArray[np.int64]:
+    from scipy.optimize import linear_sum_assignment  # takes longer to import than all else here
+
     chosen = np.full(costs.shape[:2], -1, np.int64)
     for row, cost in zip(chosen, costs, strict=True):
         robots, slots = linear_sum_assignment(cost)

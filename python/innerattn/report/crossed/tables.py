@@ -101,7 +101,7 @@ def runs_csv(situations: Sequence[Situation], named: dict[str, str]) -> str:
         [
             *(situation.name, run.arm.method, run.arm.credit, run.arm.penalty, run.arm.shared),
             *(run.seed, *(getattr(run.outcome, name) for name in names)),
-            *(named[str(run.folder)], run.digests.config, run.digests.weights),
+            *(named[str(run.run.folder)], run.run.config_sha256, run.run.weights_sha256),
         ]
         for situation in situations
         for run in situation.runs

@@ -12,8 +12,7 @@ from innerattn.config.files import write_whole
 from innerattn.experiments.crossed.claims import idle_seeds
 from innerattn.experiments.crossed.outcome import OUTCOMES
 from innerattn.experiments.crossed.study import Situation, read_situations
-from innerattn.experiments.run import named_from
-from innerattn.experiments.scan import FinishedRun
+from innerattn.experiments.run import FinishedRun, named_from
 from innerattn.experiments.smoke import smoke_note
 from innerattn.report.crossed.figures import arm_panels, seed_panels
 from innerattn.report.crossed.page import crossed_page, crossed_tables
@@ -22,6 +21,7 @@ from innerattn.report.plots.arms import draw_arms
 from innerattn.report.plots.drawing import check_format, write_figure
 from innerattn.report.plots.seeds import draw_seeds
 from innerattn.report.smoke import mark_figure, noted_csv, noted_markdown
+from innerattn.stats.estimate import as_json
 
 SCHEMA_VERSION = 2
 
@@ -49,9 +49,8 @@ def write_crossed(
         What the report says, by situation.
 
     Raises:
-        RunError: a run's evaluation is missing or is not one of two food robots; or matplotlib is
-            not installed.
-        ConfigError: a configuration cannot be read.
+        RunError: records cannot be read, a run's team has not two food robots, or matplotlib is not
+            installed.
         OSError: a file cannot be written; each is written whole or not at all.
     """
     check_format(out / "crossed.png")
@@ -94,27 +93,27 @@ def _situation(situation: Situation, out: Path) -> dict[str, Any]:
     return {
         "situation": situation.name,
         "answers": [asdict(answer) for answer in situation.answers],
-        "seeds": [asdict(one) for one in situation.seeds],
+        "seeds": as_json(situation.seeds),
         "arms": [
             {
                 **asdict(arm),
                 "method": arm.method,
                 "runs": len(outcomes[arm]),
                 "idle": idle_seeds(outcomes, [arm])[0],
-                "mean": {name: asdict(mean) if mean else None for name, mean in means.items()},
+                "mean": as_json(means),
             }
             for arm, means in situation.means.items()
         ],
-        "effects": [asdict(effect) for effect in situation.effects],
+        "effects": as_json(situation.effects),
         "runs": [
             {
                 **asdict(run.arm),
                 "method": run.arm.method,
                 "seed": run.seed,
-                "folder": named_from(run.folder, out),
+                "folder": named_from(run.run.folder, out),
                 **asdict(run.outcome),
-                "config_sha256": run.digests.config,
-                "weights_sha256": run.digests.weights,
+                "config_sha256": run.run.config_sha256,
+                "weights_sha256": run.run.weights_sha256,
             }
             for run in situation.runs
         ],

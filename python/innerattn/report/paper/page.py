@@ -16,7 +16,7 @@ from innerattn.experiments.paper.pairs import pairs, together
 from innerattn.experiments.paper.scene import SCENE_RULE, HandoffScene
 from innerattn.experiments.paper.sharing_claims import sharing_claims
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION, Table2
-from innerattn.experiments.run import Digests, StudyRun, named_from
+from innerattn.experiments.run import FinishedRun, named_from
 from innerattn.report.paper.table2 import markdown_table, table2_markdown
 from innerattn.stats.text import NONE, fixed, p_shown, shown
 
@@ -29,9 +29,6 @@ class Findings:
         budget: name of the budget of training.
         folder: where the report lies.
         runs: all runs, by situation and method, then seed.
-        digests: of each run.
-        env_steps: how long each run was trained.
-        worlds: seed of the worlds that each run was measured in.
         table: Table II.
         courses: Fig. 4.
         scene: the handoff that is shown as Fig. 5; None, too, where there is none to show.
@@ -41,10 +38,7 @@ class Findings:
 
     budget: str
     folder: Path
-    runs: tuple[StudyRun, ...]
-    digests: tuple[Digests, ...]
-    env_steps: tuple[int, ...]
-    worlds: tuple[int, ...]
+    runs: tuple[FinishedRun, ...]
     table: Table2 | None
     courses: tuple[EntropyCourse, ...] | None
     scene: HandoffScene | None
@@ -91,7 +85,7 @@ def _opening(findings: Findings) -> str:
 
 
 def _of_worlds(findings: Findings, seeds: int) -> str:
-    if len(set(findings.worlds)) >= seeds:
+    if len({run.config.evaluate.seed for run in findings.runs}) >= seeds:
         return ""
     return (
         "\n**Runs of different seeds were measured in the same worlds.** Chance of these worlds "
@@ -268,12 +262,12 @@ def _runs(findings: Findings) -> str:
     rows = [
         [
             *(run.situation, run.method, str(run.seed)),
-            *(f"`{named_from(run.folder, findings.folder)}`", f"{steps:,}"),
-            *(f"`{digest.config}`", f"`{digest.weights}`"),
+            f"`{named_from(run.folder, findings.folder)}`",
+            f"{run.config.train.env_steps:,}",
+            f"`{run.config_sha256}`",
+            f"`{run.weights_sha256}`" if run.weights_sha256 else NONE,
         ]
-        for run, digest, steps in zip(
-            findings.runs, findings.digests, findings.env_steps, strict=True
-        )
+        for run in findings.runs
     ]
     return markdown_table(head, rows)
 

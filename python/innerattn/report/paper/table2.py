@@ -11,7 +11,7 @@ from innerattn.experiments.paper.sharing_claims import share_shown, verdicts_sho
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import MARGIN, ChiSquared, Evenness, EvennessOfRuns
 from innerattn.policies import SCRIPTED
-from innerattn.stats.seeds import SeedEstimate
+from innerattn.stats import Estimate
 from innerattn.stats.text import NONE, fixed, p_shown, shown
 
 _CSV_COLUMNS = """
@@ -103,7 +103,7 @@ def _csv_line(
     ]
 
 
-def _sharing_table(rows: Sequence[Row], name: str, scores: dict[str, SeedEstimate | None]) -> str:
+def _sharing_table(rows: Sequence[Row], name: str, scores: dict[str, Estimate | None]) -> str:
     head = ["method", "task", "seeds", "rescues (first + second)", "share of the first [95 %]"]
     head += ["[90 %]", "p (TOST)", "verdict on the mean", "runs even / uneven / undecided"]
     head += ["share of all rescues [bootstrap]", "χ² (p)"]

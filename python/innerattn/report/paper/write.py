@@ -13,12 +13,10 @@ from innerattn.experiments.paper.fig5 import evidence, evidence_json
 from innerattn.experiments.paper.scene import HandoffScene, choose_scene, scene_json
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION, table2
 from innerattn.experiments.run import (
-    Measured,
-    StudyRun,
+    FinishedRun,
     by_method,
-    digests,
-    read_configs,
-    read_measured,
+    refuse_unlike,
+    refuse_without_steps,
 )
 from innerattn.experiments.smoke import smoke_note
 from innerattn.report.paper.fig4 import fig4_csv, fig4_lines
@@ -39,7 +37,7 @@ PARTS = ("table2", "fig4", "fig5")
 
 
 def write_report(
-    runs: Sequence[StudyRun],
+    runs: Sequence[FinishedRun],
     folder: Path,
     budget: str,
     parts: Collection[str] = PARTS,
@@ -50,7 +48,7 @@ def write_report(
     The same runs give the same bytes. The files are table2.json, .md and .csv; fig4.json, .csv,
     .pdf and .png; fig5.json, .pdf and .png, which show one handoff; and fig5_evidence.json, .pdf
     and .png. A figure that has nothing to show is not drawn, and removed where it was drawn before.
-    Small copies of runs (`kept.keep`) are enough for the table; what needs their steps is left out.
+    Archived runs are enough for the table; what needs their steps is left out.
 
     Args:
         runs: finished runs with evaluations; they are read only.
@@ -66,7 +64,6 @@ def write_report(
     Raises:
         RunError: runs are missing, unfinished, not what they are listed as, or cannot be compared;
             or matplotlib is not installed and a figure is to be drawn.
-        ConfigError: a configuration cannot be read.
         ValueError: a part is unknown.
         OSError: the files cannot be written; each is written whole or not at all.
     """
@@ -74,27 +71,19 @@ def write_report(
         raise ValueError(f"parts = {unknown}: known are {', '.join(PARTS)}")
     if {"fig4", "fig5"} & set(parts):
         check_format(folder / "fig4.png")
-    groups = by_method(runs)
-    ordered = [run for group in groups.values() for run in group]
-    configs = read_configs(ordered)
-    named = [digests(run.folder) for run in ordered]
-    measured: list[list[Measured]] = []
-    if {"table2", "fig5"} & set(parts):
-        steps = "fig5" in parts
-        measured = [
-            [read_measured(run, step_by_step=steps) for run in group] for group in groups.values()
-        ]
+    groups = list(by_method(runs).values())
+    ordered = tuple(run for group in groups for run in group)
+    refuse_unlike(ordered)
+    if "fig5" in parts:
+        refuse_without_steps(ordered)
     findings = Findings(
         budget=budget,
         folder=folder,
-        runs=tuple(ordered),
-        digests=tuple(named),
-        env_steps=tuple(config.train.env_steps for config in configs),
-        worlds=tuple(config.evaluate.seed for config in configs),
-        table=table2(measured) if "table2" in parts else None,
+        runs=ordered,
+        table=table2(groups) if "table2" in parts else None,
         courses=tuple(fig4(ordered)) if "fig4" in parts else None,
-        scene=_scene(measured) if "fig5" in parts else None,
-        evidence=tuple(filter(None, map(evidence, measured))) if "fig5" in parts else None,
+        scene=_scene(groups) if "fig5" in parts else None,
+        evidence=tuple(filter(None, map(evidence, groups))) if "fig5" in parts else None,
         left_out=tuple(left_out),
     )
     folder.mkdir(parents=True, exist_ok=True)
@@ -104,11 +93,11 @@ def write_report(
     return findings
 
 
-def _scene(groups: Sequence[Sequence[Measured]]) -> HandoffScene | None:
+def _scene(groups: Sequence[Sequence[FinishedRun]]) -> HandoffScene | None:
     """A handoff of TD with inner attention in the mixed situation, or of what comes nearest."""
 
-    def distance(group: Sequence[Measured]) -> tuple[bool, bool]:
-        run = group[0].run
+    def distance(group: Sequence[FinishedRun]) -> tuple[bool, bool]:
+        run = group[0]
         return run.situation != PRINTED_SITUATION, run.method != "td-inner"
 
     scenes = (choose_scene(group) for group in sorted(groups, key=distance))

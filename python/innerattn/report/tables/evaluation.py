@@ -14,7 +14,7 @@ from innerattn.report.tables.text import number, plus_minus
 
 if TYPE_CHECKING:
     from innerattn.config import Scenario
-    from innerattn.evaluate import Figures, Summary
+    from innerattn.evaluate import Performance, Summary
     from innerattn.experiments.score_means import SeedScores, TwoLengths
 
 _POLICIES = (
@@ -108,8 +108,8 @@ def _warm_start(summary: Summary) -> str:
     )
 
 
-def _scripted_cells(figures: Figures, name: str) -> tuple[str, str]:
-    return plus_minus(figures.scripted[name]), number(figures.script_score(name))
+def _scripted_cells(measured: Performance, name: str) -> tuple[str, str]:
+    return plus_minus(measured.scripted[name]), number(measured.script_score(name))
 
 
 def _cooperation(summary: Summary, scenario: Scenario) -> Table:

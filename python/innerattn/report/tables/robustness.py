@@ -11,7 +11,7 @@ from innerattn.report.table import Row, Table, columns, plain_table, print_table
 from innerattn.report.tables.text import mean_alone, number, percent, plus_minus
 
 if TYPE_CHECKING:
-    from innerattn.evaluate.bounds.figures import Bounds, Level
+    from innerattn.evaluate.bounds.results import Bounds, Level
     from innerattn.evaluate.faults.grid import Grid, Retention
     from innerattn.evaluate.faults.overview import Overview
     from innerattn.measures.faults.shift_results import FaultAttention

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import math
 
-from innerattn.stats.intervals import Interval
-from innerattn.stats.seeds import SeedEstimate
+from innerattn.stats import Estimate
 
 NONE = "-"
 """What stands where there is no value."""
 
 
-def plus_minus(estimate: Interval | SeedEstimate | None) -> str:
+def plus_minus(estimate: Estimate | None) -> str:
     """A mean and half its interval, as far as they are there."""
     if estimate is None or math.isnan(estimate.mean):
         return NONE
-    if estimate.low is None or estimate.high is None:
-        return f"{estimate.mean:.2f}"
-    if math.isnan(estimate.low):
-        return NONE
+    if not estimate.bounded:
+        return number(estimate.mean) if estimate.runs == 1 else NONE
     return f"{estimate.mean:.2f} ± {(estimate.high - estimate.low) / 2:.2f}"
 
 
-def mean_alone(estimate: Interval | SeedEstimate | None) -> str:
+def mean_alone(estimate: Estimate | None) -> str:
     """A mean without its interval."""
     return NONE if estimate is None else number(estimate.mean)
 

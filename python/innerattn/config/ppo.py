@@ -1,0 +1,79 @@
+"""On-policy learning ("ppo"): its numbers and what it registers."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from innerattn.config.files import PRESETS
+from innerattn.config.model import MOST_ROWS
+from innerattn.config.registry import Algorithm, AlgorithmConfig
+
+
+class PPOConfig(AlgorithmConfig):
+    """On-policy learning by proximal policy optimisation."""
+
+    place: ClassVar[str] = "ppo"
+
+    gae_lambda: float = Field(
+        0.9, ge=0.0, le=1.0, description="how far advantages look: 0 one step, 1 to the end"
+    )
+    learning_rate: float = Field(0.003, gt=0.0, le=1.0, description="step size of Adam")
+    final_learning_rate_share: float = Field(
+        0.1,
+        ge=0.0,
+        le=1.0,
+        description="share of the step size left at the end of training; it falls evenly",
+    )
+    rollout_steps: int = Field(
+        25, ge=1, le=MOST_ROWS, description="control steps of every world between updates [steps]"
+    )
+    epochs: int = Field(5, ge=1, le=1_000, description="passes over a rollout")
+    minibatch_size: int = Field(400, ge=1, le=MOST_ROWS, description="rows of a rollout per update")
+    clip: float = Field(0.2, gt=0.0, lt=1.0, description="how far a probability ratio counts")
+    value_clip: float | None = Field(
+        None, gt=0.0, description="how far a value may move per rollout; None: freely"
+    )
+    entropy_weight: float = Field(0.01, ge=0.0, description="weight of the policy's entropy")
+    stop_at_kl: float | None = Field(
+        None, gt=0.0, description="divergence that ends a rollout's epochs [nats]; None: none does"
+    )
+    advantage: Literal["counterfactual", "value"] = Field(
+        "counterfactual",
+        description="baseline: expectation of Q over the own action, or a value head; mappo needs "
+        "the latter",
+    )
+    attention_logit_penalty: float = Field(
+        0.0, ge=0.0, description="weight of the squared attention logits in the critic's loss"
+    )
+    critic_weight_decay: float = Field(0.0, ge=0.0, description="L2 penalty of the critic's Adam")
+    critic_grad_clip: float = Field(40.0, gt=0.0, description="largest norm of critic gradients")
+    actor_grad_clip: float = Field(0.5, gt=0.0, description="largest norm of an actor's gradients")
+    return_deviation_floor: float = Field(
+        1e-2, gt=0.0, description="least deviation of returns that rewards are divided by"
+    )
+
+    @property
+    def rows_per_update(self) -> int:
+        """Rows of a minibatch."""
+        return self.minibatch_size
+
+    def rows_of_training(self, env_steps: int) -> int:
+        """Rows of all passes over all rollouts."""
+        return env_steps * self.epochs
+
+
+PPO = Algorithm(
+    config=PPOConfig,
+    learner="innerattn.learn.ppo:PPO",
+    attends=True,
+    methods={
+        "mappo": {
+            "network": {"attention": "none", "mask_unavailable": False, "encoder": "flat"},
+            "ppo": {"advantage": "value"},
+        }
+    },
+    budgets=PRESETS / "budgets" / "ppo",
+    warm_budgets=PRESETS / "budgets" / "ppo-warm",
+)

@@ -1,0 +1,149 @@
+"""Sections of a run's configuration that every algorithm shares.
+
+Ranges of these sections live here; those of a scenario live in the compiled module.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from innerattn.config.model import MOST_ROWS, MOST_STEPS, Model, OneOf
+from innerattn.config.registry import attentions, methods, register_attention
+
+register_attention("inner", "innerattn.nn:InnerAttention")
+register_attention("uniform", "innerattn.nn:UniformAttention")
+
+Method = Annotated[str, OneOf(methods)]
+Attention = Annotated[str, OneOf(lambda: (*attentions(), "none"))]
+WarmStart = Literal["none", "hungarian", "greedy"]
+
+
+class NetworkConfig(Model):
+    """Sizes and kind of the networks."""
+
+    place: ClassVar[str] = "network"
+
+    hidden_width: int = Field(128, ge=1, le=4096, description="width of encodings and layers")
+    attention_heads: int = Field(4, ge=1, le=64, description="attention heads of the critic")
+    attention: Attention = Field(
+        "inner",
+        description="learnt, fixed at 1/(N-1), or none; follows from the method",
+    )
+    mask_unavailable: bool = Field(
+        False, description="keep unavailable teammates out of the attention"
+    )
+    encoder: Literal["flat", "entities"] = Field(
+        "flat",
+        description="first layer of actors and critic: of whole observations, or of teammates and "
+        "victims apart, whatever their order; mappo needs the former",
+    )
+    parameter_sharing: Literal["none", "kind"] = Field(
+        "none",
+        description="none: actors, encoders and critics are each robot's own; kind: robots of a "
+        "kind have the same, but for a critic without attention",
+    )
+    precision: Literal["float32", "bfloat16"] = Field(
+        "float32", description="of the products in an update; weights are float32 in any case"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.hidden_width % self.attention_heads:
+            raise ValueError(
+                f"network.hidden_width = {self.hidden_width}: must be a multiple of "
+                f"network.attention_heads = {self.attention_heads}"
+            )
+        return self
+
+
+class ImitationConfig(Model):
+    """How a warm start imitates a scripted policy, before anything is learnt from rewards."""
+
+    place: ClassVar[str] = "imitation"
+
+    env_steps: int = Field(
+        750_000,
+        ge=1,
+        le=MOST_STEPS,
+        description="length of imitation, all worlds counted [env-steps]",
+    )
+    critic_env_steps: int = Field(
+        100_000,
+        ge=0,
+        le=MOST_STEPS,
+        description="last part of it in which the critic learns too [env-steps]",
+    )
+    batch_size: int = Field(
+        1_024, ge=1, le=MOST_ROWS, description="labelled states per step of the actors"
+    )
+    update_every_env_steps: int = Field(
+        256, ge=1, le=MOST_STEPS, description="one step of the actors per so many steps [env-steps]"
+    )
+    learning_rate: float = Field(0.002, gt=0.0, le=1.0, description="step size of Adam")
+    final_learning_rate_share: float = Field(
+        0.02,
+        ge=0.0,
+        le=1.0,
+        description="share of the step size left at the end of imitation; it falls evenly",
+    )
+    memory_env_steps: int = Field(
+        500_000,
+        ge=1,
+        le=MOST_ROWS,
+        description="newest labelled states that batches are drawn from [env-steps]",
+    )
+
+
+class TrainConfig(Model):
+    """How long to train, where, and how often to log."""
+
+    place: ClassVar[str] = "train"
+
+    method: Method = Field("td-inner", description="learning algorithm and kind of critic")
+    warm_start: WarmStart = Field(
+        "none", description="scripted policy to imitate before learning from rewards"
+    )
+    seed: int = Field(0, ge=0, lt=2**63, description="seed of everything random")
+    device: str = Field("cpu", description="where networks run: cpu, cuda, cuda:0, ...")
+    threads: int | None = Field(
+        None,
+        ge=1,
+        le=256,
+        description="threads of worlds and networks; None: as many as are worth it",
+    )
+    compile: Literal["auto", "on", "off"] = Field(
+        "auto", description="compile the update before training; auto: where the run is long enough"
+    )
+    num_envs: int = Field(64, ge=1, le=1_000_000, description="worlds stepped side by side")
+    env_steps: int = Field(
+        150_000,
+        ge=1,
+        le=MOST_STEPS,
+        description="length of learning from rewards, all worlds counted [env-steps]",
+    )
+    log_every_env_steps: int = Field(
+        5_000, ge=1, le=MOST_STEPS, description="one line of metrics per so many steps [env-steps]"
+    )
+
+
+class EvaluateConfig(Model):
+    """How a policy is measured."""
+
+    place: ClassVar[str] = "evaluate"
+
+    episodes: int = Field(
+        80, ge=1, le=1_000_000, description="episodes that cooperation is counted over"
+    )
+    score_episodes: int = Field(
+        1_000, ge=2, le=1_000_000, description="episodes that rescues are averaged over"
+    )
+    long_episodes: int = Field(200, ge=2, le=1_000_000, description="episodes of the second length")
+    long_episode_steps: int = Field(
+        100, ge=1, le=100_000, description="second episode length [control steps]"
+    )
+    greedy_actions: bool = Field(
+        True, description="take the likeliest action instead of drawing one"
+    )
+    seed: int = Field(12_345, ge=0, lt=2**63, description="seed of the evaluation's worlds")

@@ -1,0 +1,105 @@
+"""All measures by name. A new one is a file of its own and one entry in `_BUILT_IN`.
+
+Whatever is registered is computed in every evaluation, stored with it and shown in its tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import takewhile
+
+import numpy as np
+
+from innerattn.measures import dispatch_quality, rescues, waiting
+from innerattn.measures.measure import Measure, Value
+from innerattn.measures.sharing import imbalance
+from innerattn.records.record import Record
+
+MEASURES: dict[str, Measure] = {}
+"""The registered measures by name, in the order of tables; `register` adds one."""
+
+_BUILT_IN = (
+    rescues.RESCUES_PER_EPISODE,
+    imbalance.IMBALANCE,
+    *dispatch_quality.MEASURES,
+    *waiting.MEASURES,
+)
+
+
+def register(measure: Measure) -> Measure:
+    """Add a measure to `MEASURES`.
+
+    Raises:
+        ValueError: there is another one of its name.
+    """
+    if measure.name in MEASURES:
+        raise ValueError(f"measure {measure.name!r}: is registered already")
+    MEASURES[measure.name] = measure
+    return measure
+
+
+def needed_fields() -> tuple[str, ...]:
+    """What must be recorded step by step so that every measure can be computed."""
+    return tuple(dict.fromkeys(name for measure in MEASURES.values() for name in measure.needs))
+
+
+def measures_of(*parts: Record) -> dict[str, Value]:
+    """All measures of one policy's episodes.
+
+    A measure is computed over all episodes that have what it needs: with only the first 80 of 400
+    episodes recorded step by step, waiting times are of those 80 and rescues of all 400.
+
+    Args:
+        parts: consecutive episodes of one policy in worlds of one scenario, seed and length, in
+            order; at least one record.
+
+    Returns:
+        By the names of `MEASURES`; None where no part has what a measure needs, or the episodes do
+        not determine it.
+
+    Raises:
+        ValueError: the parts are not consecutive episodes of one policy.
+    """
+    _refuse_gaps(parts)
+    whole: dict[tuple[str, ...], Record | None] = {}
+    values: dict[str, Value] = {}
+    for name, measure in MEASURES.items():
+        if measure.needs not in whole:
+            whole[measure.needs] = _with_fields(parts, measure.needs)
+        record = whole[measure.needs]
+        values[name] = None if record is None else measure.of(record)
+    return values
+
+
+def _refuse_gaps(parts: Sequence[Record]) -> None:
+    if not parts:
+        raise ValueError("parts: there must be at least one record")
+    first = parts[0]
+    episode = first.first_episode
+    for part in parts:
+        same = (part.policy, part.seed) == (first.policy, first.seed)
+        if not same or part.scenario != first.scenario or part.first_episode != episode:
+            raise ValueError(
+                f"parts: episodes from {part.first_episode} of {part.policy!r}, seed {part.seed}, "
+                f"do not follow those of {first.policy!r}, seed {first.seed}, up to {episode}"
+            )
+        episode += part.num_episodes
+
+
+def _with_fields(parts: Sequence[Record], fields: tuple[str, ...]) -> Record | None:
+    """One record of the first parts that have some fields step by step, with these alone."""
+    having = list(takewhile(lambda part: all(name in part.steps for name in fields), parts))
+    if not having:
+        return None
+    return replace(
+        having[0],
+        lengths=np.concatenate([part.lengths for part in having]),
+        rescues=np.concatenate([part.rescues for part in having]),
+        rewards_total=np.concatenate([part.rewards_total for part in having]),
+        steps={name: np.concatenate([part.steps[name] for part in having]) for name in fields},
+    )
+
+
+for _measure in _BUILT_IN:
+    register(_measure)

@@ -1,0 +1,47 @@
+//! `_core.Rules`: a valid scenario as a Python object. Making one is the only way to check a scenario.
+
+use std::sync::Arc;
+
+use innerattn_env::rules::Rules as Shared;
+use pyo3::prelude::*;
+
+use crate::value_error;
+
+/// A scenario that was found valid, made ready to play.
+#[pyclass(frozen, module = "innerattn._core")]
+pub struct Rules(pub Arc<Shared>);
+
+#[pymethods]
+impl Rules {
+    #[new]
+    fn new(py: Python, json: &str) -> PyResult<Self> {
+        let rules = py.detach(|| Shared::from_json(json)).map_err(|error| value_error(&error))?;
+        Ok(Self(Arc::new(rules)))
+    }
+
+    fn to_json(&self) -> String {
+        self.0.scenario.to_json()
+    }
+
+    #[getter]
+    fn num_victims(&self) -> usize {
+        self.0.scenario.num_victims()
+    }
+
+    fn __eq__(&self, other: &Bound<PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| self.0.scenario == other.get().0.scenario)
+    }
+
+    /// Nothing in it can change: a copy is the same object.
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<PyAny>) -> Py<Self> {
+        slf
+    }
+
+    fn __getnewargs__(&self) -> (String,) {
+        (self.to_json(),)
+    }
+}

@@ -1,0 +1,152 @@
+//! What appears where: obstacles and robots when an episode starts, victims when the situation wants them.
+//! Everything is drawn from the streams given, in a fixed order.
+
+use crate::geometry::{Solid, Vec2};
+use crate::place::{Placed, Placing};
+use crate::rng::{Purpose, Stream};
+use crate::robot::Body;
+use crate::scenario::{Scenario, Situation};
+use crate::task::Victim;
+
+/// Episodes that are tried before a scenario is found to have room for everything.
+const TRIALS: u64 = 64;
+
+/// What had to be placed too near to something else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Crowded {
+    /// Obstacles at random places.
+    Obstacles,
+    /// Robots.
+    Robots,
+    /// Victims.
+    Victims,
+}
+
+/// Everything about appearing that a scenario fixes.
+#[derive(Debug, Clone)]
+pub struct Spawn {
+    placing: Placing,
+    team: Vec<Body>,
+    solids: Vec<Solid>,
+    /// Given places of the obstacles, m; none for those that stand elsewhere in each episode.
+    given: Vec<Option<Vec2>>,
+    situation: Situation,
+    num_tasks: usize,
+    num_slots: usize,
+}
+
+impl Spawn {
+    /// What appears in the worlds of a valid scenario.
+    #[must_use]
+    pub(crate) fn new(scenario: &Scenario, team: &[Body], solids: &[Solid]) -> Self {
+        let given = |place: [f64; 2]| Vec2::new(place[0] as f32, place[1] as f32);
+        Self {
+            placing: Placing::new(scenario),
+            team: team.to_vec(),
+            solids: solids.to_vec(),
+            given: scenario.obstacles.iter().map(|obstacle| obstacle.position_m.map(given)).collect(),
+            situation: scenario.situation,
+            num_tasks: scenario.tasks.len(),
+            num_slots: scenario.num_victims(),
+        }
+    }
+
+    /// Writes the obstacles' places, those given first. Returns whether all are clear of each other.
+    pub fn place_obstacles(&self, stream: &mut Stream, obstacles: &mut [Vec2]) -> bool {
+        let mut clear = true;
+        let given = self.solids.iter().zip(&self.given);
+        let mut placed: Vec<Placed> = Vec::with_capacity(self.solids.len());
+        placed.extend(given.filter_map(|(solid, at)| at.map(|at| (solid, at))));
+        for ((solid, given), obstacle) in self.solids.iter().zip(&self.given).zip(obstacles) {
+            *obstacle = given.unwrap_or_else(|| {
+                let place = self.placing.obstacle(stream, solid, &placed);
+                clear &= place.clear;
+                placed.push((solid, place.at));
+                place.at
+            });
+        }
+        clear
+    }
+
+    /// Writes the robots' places. Returns whether none overlaps anything.
+    pub fn place_robots(&self, stream: &mut Stream, obstacles: &[Vec2], robots: &mut [Vec2]) -> bool {
+        let mut clear = true;
+        let solids = self.placed(obstacles);
+        let mut others = Vec::with_capacity(self.team.len());
+        for (body, robot) in self.team.iter().zip(robots) {
+            let place = self.placing.robot(stream, body, &others, &solids);
+            clear &= place.clear;
+            others.push((body, place.at));
+            *robot = place.at;
+        }
+        clear
+    }
+
+    /// Whether the situation wants victims to appear in these slots now.
+    #[must_use]
+    pub fn wants_victims(&self, slots: &[Option<Victim>]) -> bool {
+        match self.situation {
+            Situation::Single | Situation::Double => slots.iter().any(Option::is_none),
+            Situation::Mixed => slots.iter().all(Option::is_none),
+        }
+    }
+
+    /// Lets victims appear at `step` in the empty slots that the situation wants to be filled, and counts
+    /// them in `appeared`. Returns whether all found a clear place.
+    pub fn place_victims(
+        &self,
+        stream: &mut Stream,
+        step: u32,
+        appeared: &mut u32,
+        robots: &[Vec2],
+        obstacles: &[Vec2],
+        slots: &mut [Option<Victim>],
+    ) -> bool {
+        let mut clear = true;
+        let solids = self.placed(obstacles);
+        let wanted = match self.situation {
+            Situation::Single | Situation::Double => slots.len(),
+            Situation::Mixed => 1 + stream.below(slots.len()),
+        };
+        for (index, slot) in slots.iter_mut().enumerate().take(wanted) {
+            if slot.is_some() {
+                continue;
+            }
+            let task = match self.situation {
+                Situation::Double => index,
+                Situation::Single | Situation::Mixed => stream.below(self.num_tasks),
+            };
+            let place = self.placing.victim(stream, robots, &solids);
+            clear &= place.clear;
+            *slot =
+                Some(Victim { id: *appeared, task: task as u32, appeared_step: step, position: place.at });
+            *appeared += 1;
+        }
+        clear
+    }
+
+    /// What does not fit into the arena in some of 64 trial episodes, if anything.
+    #[must_use]
+    pub fn find_crowding(&self) -> Option<Crowded> {
+        let mut obstacles = vec![Vec2::zeros(); self.solids.len()];
+        let mut robots = vec![Vec2::zeros(); self.team.len()];
+        (0..TRIALS).find_map(|episode| {
+            let mut start = Stream::new(0, 0, episode, Purpose::Start);
+            let mut victims = Stream::new(0, 0, episode, Purpose::Victims);
+            let mut slots = vec![None; self.num_slots];
+            if !self.place_obstacles(&mut start, &mut obstacles) {
+                Some(Crowded::Obstacles)
+            } else if !self.place_robots(&mut start, &obstacles, &mut robots) {
+                Some(Crowded::Robots)
+            } else if !self.place_victims(&mut victims, 0, &mut 0, &robots, &obstacles, &mut slots) {
+                Some(Crowded::Victims)
+            } else {
+                None
+            }
+        })
+    }
+
+    fn placed<'a>(&'a self, obstacles: &[Vec2]) -> Vec<Placed<'a>> {
+        self.solids.iter().zip(obstacles.iter().copied()).collect()
+    }
+}

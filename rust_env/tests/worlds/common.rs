@@ -1,0 +1,174 @@
+//! What the integration tests share: a batch with the buffers that its steps write, teams and scenes.
+#![allow(dead_code)] // each test program uses a part
+
+use innerattn_env::batch::{Autoreset, Batch, Options, StepBuffers};
+use innerattn_env::error::Result;
+use innerattn_env::fault::{Fault, KINDS, Kind};
+use innerattn_env::reward::{COMPONENTS, NUM_COMPONENTS};
+use innerattn_env::rng::{Purpose, Stream};
+use innerattn_env::robot::Commands;
+use innerattn_env::rules::Rules;
+use innerattn_env::scenario::{Actions, Engine, Obstacle, Robot, Scenario, Shape};
+use innerattn_env::task::Rescue;
+
+/// Every engine: each must keep every promise.
+pub const ENGINES: [Engine; 2] = [Engine::Rapier, Engine::Discs];
+
+/// Options of a batch that nothing else in a test depends on.
+pub fn options(num_envs: usize, seed: u64) -> Options {
+    Options { num_envs, seed, num_threads: Some(1), first_env: 0, autoreset: Autoreset::SameStep }
+}
+
+/// A batch and everything that its last step wrote.
+pub struct Table {
+    pub batch: Batch,
+    pub obs: Vec<f32>,
+    pub final_obs: Vec<f32>,
+    pub reward: Vec<f32>,
+    pub components: Vec<f32>,
+    pub terminated: Vec<bool>,
+    pub truncated: Vec<bool>,
+    pub rescues: Vec<Rescue>,
+}
+
+impl Table {
+    pub fn new(scenario: Scenario, options: Options) -> Self {
+        let batch = Batch::new(Rules::new(scenario).expect("a valid scenario"), options).expect("a batch");
+        let rows = options.num_envs * batch.rules().team.len();
+        let width = batch.rules().layout.width();
+        let mut table = Self {
+            obs: vec![0.0; rows * width],
+            final_obs: vec![0.0; rows * width],
+            reward: vec![0.0; rows],
+            components: vec![0.0; rows * NUM_COMPONENTS],
+            terminated: vec![false; options.num_envs],
+            truncated: vec![false; options.num_envs],
+            rescues: vec![],
+            batch,
+        };
+        table.batch.reset(None, None, &mut table.obs);
+        table
+    }
+
+    pub fn try_step(&mut self, commands: Commands) -> Result<()> {
+        let buffers = StepBuffers {
+            obs: &mut self.obs,
+            final_obs: &mut self.final_obs,
+            reward: &mut self.reward,
+            components: &mut self.components,
+            terminated: &mut self.terminated,
+            truncated: &mut self.truncated,
+        };
+        self.rescues = self.batch.step(commands, buffers)?;
+        Ok(())
+    }
+
+    /// A step with actions of the scenario's kind, one row of `actions` for each env.
+    pub fn step(&mut self, actions: &[[f32; 2]]) {
+        let result = match self.batch.rules().scenario.actions {
+            Actions::Discrete => {
+                let actions: Vec<i64> = actions.iter().copied().map(nearest_action).collect();
+                self.try_step(Commands::Discrete(&actions))
+            }
+            Actions::Continuous => self.try_step(Commands::Continuous(actions.as_flattened())),
+        };
+        result.expect("valid actions");
+    }
+
+    /// Whether the robot of a row (env × R + robot) paid for a contact in the last step.
+    pub fn touched(&self, row: usize) -> bool {
+        let contact = COMPONENTS.iter().position(|component| component.name == "contact");
+        self.components[row * NUM_COMPONENTS + contact.expect("a component")] < 0.0
+    }
+
+    /// Everything that worlds `from..to` showed in the last step, as bits.
+    pub fn shown(&self, from: usize, to: usize) -> Vec<u32> {
+        let envs = self.terminated.len();
+        let part = |values: &[f32]| {
+            let row = values.len() / envs;
+            values[from * row..to * row].iter().map(|value| value.to_bits()).collect::<Vec<u32>>()
+        };
+        let mut bits: Vec<u32> = [&self.obs, &self.final_obs, &self.reward, &self.components]
+            .into_iter()
+            .flat_map(|v| part(v))
+            .collect();
+        bits.extend(
+            self.terminated[from..to].iter().chain(&self.truncated[from..to]).map(|flag| u32::from(*flag)),
+        );
+        for rescue in self.rescues.iter().filter(|rescue| (from..to).contains(&(rescue.env as usize))) {
+            bits.extend([rescue.env - from as u32, rescue.episode as u32, rescue.step, rescue.slot]);
+            bits.extend([rescue.victim, rescue.task]);
+            bits.extend(rescue.helpers.iter().map(|helper| helper.map_or(u32::MAX, u32::from)));
+        }
+        bits
+    }
+}
+
+/// The discrete action nearest to a drive.
+fn nearest_action([x, y]: [f32; 2]) -> i64 {
+    if x.abs().max(y.abs()) < 0.5 {
+        0
+    } else if x.abs() >= y.abs() {
+        if x > 0.0 { 1 } else { 2 }
+    } else if y > 0.0 {
+        3
+    } else {
+        4
+    }
+}
+
+/// A source of random test data.
+pub fn chance(seed: u64) -> Stream {
+    Stream::new(seed, u64::MAX, 0, Purpose::Start)
+}
+
+/// One of the five discrete drives.
+pub fn random_drive(chance: &mut Stream) -> [f32; 2] {
+    [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]][chance.below(5)]
+}
+
+/// `count` robots of unlike size, mass and speed, with the default team's abilities in turn.
+pub fn mixed_team(count: usize) -> Vec<Robot> {
+    let like = Scenario::default().robots;
+    (0..count)
+        .map(|index| Robot {
+            name: format!("robot_{index}"),
+            radius_m: [0.05, 0.04, 0.06, 0.08, 0.03][index % 5],
+            mass_kg: [1.0, 0.5, 2.0, 4.0, 0.25, 1.5, 0.5][index % 7],
+            max_speed_mps: [1.0, 1.5, 1.25][index % 3],
+            ..like[index % like.len()].clone()
+        })
+        .collect()
+}
+
+/// A disc at a random place, a box at a random place, and a box that stays.
+pub fn some_obstacles() -> Vec<Obstacle> {
+    let disc = |radius| Obstacle {
+        shape: Shape::Disc,
+        radius_m: Some(radius),
+        half_extents_m: None,
+        position_m: None,
+    };
+    let block =
+        |half, at| Obstacle { shape: Shape::Box, radius_m: None, half_extents_m: Some(half), position_m: at };
+    vec![disc(0.12), disc(0.06), block([0.1, 0.04], None), block([0.04, 0.25], Some([-0.3, 0.2]))]
+}
+
+/// A fault of the default kind of onset: there from the first step to the last.
+pub fn fault(robot: &str, kind: Kind, value: f64) -> Fault {
+    Fault { robot: robot.into(), kind, value, onset_step: 0, onset_rate_hz: None, duration_steps: None }
+}
+
+/// Faults of every kind for every robot, which come and go at random.
+pub fn coming_and_going(robots: &[Robot]) -> Vec<Fault> {
+    let each = |robot: &Robot| {
+        let name = robot.name.clone();
+        KINDS.map(move |kind| Fault {
+            onset_step: 2,
+            onset_rate_hz: Some(0.5),
+            duration_steps: Some(7),
+            ..fault(&name, kind, 0.4)
+        })
+    };
+    robots.iter().flat_map(each).collect()
+}

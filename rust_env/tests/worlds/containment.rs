@@ -1,0 +1,170 @@
+//! Robots stay where they can be: no play drives one out of the arena, through an obstacle or through
+//! another robot, and overlaps stay small beside a radius. Half a million env-steps for each engine;
+//! twenty times as many with `INNERATTN_SLOW=1`.
+
+use innerattn_env::batch::Options;
+use innerattn_env::geometry::{Solid, Vec2};
+use innerattn_env::rng::Stream;
+use innerattn_env::scenario::{Actions, Engine, Scenario};
+use innerattn_env::world::World;
+
+use crate::common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles};
+
+const ENVS: usize = 250;
+/// Largest overlap at a period's end as a share of the smaller radius: of all, and at the 99.9th percentile.
+const MOST: f32 = 0.05;
+const USUAL: f32 = 0.01;
+
+#[derive(Debug, Clone, Copy)]
+enum Play {
+    /// Random discrete actions.
+    Random,
+    /// Everyone into one corner.
+    Corner,
+    /// Pairs charge at each other from afar, again and again.
+    HeadOn,
+    /// Everyone after one robot, which flees into a corner.
+    Chase,
+}
+
+const PLAYS: [Play; 4] = [Play::Random, Play::Corner, Play::HeadOn, Play::Chase];
+
+impl Play {
+    fn drive(self, world: &World, robot: usize, chance: &mut Stream) -> [f32; 2] {
+        let own = world.positions[robot];
+        let robots = world.positions.len();
+        let phase = (world.step / 12) as usize;
+        let away = match self {
+            Self::Random => return random_drive(chance),
+            Self::Corner => Vec2::new(9.0, if world.stream.is_multiple_of(2) { 9.0 } else { 8.0 }) - own,
+            Self::HeadOn => {
+                let partner = world.positions[(robot ^ 1) % robots] - own;
+                if phase.is_multiple_of(2) { partner } else { -partner }
+            }
+            Self::Chase => {
+                let prey = (world.stream as usize + phase) % robots;
+                if prey == robot { own } else { world.positions[prey] - own }
+            }
+        };
+        let drive = away / away.norm().max(1e-6);
+        [drive.x, drive.y]
+    }
+}
+
+/// Overlaps of one world, each as a share of the smaller radius; `before` are the places one period ago.
+fn inspect(table: &Table, world: &World, before: Option<&[Vec2]>, overlaps: &mut Vec<f32>) {
+    let rules = table.batch.rules();
+    let arena = rules.scenario.arena_half_width_m as f32;
+    let mut worst = 0.0_f32;
+    for (index, (at, body)) in world.positions.iter().zip(&rules.team).enumerate() {
+        worst = worst.max((at.amax() + body.radius - arena) / body.radius);
+        for (other, from) in world.positions[..index].iter().zip(&rules.team) {
+            let overlap = body.radius + from.radius - (at - other).norm();
+            worst = worst.max(overlap / body.radius.min(from.radius));
+        }
+        for (solid, centre) in rules.solids.iter().zip(&world.obstacles) {
+            worst = worst.max((body.radius - solid.distance(at - centre)) / body.radius);
+        }
+    }
+    overlaps.push(worst);
+    let Some(before) = before else { return };
+    // Without forces nothing turns round something else within a period: whoever's straight line from
+    // start to end leads deep through something has gone through it.
+    for index in 0..before.len() {
+        let radius = rules.team[index].radius;
+        for other in 0..index {
+            let near = nearest_to_origin(
+                before[index] - before[other],
+                world.positions[index] - world.positions[other],
+            );
+            assert!(
+                near > 0.5 * (radius + rules.team[other].radius),
+                "robots {other} and {index} crossed: {world:?}"
+            );
+        }
+        for (solid, centre) in rules.solids.iter().zip(&world.obstacles) {
+            let (start, end) = (before[index] - centre, world.positions[index] - centre);
+            let inside = (0..=20).any(|part| {
+                let at = start.lerp(&end, part as f32 / 20.0);
+                match solid {
+                    Solid::Disc(reach) => at.norm() < 0.5 * reach,
+                    Solid::Box(half) => at.x.abs() < 0.5 * half.x && at.y.abs() < 0.5 * half.y,
+                }
+            });
+            assert!(!inside, "robot {index} crossed an obstacle: {world:?}");
+        }
+    }
+}
+
+fn nearest_to_origin(from: Vec2, to: Vec2) -> f32 {
+    let along = to - from;
+    let share = (-from.dot(&along) / along.norm_squared().max(1e-12)).clamp(0.0, 1.0);
+    (from + along * share).norm()
+}
+
+fn play(name: &str, engines: &[Engine], scenario: &Scenario, steps: usize) {
+    let slow = std::env::var("INNERATTN_SLOW").is_ok_and(|value| value == "1");
+    let steps = if slow { 20 * steps } else { steps };
+    for (engine, play) in engines.iter().flat_map(|engine| PLAYS.map(|play| (*engine, play))) {
+        let scenario = Scenario { engine, ..scenario.clone() };
+        let mut table = Table::new(scenario, Options { num_threads: Some(2), ..options(ENVS, 1) });
+        let mut chance = chance(2);
+        let mut overlaps = Vec::with_capacity(steps);
+        while overlaps.len() < steps {
+            let robots = 0..table.batch.rules().team.len();
+            let before: Vec<World> = table.batch.worlds().cloned().collect();
+            let drives =
+                |world| robots.clone().map(|robot| play.drive(world, robot, &mut chance)).collect::<Vec<_>>();
+            let actions: Vec<[f32; 2]> = before.iter().flat_map(drives).collect();
+            table.step(&actions);
+            for (world, before) in table.batch.worlds().zip(&before) {
+                let same = (world.episode == before.episode).then_some(&before.positions[..]);
+                inspect(&table, world, same, &mut overlaps);
+            }
+        }
+        overlaps.sort_unstable_by(f32::total_cmp);
+        let most = overlaps[overlaps.len() - 1];
+        let usual = overlaps[overlaps.len() * 999 / 1000];
+        println!(
+            "{name}, {engine:?}, {play:?}: overlap of a radius {:.2} % at p99.9, {:.2} % at most",
+            100.0 * usual,
+            100.0 * most
+        );
+        assert!(usual <= USUAL, "{name}, {engine:?}, {play:?}: p99.9 is {usual}");
+        assert!(most <= MOST, "{name}, {engine:?}, {play:?}: the most is {most}");
+    }
+}
+
+fn long_episodes() -> Scenario {
+    Scenario { actions: Actions::Continuous, episode_steps: 100, ..Scenario::default() }
+}
+
+#[test]
+fn the_default_team_stays_apart() {
+    play("default team", &ENGINES, &long_episodes(), 75_000);
+}
+
+#[test]
+fn obstacles_hold() {
+    play("obstacles", &ENGINES, &Scenario { obstacles: some_obstacles(), ..long_episodes() }, 40_000);
+}
+
+#[test]
+fn a_crowd_of_unlike_robots_stays_apart() {
+    let scenario = Scenario { robots: mixed_team(16), spawn_clearance_m: 0.1, ..long_episodes() };
+    play("sixteen", &ENGINES, &scenario, 12_500);
+}
+
+#[test]
+fn discs_hold_however_unlike_small_and_fast_the_robots() {
+    let mut robots = mixed_team(8);
+    for (index, robot) in robots.iter_mut().enumerate() {
+        (robot.mass_kg, robot.radius_m) = ([0.1, 10.0][index % 2], 0.02);
+        (robot.max_speed_mps, robot.drive_force_n) = (5.0, [20.0, 2000.0][index % 2]);
+    }
+    let scenario = Scenario { robots, spawn_clearance_m: 0.1, ..long_episodes() };
+    // Short periods: in a long one so fast a robot may be turned about by contact after contact, and
+    // the straight line from its start to its end says nothing.
+    let scenario = Scenario { dt_s: 0.005, damping: 0.1, ..scenario };
+    play("extreme", &[Engine::Discs], &scenario, 12_500);
+}

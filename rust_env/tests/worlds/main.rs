@@ -1,0 +1,13 @@
+//! What worlds promise, tested through the crate's public face. All in one program, so that the crate is
+//! linked once; `cargo test --test worlds contacts` runs the tests of one file.
+
+mod common;
+
+mod contacts;
+mod containment;
+mod determinism;
+mod engines;
+mod faults;
+mod snapshot;
+mod speed;
+mod structure;
