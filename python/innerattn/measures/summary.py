@@ -43,6 +43,13 @@ class Performance:
     scripted: dict[str, Estimate]
     measures: dict[str, dict[str, Value]] = field(default_factory=dict)
 
+    def script_score(self, name: str) -> float | None:
+        """The score of a scripted policy; None where the policy has none."""
+        if self.score is None:
+            return None
+        least, most = self.scripted["random"].mean, self.scripted["hungarian"].mean
+        return (self.scripted[name].mean - least) / (most - least)
+
 
 @dataclass(frozen=True)
 class Summary:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from innerattn.stats.estimate import Estimate
 
 NONE = "–"
@@ -28,3 +30,11 @@ def format_p(value: float | None) -> str:
     if value is None:
         return NONE
     return "< 0.001" if value < 0.001 else format_number(value, 3)
+
+
+def format_seeds(seeds: Sequence[int]) -> str:
+    """Seeds in their order; a whole range by its ends."""
+    ordered = sorted(seeds)
+    if len(ordered) > 2 and ordered[-1] - ordered[0] == len(ordered) - 1:
+        return f"{ordered[0]} to {ordered[-1]}"
+    return ", ".join(map(str, ordered))
