@@ -17,8 +17,7 @@ class PermutationTest(NamedTuple):
     """The result of a permutation test.
 
     Attributes:
-        p: two-sided, twice the smaller one-sided p-value and at most 1. Where permutations are
-            drawn, the observed one counts among them, so that p is never 0.
+        p: where permutations are drawn, the observed one counts among them, so that p is never 0.
         null: (B,) the statistic of each permutation.
     """
 
@@ -32,6 +31,7 @@ def permutation_test(
     kind: Literal["samples", "pairings"],
     seed: int,
     permutations: int,
+    alternative: Literal["two-sided", "greater"] = "two-sided",
 ) -> PermutationTest:
     """Compare a statistic with its values under permutation.
 
@@ -42,6 +42,8 @@ def permutation_test(
             where k is 1; "pairings" permutes the n observations of each sample.
         seed: seed of the permutations.
         permutations: how many to draw, B; where there are no more, all are taken instead.
+        alternative: "two-sided", with twice the smaller one-sided p-value and at most 1; or
+            "greater", with the share of permutations whose statistic is at least the observed one.
     """
     from scipy.stats import permutation_test as test
 
@@ -52,7 +54,7 @@ def permutation_test(
         vectorized=True,
         n_resamples=permutations,
         batch=max(1, _CHUNK // sum(map(len, samples))),
-        alternative="two-sided",
+        alternative=alternative,
         rng=seed,
     )
     return PermutationTest(float(result.pvalue), np.asarray(result.null_distribution))

@@ -173,9 +173,10 @@ def _merit(table: Table2) -> str:
         for one in imbalance_score_correlations(table.competence)
     ]
     return (
-        "Of a run's imbalance and its score, each less its method's mean: above 0 where uneven "
-        "runs score more. p is as if runs of one seed had nothing in common, and of each situation "
-        "by itself.\n\n" + markdown_table(head, rows)
+        "Of a run's imbalance and its score, each minus its method's mean: above 0 where "
+        "imbalanced runs score more. p is of a permutation test that exchanges whole seeds, since "
+        "runs of one seed are not independent, and of each situation by itself.\n\n"
+        + markdown_table(head, rows)
     )
 
 
