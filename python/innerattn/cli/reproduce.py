@@ -124,7 +124,8 @@ class Reproduce(Command):
         return make(methods, situations, range(self.seeds), self.budget, out)
 
     def _print_plan(self, console: Console, found: Sequence[RunStatus], out: Path) -> None:
-        from innerattn.experiments.train import places, to_measure, to_train
+        from innerattn.experiments.processes import places
+        from innerattn.experiments.train import to_measure, to_train
 
         states = Counter(one.state for one in found)
         train, measure = len(to_train(found)), len(to_measure(found))
