@@ -12,7 +12,7 @@ export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train test test-slow lint format bench lock docs setup clean
+.PHONY: train test test-pool test-slow lint format bench lock docs setup clean
 
 train: setup ## train TD-innerATT on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -21,7 +21,10 @@ test: setup lint ## every check but the long one
 	cargo test --quiet --locked
 	pytest -n auto --dist worksteal
 
-test-slow: setup ## the long checks: ten million env-steps of contacts, compilers at their slowest
+test-pool: ## the pool of threads under every order of events that the memory model allows
+	RUSTFLAGS='--cfg loom' cargo test --quiet --locked --target-dir target/loom -p innerattn-pool
+
+test-slow: setup test-pool ## the long checks: ten million env-steps of contacts, compilers at their slowest
 	INNERATTN_SLOW=1 cargo test --quiet --test worlds containment
 	pytest -m slow
 

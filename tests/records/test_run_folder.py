@@ -37,7 +37,7 @@ def test_keys_that_came_later_have_defaults() -> None:
         ({}, "not the record of a run"),
         ({**DOCUMENT, "unheard": 1}, "not the record of a run"),
         ({**DOCUMENT, "schema_version": 2}, "schema version 2, only 1 is known"),
-        ({**DOCUMENT, "state": "?"}, "state '?' is not one of"),
+        ({**DOCUMENT, "state": "?"}, "state '\\?' is not one of"),
     ],
 )
 def test_what_is_no_record_of_a_run_is_refused(document: object, message: str) -> None:
