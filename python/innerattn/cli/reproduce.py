@@ -74,6 +74,7 @@ class Reproduce(Command):
         from innerattn.experiments.account import write_account
         from innerattn.experiments.lock import StudyLock
         from innerattn.experiments.scan import finished_runs, scan_runs
+        from innerattn.experiments.score_means import method_scores
         from innerattn.report.outputs import make_outputs
         from innerattn.report.plots.drawing import check_format
 
@@ -101,7 +102,7 @@ class Reproduce(Command):
             runs = finished_runs(found)
             outputs = make_outputs(self.target, runs, out, self.budget, reasons)
             account = write_account(out, self.target, self.budget, found, outputs)
-        print_scores(console, found)
+        print_scores(console, method_scores(found))
         if reasons:
             console.print("Runs that are not in it", style="bold")
         for reason in reasons:

@@ -127,6 +127,8 @@ class _Train(_Sources):
         return 0
 
     def _train_several(self, console: Console, configs: Sequence[RunConfig]) -> int:
+        from innerattn.experiments.score_means import seed_scores
+
         stamp = _stamp()
         runs = [Run(config, self._folder_of_seed(config, stamp)) for config in configs]
         refuse_what_cannot_run(runs)
@@ -143,7 +145,7 @@ class _Train(_Sources):
             _say_what_is_kept([run.folder for run in runs])
             raise
         _say_if_nothing_was_learnt([run.folder for run in runs if run.state == "done"])
-        print_seeds(console, {run.config.train.seed: run.summary for run in runs})
+        print_seeds(console, seed_scores({run.config.train.seed: run.summary for run in runs}))
         console.print("Run folders", style="bold")
         for run in runs:
             console.print(f"  {run.folder} ({run.state})", soft_wrap=True)

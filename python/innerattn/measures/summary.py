@@ -17,8 +17,8 @@ from innerattn.measures.registry import measures_of
 from innerattn.policies import SCRIPTED
 from innerattn.records.record import Record
 from innerattn.stats import Estimate
+from innerattn.stats.bootstrap import mean_interval, score_interval
 from innerattn.stats.estimate import as_json
-from innerattn.stats.intervals import mean_interval, score_interval
 
 SCHEMA_VERSION = 1
 
@@ -42,6 +42,13 @@ class Performance:
     score: Estimate | None
     scripted: dict[str, Estimate]
     measures: dict[str, dict[str, Value]] = field(default_factory=dict)
+
+    def script_score(self, name: str) -> float | None:
+        """The score of a scripted policy; None where the policy has none."""
+        if self.score is None:
+            return None
+        least, most = self.scripted["random"].mean, self.scripted["hungarian"].mean
+        return (self.scripted[name].mean - least) / (most - least)
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from innerattn.experiments.run import FinishedRun
-from innerattn.report.crossed import write_crossed
+from innerattn.report.crossed.write import FILES as CROSSED_FILES
+from innerattn.report.crossed.write import write_crossed
 from innerattn.report.paper.write import PARTS, write_report
 
 _MADE = {
     "table2": ("table2.csv", "table2.json", "table2.md"),
     "fig4": ("fig4.csv", "fig4.json", "fig4.pdf", "fig4.png"),
     "fig5": tuple(f"fig5{part}.{x}" for part in ("", "_evidence") for x in ("json", "pdf", "png")),
-    "crossed": tuple(f"crossed.{kind}" for kind in ("csv", "json", "md", "pdf", "png")),
+    "crossed": CROSSED_FILES,
 }
 """The files of each target but the report."""
 

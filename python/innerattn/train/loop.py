@@ -16,8 +16,8 @@ import torch
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.learn.types import Learner, Transitions
-from innerattn.measures.attention import attention_entropy
 from innerattn.records.run_folder import State
+from innerattn.train.attention_log import AttentionLog
 from innerattn.train.build import (
     build_learner,
     keep_heap_small,
@@ -123,7 +123,7 @@ class _Loop:
         self._folder = folder
         self._learner = learner
         self._collector = collector
-        self._robot_names = robot_names
+        self._attention = AttentionLog(robot_names, config.scenario.episode_steps)
         self._progress = progress
         self._check_interrupted = check_interrupted
         self._file = MetricsFile(folder.path / "metrics.jsonl")
@@ -165,8 +165,9 @@ class _Loop:
             done += self._config.num_envs
             refuse_divergence({"losses": metrics or {}}, self._env_steps)
             self._interval.add_losses(metrics or {})
+            self._attention.add(newest.obs, newest.actions)
             if done >= total or before // every < self._env_steps // every:
-                self._log(newest)
+                self._log()
             if self._progress is not None:
                 self._progress(
                     Progress(
@@ -186,17 +187,12 @@ class _Loop:
         self._learner.set_progress(share)
         return transitions, self._learner.learn()
 
-    def _log(self, newest: Transitions) -> None:
-        weights = self._learner.attention(newest.obs, newest.actions)
-        entropy: dict[str, list[float]] = {}
-        if weights is not None:
-            rows = attention_entropy(weights.cpu().numpy()).tolist()
-            entropy = dict(zip(self._robot_names, rows, strict=True))
+    def _log(self) -> None:
         self._metrics = self._interval.close(
             self._env_steps,
             self._learner.updates,
             self._collector.take_tally(),
-            entropy,
+            self._attention.entropy(self._learner),
         )
         self._file.append(self._metrics)
         self._mark("running")

@@ -7,6 +7,7 @@ from rich.console import Console
 
 from innerattn.config import Scenario
 from innerattn.evaluate import Estimate, Performance, Summary
+from innerattn.experiments.score_means import seed_scores
 from innerattn.report.tables.evaluation import print_seeds, print_summary
 
 SCORE = Estimate(0.5, 0.4, 0.61)
@@ -57,7 +58,7 @@ def printed(found: Summary) -> list[list[str]]:
 def printed_seeds(found: dict[int, Summary | None]) -> list[list[str]]:
     """Cells by line."""
     out = io.StringIO()
-    print_seeds(Console(file=out, width=80, markup=False), found)
+    print_seeds(Console(file=out, width=80, markup=False), seed_scores(found))
     return cells(out.getvalue())
 
 

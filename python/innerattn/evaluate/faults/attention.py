@@ -29,7 +29,7 @@ from innerattn.measures.faults.shift import (
 )
 from innerattn.measures.faults.shift_results import FaultAttention, KindShift
 from innerattn.records.record import Record
-from innerattn.stats.resampling import resampled_counts
+from innerattn.stats.bootstrap import resampled_counts
 from innerattn.train.build import thread_count, torch_threads
 
 EPISODES = 100

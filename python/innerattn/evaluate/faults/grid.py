@@ -21,7 +21,7 @@ from innerattn.evaluate.play import run_episodes
 from innerattn.measures.faults.retention import area, retention
 from innerattn.policies import Policy
 from innerattn.records.record import Record
-from innerattn.stats.resampling import Resampled, resampled_counts
+from innerattn.stats.bootstrap import Resampled, resampled_counts
 
 SEVERITIES = (0.25, 0.5, 0.75, 1.0)
 """From harmless (0, which needs no measuring) to the worst (1)."""

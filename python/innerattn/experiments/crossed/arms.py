@@ -47,9 +47,9 @@ class Arm:
         return f"{word}-shared" if self.shared else word
 
     def __str__(self) -> str:
-        """How tables name it."""
-        penalty = "" if self.penalty is None else f", penalty {self.penalty:g}"
-        return f"{self.method}, {self.credit}{penalty}{', shared by kind' if self.shared else ''}"
+        """How tables name it: attention, λ where there is one, credit."""
+        attention = "uniform" if self.penalty is None else f"inner λ = {self.penalty:g}"
+        return f"{attention}, {self.credit}{', shared by kind' if self.shared else ''}"
 
     def overrides(self) -> dict[str, object]:
         """Values by dotted key that make the arm what it is."""

@@ -9,12 +9,19 @@ from dataclasses import dataclass
 from scipy.stats import binomtest
 
 from innerattn.experiments.crossed.arms import CREDITS, CROSSED, PENALTIES, SHARED, Arm, Credit
-from innerattn.experiments.crossed.effects import LEAST_SEEDS, MARGINS, Effect
+from innerattn.experiments.crossed.effects import (
+    ATTENTION,
+    CREDIT,
+    LEAST_SEEDS,
+    MARGINS,
+    Effect,
+)
 from innerattn.experiments.crossed.outcome import IDLE, Outcomes, by_seed
 from innerattn.experiments.paper.claims import EVEN_ENTROPY, Holds
 from innerattn.stats import Estimate
+from innerattn.stats.comparison import Contrast, contrast
 from innerattn.stats.seeds import seed_estimate
-from innerattn.stats.text import NONE, shown
+from innerattn.stats.text import NONE, format_estimate
 
 LEAST_WITHOUT_IDLE = 10
 """So many seeds without an idle robot say that there is none; fewer say nothing."""
@@ -22,36 +29,42 @@ LEAST_WITHOUT_IDLE = 10
 LEAST_UNEVEN = MARGINS["imbalance"] / 2.0
 """Less imbalance than this is too little to ask what takes it away."""
 
-RULES = f"""\
-The seed is the unit: runs of one seed begin with the same weights in the same worlds and are
-measured in the same ones, so that they may be alike in all arms. Where several arms are put
-together, or compared, every seed that has a run of each gives one number. Intervals are 95 %:
-Student's over seeds, Wilson's of numbers of seeds; an effect, or a mean that decides, needs
-{LEAST_SEEDS} seeds. Two means count as alike where two one-sided tests show them to be within the
-margin ({MARGINS["imbalance"]:g} of imbalance, {MARGINS["score"]:g} of the score,
-{MARGINS["entropy_share"]:g} of the entropy's share). The rules go by intervals of single effects;
-beside each p-value of an effect stands Holm's, adjusted for all main effects of the situation on
-all figures, or for all its other effects.
+_FREE, _HELD = PENALTIES[0], PENALTIES[-1]  # λ that leaves attention free, and that holds it even
 
-- **Attention makes sharing even under the team's credit**, over penalties: by inner minus half of
-  uniform. Yes where its interval lies below 0, so that attention takes away more than half of the
-  imbalance; no where it lies above. Only asked where there is something to take away: where
-  uniform's interval lies above {LEAST_UNEVEN:g}.
-- **Attention rescues more**: yes where the interval of inner minus uniform, over credits and
-  penalties, lies above 0; no where it lies below, or where the two are alike.
-- **The team's credit makes sharing uneven**: yes where the interval of team minus helpers, over
-  attentions and penalties, lies above 0; no where it lies below, or where they are alike.
-- **The team's credit leaves a food robot idle with either attention**: yes where both attentions
-  have seeds with such a run (a share of the rescues below {IDLE:g}); no where one of them has none
-  in at least {LEAST_WITHOUT_IDLE} seeds. A seed has one run with uniform weights and
-  {len(PENALTIES)} with learnt attention, so the two numbers are not to be compared with each other.
-- **With the helpers' credit sharing is even with either attention**: yes where no robot is idle in
-  at least {LEAST_WITHOUT_IDLE} seeds and both intervals of the imbalance lie below
-  {MARGINS["imbalance"]:g}; no where a robot is idle or one interval lies above.
-- **Robots of a kind with the same parameters share evenly under the team's credit, too**: decided
-  as the claim before, for the arm in which they have the same (learnt attention, no penalty).
-- **The largest penalty holds attention even**: yes where the interval of the entropy's share lies
-  above {EVEN_ENTROPY:g}; no where it lies below.
+RULES = f"""\
+- **Unit.** The seed is the unit. Runs of one seed begin with the same weights, train in the same
+  worlds and are measured in the same worlds, so they may be alike in all arms. Where arms are
+  averaged or compared, each seed with a run of every such arm gives one number.
+- **Intervals** are 95 %: Student's t over seeds, and Wilson's for counts of seeds. An effect, and a
+  mean that decides, needs {LEAST_SEEDS} seeds.
+- **Alike** means that two one-sided tests at 5 % put the difference within the equivalence margin:
+  {MARGINS["imbalance"]:g} of imbalance, {MARGINS["score"]:g} of the score,
+  {MARGINS["entropy_share"]:g} of the entropy's share of ln(N − 1).
+- **Many tests.** Verdicts go by the intervals of single effects. The tables add Holm's p, adjusted
+  within a situation for all main effects, or for all others.
+
+The claims:
+
+- **Attention makes sharing even under team credit.** Inner minus half of uniform decides. Yes if
+  its interval is below 0: attention removes more than half of the imbalance. No if it is above 0.
+  The question is asked only if there is imbalance to remove: the interval of uniform is above
+  {LEAST_UNEVEN:g}.
+- **Attention rescues more.** The score of inner minus uniform decides, a mean over both credits.
+  Yes if its interval is above 0. No if it is below 0, or if the two are alike.
+- Both are asked twice: for λ = {_FREE:g}, which leaves attention free, and for the mean over all λ.
+- **Team credit makes sharing uneven.** The imbalance of team minus helpers decides, a mean over
+  attentions and λ. Yes if its interval is above 0. No if it is below 0, or if the two are alike.
+- **Team credit leaves a food robot idle with either attention.** A robot is idle if it takes part
+  in less than {IDLE:g} of the rescues. Yes if both attentions have seeds with such a run. No if one
+  attention has none in {LEAST_WITHOUT_IDLE} or more seeds. A seed has one run with uniform
+  attention and {len(PENALTIES)} with inner attention, so the two counts cannot be compared.
+- **Helpers credit makes sharing even with either attention.** Yes if no robot is idle in
+  {LEAST_WITHOUT_IDLE} or more seeds and both intervals of the imbalance are below
+  {MARGINS["imbalance"]:g}. No if a robot is idle, or if an interval is above that.
+- **Shared parameters make sharing even under team credit.** Decided like the claim before, for the
+  arm in which robots of a kind share parameters (inner, λ = {_FREE:g}).
+- **λ = {_HELD:g} keeps attention even.** The entropy's share of ln(N − 1) decides. Yes if its
+  interval is above {EVEN_ENTROPY:g}. No if it is below.
 """
 """How `Answer.holds` is found, in Markdown."""
 
@@ -75,32 +88,33 @@ class Answer:
 
 def answers(situation: str, outcomes: Outcomes, effects: Sequence[Effect]) -> list[Answer]:
     """All expectations in one situation, from its runs and their `effects`."""
-    main = {(one.figure, one.name.split(",")[0]): one for one in effects if one.main}
-    asked = [
-        ("attention rescues more", "score", "inner - uniform", 1.0),
-        ("the team's credit makes sharing uneven", "imbalance", "team - helpers", 1.0),
-    ]
     found = [
-        Answer(claim, situation, *_of_effect(main[figure, name], sign))
-        for claim, figure, name, sign in asked
+        (f"attention (λ = {_FREE:g}) makes sharing even", _makes_even(outcomes, [_FREE])),
+        ("attention (mean over λ) makes sharing even", _makes_even(outcomes, PENALTIES)),
+        (f"attention (λ = {_FREE:g}) rescues more", _above_0(_free_attention(outcomes, "score"))),
+        ("attention (mean over λ) rescues more", _above_0(_effect(effects, ATTENTION, "score"))),
+        ("team credit makes sharing uneven", _above_0(_effect(effects, CREDIT, "imbalance"))),
+        ("team credit leaves a food robot idle with either attention", _idle_with_team(outcomes)),
+        (
+            "helpers credit makes sharing even with either attention",
+            _even_in_all(outcomes, _by_attention("helpers")),
+        ),
+        (
+            "shared parameters make sharing even under team credit",
+            _even_in_all(outcomes, {"shared": [SHARED]}),
+        ),
+        (f"λ = {_HELD:g} keeps attention even", _held_even(outcomes)),
     ]
-    return [
-        _makes_even(situation, outcomes),
-        *found,
-        _idle_with_team(situation, outcomes),
-        _even_with_helpers(situation, outcomes),
-        _even_if_shared(situation, outcomes),
-        _held_even(situation, outcomes),
-    ]
+    return [Answer(claim, situation, measured, holds) for claim, (measured, holds) in found]
 
 
 def idle_shown(outcomes: Outcomes, arms: Sequence[Arm]) -> str:
-    """In how many seeds some run of the arms has an idle robot, with Wilson's interval."""
+    """In how many seeds some run of the arms has an idle robot, and the rates that this fits."""
     idle, known = idle_seeds(outcomes, arms)
     if not known:
         return NONE
     ends = binomtest(idle, known).proportion_ci(method="wilson")
-    return f"{idle} of {known} [{ends.low:.2f}, {ends.high:.2f}]"
+    return f"{idle} of {known} (rate {100 * ends.low:.0f} to {100 * ends.high:.0f} %)"
 
 
 def idle_seeds(outcomes: Outcomes, arms: Sequence[Arm]) -> tuple[int, int]:
@@ -110,7 +124,7 @@ def idle_seeds(outcomes: Outcomes, arms: Sequence[Arm]) -> tuple[int, int]:
 
 
 def _mean(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> Estimate | None:
-    """The mean over seeds of a figure that is averaged over the arms."""
+    """The mean over seeds of a result that is averaged over the arms."""
     return seed_estimate(by_seed(outcomes, arms, figure).mean(axis=1).tolist())
 
 
@@ -121,31 +135,46 @@ def _ends(mean: Estimate | None) -> tuple[float, float]:
     return mean.low, mean.high
 
 
-def _of_effect(effect: Effect, sign: float) -> tuple[str, Holds]:
-    """Whether an effect is on the expected side of 0."""
-    found = effect.found
+def _effect(effects: Sequence[Effect], name: str, figure: str) -> Contrast | None:
+    (found,) = [one.found for one in effects if (one.name, one.figure) == (name, figure)]
+    return found
+
+
+def _free_attention(outcomes: Outcomes, figure: str) -> Contrast | None:
+    """Inner without regularisation minus uniform, a mean over credits."""
+    arms = [Arm(credit, penalty) for credit in CREDITS for penalty in (_FREE, None)]
+    rows = by_seed(outcomes, arms, figure)
+    weights = [0.5, -0.5] * len(CREDITS)
+    return contrast(rows, weights, MARGINS[figure]) if len(rows) >= LEAST_SEEDS else None
+
+
+def _above_0(found: Contrast | None) -> tuple[str, Holds]:
+    """Whether a difference is above 0."""
     if found is None:
         return NONE, "undecided"
-    measured = f"{effect.name}: {shown(found.difference)}, g {shown(found.hedges_g, 1)}"
-    low, high = sorted((sign * found.difference.low, sign * found.difference.high))
-    if low > 0.0:
+    measured = (
+        f"difference {format_estimate(found.difference, 3)}, g {format_estimate(found.hedges_g, 1)}"
+    )
+    if found.difference.low > 0.0:
         return measured, "yes"
-    return measured, "no" if high < 0.0 or found.equivalent else "undecided"
+    return measured, "no" if found.difference.high < 0.0 or found.equivalent else "undecided"
 
 
-def _makes_even(situation: str, outcomes: Outcomes) -> Answer:
-    groups = _by_attention("team")
-    rows = by_seed(outcomes, [arm for arms in groups.values() for arm in arms], "imbalance")
-    inner, uniform = rows[:, : len(groups["inner"])].mean(axis=1), rows[:, -1]
-    means = [seed_estimate(values.tolist()) for values in (inner, uniform, inner - uniform / 2.0)]
-    with_, without, left = (shown(mean) for mean in means)
+def _makes_even(outcomes: Outcomes, penalties: Sequence[float]) -> tuple[str, Holds]:
+    arms = [*(Arm("team", penalty) for penalty in penalties), Arm("team", None)]
+    rows = by_seed(outcomes, arms, "imbalance")
+    inner, uniform = rows[:, :-1].mean(axis=1), rows[:, -1]
+    parts = (inner, uniform, inner - uniform, inner - uniform / 2.0)
+    means = [seed_estimate(values.tolist()) for values in parts]
+    with_, without, difference, left = map(format_estimate, means, (2, 2, 3, 2))
     holds: Holds = "undecided"
     if _ends(means[1])[0] > LEAST_UNEVEN:
-        low, high = _ends(means[2])
+        low, high = _ends(means[3])
         holds = "yes" if high < 0.0 else "no" if low > 0.0 else "undecided"
-    claim = "attention makes sharing even under the team's credit"
-    measured = f"inner: {with_}; uniform: {without}; inner - uniform / 2: {left}"
-    return Answer(claim, situation, measured if len(rows) else NONE, holds)
+    measured = (
+        f"inner {with_}, uniform {without}; difference {difference}, inner − uniform / 2 {left}"
+    )
+    return measured if len(rows) else NONE, holds
 
 
 def _by_attention(credit: Credit) -> dict[str, list[Arm]]:
@@ -157,34 +186,21 @@ def _by_attention(credit: Credit) -> dict[str, list[Arm]]:
     }
 
 
-def _idle_with_team(situation: str, outcomes: Outcomes) -> Answer:
+def _idle_with_team(outcomes: Outcomes) -> tuple[str, Holds]:
     groups = _by_attention("team")
-    measured = "; ".join(f"{name}: {idle_shown(outcomes, arms)}" for name, arms in groups.items())
+    measured = "; ".join(f"{name} {idle_shown(outcomes, arms)}" for name, arms in groups.items())
     counts = [idle_seeds(outcomes, arms) for arms in groups.values()]
-    holds: Holds = "undecided"
     if all(idle for idle, _ in counts):
-        holds = "yes"
-    elif any(not idle and known >= LEAST_WITHOUT_IDLE for idle, known in counts):
-        holds = "no"
-    claim = "the team's credit leaves a food robot idle with either attention"
-    return Answer(claim, situation, measured, holds)
-
-
-def _even_with_helpers(situation: str, outcomes: Outcomes) -> Answer:
-    claim = "with the helpers' credit sharing is even with either attention"
-    return Answer(claim, situation, *_even_in_all(outcomes, _by_attention("helpers")))
-
-
-def _even_if_shared(situation: str, outcomes: Outcomes) -> Answer:
-    claim = "robots of a kind with the same parameters share evenly under the team's credit, too"
-    return Answer(claim, situation, *_even_in_all(outcomes, {"shared": [SHARED]}))
+        return measured, "yes"
+    none = any(not idle and known >= LEAST_WITHOUT_IDLE for idle, known in counts)
+    return measured, "no" if none else "undecided"
 
 
 def _even_in_all(outcomes: Outcomes, groups: Mapping[str, Sequence[Arm]]) -> tuple[str, Holds]:
     """Whether sharing is even in all groups of arms, by their names."""
     means = {name: _mean(outcomes, arms, "imbalance") for name, arms in groups.items()}
     measured = "; ".join(
-        f"{name}: {shown(means[name])}, idle {idle_shown(outcomes, arms)}"
+        f"{name} {format_estimate(means[name])}, idle {idle_shown(outcomes, arms)}"
         for name, arms in groups.items()
     )
     idle = any(idle_seeds(outcomes, arms)[0] for arms in groups.values())
@@ -196,14 +212,10 @@ def _even_in_all(outcomes: Outcomes, groups: Mapping[str, Sequence[Arm]]) -> tup
     return measured, "yes" if enough and all(high < margin for _, high in ends) else "undecided"
 
 
-def _held_even(situation: str, outcomes: Outcomes) -> Answer:
-    arms = [Arm(credit, PENALTIES[-1]) for credit in CREDITS]
-    mean = _mean(outcomes, arms, "entropy_share")
+def _held_even(outcomes: Outcomes) -> tuple[str, Holds]:
+    mean = _mean(outcomes, [Arm(credit, _HELD) for credit in CREDITS], "entropy_share")
     low, high = _ends(mean)
-    holds: Holds = "undecided"
+    measured = f"share of ln(N − 1) {format_estimate(mean, 3)}"
     if low > EVEN_ENTROPY:
-        holds = "yes"
-    elif high < EVEN_ENTROPY:
-        holds = "no"
-    claim = f"a penalty of {PENALTIES[-1]:g} holds attention even"
-    return Answer(claim, situation, f"share of ln(N - 1): {shown(mean, 3)}", holds)
+        return measured, "yes"
+    return measured, "no" if high < EVEN_ENTROPY else "undecided"

@@ -25,6 +25,10 @@ MARGINS = {
 LEAST_SEEDS = 3
 """An effect needs so many seeds that have a run of each arm."""
 
+ATTENTION = "inner − uniform, mean over credits and λ"
+CREDIT = "team − helpers credit, mean over attentions and λ"
+"""Names of the two effects that claims are about; λ is the weight of the regularisation."""
+
 Weights = Mapping[Arm, float]
 
 
@@ -58,35 +62,35 @@ def contrasts() -> list[tuple[str, bool, Weights]]:
     attention = {credit: _attention(credit) for credit in CREDITS}
     helpers, team = (attention[credit] for credit in ("helpers", "team"))
     asked: list[tuple[str, bool, Weights]] = [
-        ("inner - uniform, over credits and penalties", True, _mean([helpers, team])),
-        ("inner - uniform with the team's credit, over penalties", True, team),
-        ("team - helpers, over attentions and penalties", True, _credit(CROSSED)),
+        (ATTENTION, True, _mean([helpers, team])),
+        ("inner − uniform under team credit, mean over λ", True, team),
+        (CREDIT, True, _credit(CROSSED)),
         (
-            f"penalty {most:g} - {least:g}, over credits",
+            f"λ = {most:g} − λ = {least:g}, mean over credits",
             True,
             _mean([_penalty(credit, most) for credit in CREDITS]),
         ),
-        ("(inner - uniform) with team - with helpers", True, _minus(team, helpers)),
+        ("(inner − uniform) under team − under helpers credit", True, _minus(team, helpers)),
     ]
     for credit in CREDITS:
         asked += [
             (
-                f"inner at penalty {penalty:g} - uniform, {credit}",
+                f"inner λ = {penalty:g} − uniform, {credit}",
                 False,
                 {Arm(credit, penalty): 1.0, Arm(credit, None): -1.0},
             )
             for penalty in PENALTIES
         ]
         asked += [
-            (f"penalty {penalty:g} - {least:g}, {credit}", False, _penalty(credit, penalty))
+            (f"λ = {penalty:g} − λ = {least:g}, {credit}", False, _penalty(credit, penalty))
             for penalty in PENALTIES[1:]
         ]
     for penalty in (None, *PENALTIES):
         arms = [Arm(credit, penalty) for credit in CREDITS]
-        words = "uniform" if penalty is None else f"inner at penalty {penalty:g}"
-        asked.append((f"team - helpers, {words}", False, _credit(arms)))
+        words = "uniform" if penalty is None else f"inner λ = {penalty:g}"
+        asked.append((f"team − helpers credit, {words}", False, _credit(arms)))
     own = Arm(SHARED.credit, SHARED.penalty)
-    name = f"parameters shared by kind - each robot's own, {own.credit}, inner at penalty {least:g}"
+    name = f"shared parameters − own parameters, {own.credit}, inner λ = {least:g}"
     return [*asked, (name, False, {SHARED: 1.0, own: -1.0})]
 
 

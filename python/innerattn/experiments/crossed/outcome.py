@@ -21,6 +21,7 @@ OUTCOMES = {
     "rescues_per_episode": "rescues in an episode of the standard length",
     "score": "0 random play, 1 scripted dispatch",
     "entropy_share": "entropy of attention as a share of ln(N - 1), over robots and heads",
+    "first_share": "share of all rescues by the first food robot",
 }
 """The figures of a run and what they are."""
 
@@ -34,6 +35,7 @@ class Outcome:
     rescues_per_episode: float
     score: float | None
     entropy_share: float | None
+    first_share: float | None
 
 
 Outcomes = Mapping[Arm, Mapping[int, Outcome]]
@@ -54,6 +56,7 @@ def outcome_of(measured: FinishedRun) -> Outcome:
         rescues_per_episode=float(summary["rescues_per_episode"]["mean"]),
         score=None if summary["score"] is None else float(summary["score"]["mean"]),
         entropy_share=_mean(summary["attention_entropy_share"]),
+        first_share=float(total[0] / total.sum()) if total.sum() else None,
     )
 
 

@@ -16,7 +16,7 @@ from innerattn.experiments.paper.fig5 import Evidence
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION
 from innerattn.measures.sharing.evenness import MARGIN
 from innerattn.stats import Estimate
-from innerattn.stats.text import NONE, shown
+from innerattn.stats.text import NONE, format_estimate
 
 Holds = Literal["yes", "no", "undecided"]
 
@@ -58,10 +58,11 @@ is judged by itself at 5 %; nothing is adjusted for their number.
 - **Attention moves to the next partner**: by the mean weight on the partner-to-be after the first
   rescue minus that before. Yes where its interval lies above 0 and its mean is {LEAST_MOVE} or
   more; no where its interval lies below {LEAST_MOVE}.
-- **…and does so for the robot that hands over**: by that change minus the change of the food robot
-  that takes no part. Yes where its interval lies above 0 and its mean is at least half the change;
-  no where the interval of that part minus half the change lies below 0, so that most of the change
-  is shared by the robot that takes no part; only asked where attention moves.
+- **…and does so for the robot that hands over**: by that change minus the change of the other food
+  robot, over the handoffs during which the other one rescues nobody. Yes where its interval lies
+  above 0 and its mean is at least half the change; no where the interval of that part minus half
+  the change lies below 0, so that most of the change is shared by the robot that takes no part;
+  only asked where attention moves.
 """
 """How `Claim.holds` is found, in Markdown."""
 
@@ -102,14 +103,14 @@ def entropy_claims(courses: Sequence[EntropyCourse]) -> list[Claim]:
                 course,
                 "entropy ends below that of even attention",
                 f"about {PRINTED_NATS} of {math.log(3):.2f} nats",
-                f"{shown(end)} of {even:.2f} nats",
+                f"{format_estimate(end)} of {even:.2f} nats",
                 _decided(end, EVEN_ENTROPY * even),
             ),
             _claim(
                 course,
                 "entropy falls in training",
                 f"falls continually to about {PRINTED_NATS} nats",
-                f"from {begin.mean:.2f} to {end.mean:.2f} nats: {shown(change)}",
+                f"from {begin.mean:.2f} to {end.mean:.2f} nats: {format_estimate(change)}",
                 _falls(change, least_fall),
             ),
         ]
@@ -128,15 +129,16 @@ def handoff_claims(found: Sequence[Evidence]) -> list[Claim]:
                 part,
                 "attention moves to the next partner",
                 "rises on the next, falls on the one before",
-                f"on the next {shown(change)}, on the one before {shown(before)} "
-                f"({sum(part.handoffs):,} handoffs)",
+                f"on the next {format_estimate(change)}, "
+                f"on the one before {format_estimate(before)} ({sum(part.handoffs):,} handoffs)",
                 moves,
             ),
             _claim(
                 part,
                 "…and does so for the robot that hands over",
                 "taken for granted",
-                f"{shown(own)} more than the robot that takes no part ({shown(control)})",
+                f"{format_estimate(own)} more than the robot that takes no part "
+                f"({format_estimate(control)}), of at most {format_estimate(part.ceiling)}",
                 handoff_is_own(part) if moves == "yes" else "undecided",
             ),
         ]

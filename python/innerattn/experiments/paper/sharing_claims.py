@@ -10,7 +10,7 @@ from innerattn.experiments.paper.printed import TEXT, PrintedRow
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import Verdict
 from innerattn.stats import Estimate
-from innerattn.stats.text import NONE, shown
+from innerattn.stats.text import NONE, format_estimate
 
 
 def sharing_claims(table: Table2) -> list[Claim]:
@@ -63,7 +63,7 @@ def share_shown(sharing: Sharing) -> str:
     """The share of the first robot in all runs; without an interval where it has none."""
     whole = sharing.all
     if whole.share is not None or not sum(whole.rescues):
-        return shown(whole.share)
+        return format_estimate(whole.share)
     return f"{whole.rescues[0] / sum(whole.rescues):.2f}"
 
 
@@ -95,7 +95,7 @@ def _contrast(pair: Pair, inner: Sequence[Row], uniform: Sequence[Row]) -> Claim
     holds: Holds = "undecided"
     measured = f"distance from 0.5: {_mean(pair.inner)} with, {_mean(pair.uniform)} without"
     if pair.found is not None:
-        measured += f"; difference {shown(pair.found.difference)}"
+        measured += f"; difference {format_estimate(pair.found.difference)}"
         if pair.found.difference.high < 0.0:
             holds = "yes"
         elif pair.found.difference.low > 0.0 or pair.found.equivalent:

@@ -18,7 +18,7 @@ from innerattn.experiments.paper.sharing_claims import sharing_claims
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION, Table2
 from innerattn.experiments.run import FinishedRun, named_from
 from innerattn.report.paper.table2 import markdown_table, table2_markdown
-from innerattn.stats.text import NONE, fixed, p_shown, shown
+from innerattn.stats.text import NONE, format_estimate, format_number, format_p
 
 
 @dataclass(frozen=True)
@@ -129,19 +129,19 @@ def _compared(table: Table2) -> str:
     for pair in pairs(table.competence):
         found = pair.found
         cells = [pair.situation, pair.algorithm, pair.figure, _seeds(pair.seeds) or NONE]
-        cells += [shown(pair.inner), shown(pair.uniform)]
+        cells += [format_estimate(pair.inner), format_estimate(pair.uniform)]
         if found is None:
             rows.append([*cells, NONE, NONE, NONE])
             continue
         alike = f"{found.margin:g}: {'yes' if found.equivalent else 'not shown'}"
-        rows.append([*cells, shown(found.difference, 3), p_shown(found.p), alike])
+        rows.append([*cells, format_estimate(found.difference, 3), format_p(found.p), alike])
     if not rows:
         return ""
     head_of_all = ["algorithm", "situations", "inner", "uniform", "a run of inner scores higher"]
     rows_of_all = [
         [
             *(one.algorithm, ", ".join(one.situations)),
-            *(shown(one.inner), shown(one.uniform), shown(one.better)),
+            *map(format_estimate, (one.inner, one.uniform, one.better)),
         ]
         for one in together(table.competence)
     ]
@@ -167,15 +167,16 @@ def _merit(table: Table2) -> str:
         [
             *(one.situation, str(one.runs)),
             NONE if one.correlation is None else _signed(one.correlation),
-            p_shown(one.p),
-            *(NONE if value is None else fixed(value) for value in one.script),
+            format_p(one.p),
+            *(NONE if value is None else format_number(value) for value in one.script),
         ]
         for one in imbalance_score_correlations(table.competence)
     ]
     return (
-        "Of a run's imbalance and its score, each less its method's mean: above 0 where uneven "
-        "runs score more. p is as if runs of one seed had nothing in common, and of each situation "
-        "by itself.\n\n" + markdown_table(head, rows)
+        "Of a run's imbalance and its score, each minus its method's mean: above 0 where "
+        "imbalanced runs score more. p is of a permutation test that exchanges whole seeds, since "
+        "runs of one seed are not independent, and of each situation by itself.\n\n"
+        + markdown_table(head, rows)
     )
 
 
@@ -190,7 +191,7 @@ def _fig4(courses: Sequence[EntropyCourse]) -> str:
             [
                 *(course.situation, course.method, _seeds(course.seeds)),
                 f"{steps[0]:,} to {steps[-1]:,}",
-                *(shown(course.begin), shown(course.end), shown(course.change)),
+                *map(format_estimate, (course.begin, course.end, course.change)),
                 *(f"{end / even:.2f}" if even else NONE, f"{np.exp(end):.2f}"),
             ]
         )
@@ -213,8 +214,10 @@ def _fig5(findings: Findings) -> str:
         )
     if not findings.evidence:
         return text + "\nNo run has handoffs and attention that chooses.\n"
-    head = ["situation", "method", "seed", "handoffs (episodes)", "change on the partner to be"]
-    head += ["of the robot that takes no part", "difference", "difference − half the change"]
+    head = ["situation", "method", "seed", "handoffs of all (episodes)"]
+    head += ["change on the partner to be"]
+    head += ["of the robot that takes no part", "difference", "its ceiling"]
+    head += ["difference − half the change"]
     head += ["change on the partner before", "of the robot that takes no part"]
     head += ["p", "p of the robot that takes no part"]
     rows = [row for part in findings.evidence for row in _evidence_rows(part)]
@@ -224,7 +227,9 @@ def _fig5(findings: Findings) -> str:
         "rescue minus that up to it; p is of a permutation test of the change on the partner to "
         "be minus that on the one before, which exchanges the two in some episodes. The control "
         "is the other food robot at the same moments: what it shows too follows from which "
-        "victims are there, not from who hands over.\n\n" + markdown_table(head, rows)
+        "victims are there, not from who hands over. Handoffs count during which the control "
+        "rescues nobody; the ceiling of the difference is that of attention which follows each "
+        "robot's own next rescue.\n\n" + markdown_table(head, rows)
     )
 
 
@@ -237,20 +242,20 @@ def _evidence_rows(part: Evidence) -> list[list[str]]:
         rows.append(
             [
                 *(part.situation, part.method, str(seed)),
-                f"{part.handoffs[n]} ({part.episodes[n]})",
+                f"{part.handoffs[n]} of {part.handoffs[n] + part.left_out[n]} ({part.episodes[n]})",
                 *(_signed(role.change_by_run[n]) for role in (to_be, control)),
-                *(_signed(part.own_part_by_run[n]), NONE),
+                *(_signed(part.own_part_by_run[n]), NONE, NONE),
                 *(_signed(role.change_by_run[n]) for role in (before, before_control)),
-                *map(p_shown, p_values),
+                *map(format_p, p_values),
             ]
         )
     if len(part.seeds) > 1:
         rows.append(
             [
                 *(part.situation, part.method, "mean [95 %]", f"{sum(part.handoffs):,}"),
-                *(shown(to_be.change), shown(control.change)),
-                *(shown(part.own_part), shown(part.own_part_beyond_half)),
-                *(shown(before.change), shown(before_control.change), NONE, NONE),
+                *(format_estimate(to_be.change), format_estimate(control.change)),
+                *map(format_estimate, (part.own_part, part.ceiling, part.own_part_beyond_half)),
+                *map(format_estimate, (before.change, before_control.change, None, None)),
             ]
         )
     return rows

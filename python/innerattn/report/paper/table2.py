@@ -12,7 +12,7 @@ from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import MARGIN, ChiSquared, Evenness, EvennessOfRuns
 from innerattn.policies import SCRIPTED
 from innerattn.stats import Estimate
-from innerattn.stats.text import NONE, fixed, p_shown, shown
+from innerattn.stats.text import NONE, format_estimate, format_number, format_p
 
 _CSV_COLUMNS = """
 situation method task seed episodes robot_0 robot_1 rescues_0 rescues_1 share_0 share_low share_high
@@ -118,9 +118,9 @@ def _sharing_table(rows: Sequence[Row], name: str, scores: dict[str, Estimate | 
         cells += [f"{first + second} ({first} + {second})", share_shown(sharing)]
         cells += _tost(sharing.all)
         cells += [verdicts_shown(sharing)]
-        cells += [shown(sharing.together.pooled_share) if sharing.together else NONE]
+        cells += [format_estimate(sharing.together.pooled_share) if sharing.together else NONE]
         cells += [_chi_squared(sharing.all.chi_squared)]
-        cells += [shown(scores[row.method])] if name == "scored" else []
+        cells += [format_estimate(scores[row.method])] if name == "scored" else []
         if printed and row.printed:
             shares, was = row.printed.row.shares, row.printed.row
             cells += [f"{shares[0]:.2f} / {shares[1]:.2f}, {was.chi_squared:.{was.decimals}f}"]
@@ -143,7 +143,7 @@ def _runs_table(rows: Sequence[Row]) -> str:
             cells = [row.method, row.task, str(seed)]
             for sharing in (row.scored, row.recorded):
                 run = sharing.each[index]
-                cells += [f"{run.rescues[0]} + {run.rescues[1]}", shown(run.share)]
+                cells += [f"{run.rescues[0]} + {run.rescues[1]}", format_estimate(run.share)]
                 cells += [*_tost(run), _chi_squared(run.chi_squared)]
             lines.append(cells)
     return markdown_table(head, lines)
@@ -161,10 +161,10 @@ def _competence_table(parts: Sequence[Competence]) -> str:
             if played and len(part.seeds) > 1:
                 continue  # a policy that learns nothing differs by its worlds alone
             values = [figures[name] for name in COMPETENCE]
-            shown_ = [NONE if value is None else fixed(value) for value in values]
+            shown_ = [NONE if value is None else format_number(value) for value in values]
             lines.append([part.method, str(seed), *shown_])
         if len(part.seeds) > 1:
-            means = [shown(part.mean[name]) for name in COMPETENCE]
+            means = [format_estimate(part.mean[name]) for name in COMPETENCE]
             lines.append([part.method, "mean [95 %]", *means])
     return markdown_table(head, lines)
 
@@ -172,15 +172,15 @@ def _competence_table(parts: Sequence[Competence]) -> str:
 def _tost(found: Evenness | EvennessOfRuns) -> list[str]:
     """The interval that decides whether work is even, the p-value and the verdict."""
     ends = found.interval_90
-    interval = f"[{fixed(ends[0])}, {fixed(ends[1])}]" if ends else NONE
-    return [interval, p_shown(found.equivalence_p), found.verdict]
+    interval = f"[{format_number(ends[0])}, {format_number(ends[1])}]" if ends else NONE
+    return [interval, format_p(found.equivalence_p), found.verdict]
 
 
 def _chi_squared(found: ChiSquared | None) -> str:
     if found is None:
         return NONE
     verdict = ", rejected" if found.rejected else ""
-    return f"{found.statistic:.2f} ({p_shown(found.p)}){verdict}"
+    return f"{found.statistic:.2f} ({format_p(found.p)}){verdict}"
 
 
 def _listed(values: Sequence[int]) -> str:

@@ -1,30 +1,33 @@
-"""The tables that an evaluation is shown as; every figure comes from its summary."""
+"""The tables that an evaluation is shown as in a terminal."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
+
+from innerattn.report.table import Row, Table, columns, plain_table, print_table, section
+from innerattn.report.tables.text import number, plus_minus
 
 if TYPE_CHECKING:
     from innerattn.config import Scenario
-    from innerattn.evaluate import Estimate, Performance, Summary
+    from innerattn.evaluate import Performance, Summary
+    from innerattn.experiments.score_means import SeedScores, TwoLengths
 
-_KEY = """\
-  random: any action, each with the same chance
-  greedy: each robot to the nearest victim it can help
-  hungarian: robots assigned to victims by arrival time
-  score: 0 plays like random, 1 like hungarian; ± is half the 95 % interval
-"""
+_POLICIES = (
+    "random: any action, each with the same chance",
+    "greedy: each robot to the nearest victim it can help",
+    "hungarian: robots assigned to victims by arrival time",
+    "score: 0 plays like random, 1 like hungarian; ± is half the 95 % interval",
+)
+_SEEDS = (
+    "score: 0 plays like random, 1 like hungarian",
+    "mean: ± is half the 95 % interval over seeds (Student's t), in the same worlds",
+)
 _MOST_COLUMNS = 4  # that 80 columns hold beside names
-_KEY_OF_SEEDS = """\
-  score: 0 plays like random, 1 like hungarian
-  mean: ± is half the 95 % interval over seeds (Student's t), in the same worlds
-"""
 
 
 def print_summary(console: Console, summary: Summary, scenario: Scenario) -> None:
@@ -32,114 +35,81 @@ def print_summary(console: Console, summary: Summary, scenario: Scenario) -> Non
 
     Args:
         console: where to.
-        summary: the figures.
-        scenario: the worlds they were measured in.
+        summary: what was measured.
+        scenario: the worlds it was measured in.
     """
-    console.print(f"\nRescues per episode, situation {summary.situation}", style="bold")
-    console.print(_rescues(summary))
-    console.print(_KEY)
-    if summary.warm_start != "none":
-        console.print(
-            f"  {summary.method} was warm-started from {summary.warm_start}: it imitated that "
-            f"script,\n  then learnt from rewards\n"
-        )
+    console.print()
+    print_table(console, _rescues(summary))
     if any(summary.cooperation.values()):
-        console.print(
-            f"Who helped where several robots could: rescues in {summary.episodes:,} episodes "
-            f"of {summary.standard.episode_steps} steps",
-            style="bold",
-        )
-        console.print(_cooperation(summary, scenario))
+        print_table(console, _cooperation(summary, scenario))
     if summary.attention_entropy:
-        console.print("Attention entropy of each robot's critic, in nats", style="bold")
-        for table in _attention(summary):
-            console.print(table)
-        if scenario.num_robots > 2:
-            others = scenario.num_robots - 1
-            console.print(
-                f"  100% is ln {others} = {math.log(others):.2f}: even attention over "
-                f"{others} teammates; less is more selective\n"
-            )
+        for table in _attention(summary, scenario.num_robots - 1):
+            print_table(console, table)
 
 
-def print_seeds(console: Console, summaries: Mapping[int, Summary | None]) -> None:
-    """Print what the runs of several seeds found, and their mean.
+def print_seeds(console: Console, scores: SeedScores | None) -> None:
+    """Print what the runs of several seeds scored, and their mean.
 
     Args:
         console: where to.
-        summaries: the figures by seed, in order; None for a run that failed.
+        scores: by seed; nothing is printed without.
     """
-    found = [summary for summary in summaries.values() if summary is not None]
-    if not found:
+    if scores is None:
         return
-    table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("seed")
-    for figures in (found[0].standard, found[0].long):
-        table.add_column(f"{figures.episode_steps} steps", justify="right")
-        table.add_column("score", justify="right")
-    for seed, summary in summaries.items():
-        cells = [_mean(x) for x in _of_seed(summary)] if summary else ["failed"]
-        table.add_row(str(seed), *cells)
-    if len(found) > 1:
-        table.add_section()
-        columns = zip(*(_of_seed(summary) for summary in found), strict=True)
-        table.add_row(f"mean of {len(found)}", *map(_over_seeds, columns), style="bold")
-    console.print(f"\nRescues per episode, situation {found[0].situation}", style="bold")
-    console.print(table)
-    console.print(_KEY_OF_SEEDS)
+    standard, long = scores.mean
+    lengths = (standard.episode_steps, long.episode_steps)
+    runs = section(
+        [str(seed), *(_scores_shown(two) if two else ["failed"])]
+        for seed, two in scores.by_seed.items()
+    )
+    used = sum(two is not None for two in scores.by_seed.values())
+    parts = [runs]
+    if used > 1:
+        shown = [plus_minus(x) for one in scores.mean for x in (one.rescues_per_episode, one.score)]
+        parts.append(section([Row((f"mean of {used}", *shown), strong=True)]))
+    title = f"Rescues per episode, situation {scores.situation}"
+    console.print()
+    print_table(console, Table(columns(["seed"], _heads(lengths)), tuple(parts), title, _SEEDS))
 
 
-def _of_seed(summary: Summary) -> list[Estimate | None]:
-    lengths = (summary.standard, summary.long)
-    return [x for figures in lengths for x in (figures.rescues_per_episode, figures.score)]
+def _scores_shown(two: TwoLengths) -> list[str]:
+    return [number(x) for one in two for x in (one.rescues_per_episode, one.score)]
 
 
-def _over_seeds(intervals: Sequence[Estimate | None]) -> str:
-    from innerattn.stats.intervals import student_interval
-
-    means = [interval.mean for interval in intervals if interval is not None]
-    return plus_minus(student_interval(means) if len(means) == len(intervals) else None)
-
-
-def _mean(interval: Estimate | None) -> str:
-    return "-" if interval is None else f"{interval.mean:.2f}"
+def _heads(lengths: Sequence[int]) -> list[str]:
+    return [head for steps in lengths for head in (f"{steps} steps", "score")]
 
 
 def _rescues(summary: Summary) -> Table:
     lengths = (summary.standard, summary.long)
-    table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("policy")
-    for figures in lengths:
-        table.add_column(f"{figures.episode_steps} steps", justify="right")
-        table.add_column("score", justify="right")
-    for name in summary.standard.scripted:
-        if name != summary.method:
-            cells = [cell for figures in lengths for cell in _scripted_cells(figures, name)]
-            table.add_row(name, *cells)
-    own = [
-        cell
-        for figures in lengths
-        for cell in (plus_minus(figures.rescues_per_episode), plus_minus(figures.score))
+    rows = [
+        Row((name, *(cell for one in lengths for cell in _scripted_cells(one, name))))
+        for name in summary.standard.scripted
+        if name != summary.method
     ]
     scripted = summary.method in summary.standard.scripted
-    table.add_row(summary.method if scripted else f"{summary.method} (trained)", *own, style="bold")
-    table.add_section()
-    table.add_row("episodes", *(cell for f in lengths for cell in (f"{f.episodes:,}", "")))
-    return table
+    name = summary.method if scripted else f"{summary.method} (trained)"
+    own = [plus_minus(x) for one in lengths for x in (one.rescues_per_episode, one.score)]
+    rows.append(Row((name, *own), strong=True))
+    counts = [cell for one in lengths for cell in (f"{one.episodes:,}", "")]
+    warm = () if summary.warm_start == "none" else (_warm_start(summary),)
+    return Table(
+        columns(["policy"], _heads([one.episode_steps for one in lengths])),
+        (section(rows), section([["episodes", *counts]])),
+        f"Rescues per episode, situation {summary.situation}",
+        (*_POLICIES, *warm),
+    )
 
 
-def _scripted_cells(figures: Performance, name: str) -> tuple[str, str]:
-    means = {policy: interval.mean for policy, interval in figures.scripted.items()}
-    span = means["hungarian"] - means["random"]
-    score = f"{(means[name] - means['random']) / span:.2f}" if figures.score else "-"
-    return plus_minus(figures.scripted[name]), score
+def _warm_start(summary: Summary) -> str:
+    return (
+        f"{summary.method} was warm-started from {summary.warm_start}: it imitated that script, "
+        "then learnt from rewards"
+    )
 
 
-def plus_minus(interval: Estimate | None) -> str:
-    """A mean and half its interval, as tables show them."""
-    if interval is None or not interval.bounded:
-        return "-"
-    return f"{interval.mean:.2f} ± {(interval.high - interval.low) / 2:.2f}"
+def _scripted_cells(measured: Performance, name: str) -> tuple[str, str]:
+    return plus_minus(measured.scripted[name]), number(measured.script_score(name))
 
 
 def _cooperation(summary: Summary, scenario: Scenario) -> Table:
@@ -154,24 +124,38 @@ def _cooperation(summary: Summary, scenario: Scenario) -> Table:
     if len(robots) > _MOST_COLUMNS:
         rows = [list(column) for column in zip(*rows, strict=True)]
         rows[0][0] = "robot"
-    return _table(rows)
+    return plain_table(
+        columns(rows[0][:1], rows[0][1:]),
+        rows[1:],
+        f"Who helped where several robots could: rescues in {summary.episodes:,} episodes "
+        f"of {summary.standard.episode_steps} steps",
+    )
 
 
 def _with_share(count: int, total: int) -> str:
     return f"{count:,} ({count / total:.0%})" if total else "0"
 
 
-def _attention(summary: Summary) -> list[Table]:
-    """A table for every few heads."""
+def _attention(summary: Summary, teammates: int) -> list[Table]:
+    """A table for every few heads, titled above the first and explained below the last."""
     heads = len(next(iter(summary.attention_entropy.values())))
-    return [
+    tables = [
         _attention_of(summary, range(first, min(first + _MOST_COLUMNS, heads)))
         for first in range(0, heads, _MOST_COLUMNS)
     ]
+    title = "Attention entropy of each robot's critic, in nats"
+    tables[0] = replace(tables[0], title=title)
+    if teammates > 1:
+        note = (
+            f"100% is ln {teammates} = {math.log(teammates):.2f}: even attention over "
+            f"{teammates} teammates; less is more selective"
+        )
+        tables[-1] = replace(tables[-1], notes=(note,))
+    return tables
 
 
-def _attention_of(summary: Summary, heads: range) -> Table:
-    rows = [["robot", *(f"head {head + 1}" for head in heads)]]
+def _attention_of(summary: Summary, heads: Sequence[int]) -> Table:
+    rows = []
     for robot, nats in summary.attention_entropy.items():
         shares = summary.attention_entropy_share[robot]
         cells = [
@@ -179,14 +163,4 @@ def _attention_of(summary: Summary, heads: range) -> Table:
             for head in heads
         ]
         rows.append([robot, *cells])
-    return _table(rows)
-
-
-def _table(rows: Sequence[Sequence[str]]) -> Table:
-    """The first row is the head; figures stand to the right."""
-    table = Table(box=box.SIMPLE_HEAD)
-    for number, name in enumerate(rows[0]):
-        table.add_column(name, justify="right" if number else "left", overflow="fold")
-    for row in rows[1:]:
-        table.add_row(*row)
-    return table
+    return plain_table(columns(["robot"], [f"head {head + 1}" for head in heads]), rows)

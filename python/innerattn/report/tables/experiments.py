@@ -1,75 +1,47 @@
-"""The table that a study is shown as: what its runs scored, by situation and method."""
+"""The table that a study is shown as in a terminal: what its runs scored."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
-from innerattn.report.tables.evaluation import plus_minus
+from innerattn.report.table import Table, columns, print_table, section
+from innerattn.report.tables.text import plus_minus
 
 if TYPE_CHECKING:
-    from innerattn.experiments.run import Scores
-    from innerattn.experiments.scan import RunStatus
+    from innerattn.experiments.score_means import MethodScores
 
-_KEY = """\
-  score: 0 plays like random, 1 like hungarian
-  ±: half the 95 % interval over seeds (Student's t), where there are several
-"""
+_NOTES = (
+    "score: 0 plays like random, 1 like hungarian",
+    "±: half the 95 % interval over seeds (Student's t), where there are several",
+)
 
 
-def print_scores(console: Console, found: Sequence[RunStatus]) -> None:
-    """Print what the finished runs scored, over seeds.
+def print_scores(console: Console, scores: Sequence[MethodScores]) -> None:
+    """Print what the runs of a study scored, by situation and method.
 
     Args:
         console: where to.
-        found: what is there of each run, whether it can be used or not.
+        scores: by situation and method; nothing is printed where no run is finished.
     """
-    cells: dict[tuple[str, str], list[tuple[Scores, Scores] | None]] = {}
-    for one in found:
-        planned = one.planned
-        measured = one.run.scores() if one.run else None
-        cells.setdefault((planned.case.situation, planned.case.trained), []).append(measured)
-    lengths = next((two for runs in cells.values() for two in runs if two is not None), None)
+    lengths = next((one.mean for one in scores if one.mean is not None), None)
     if lengths is None:
         return
-    table = Table(box=box.SIMPLE_HEAD, padding=0)
-    table.add_column("method", no_wrap=True)
-    table.add_column("runs", justify="right")
-    for measured_at in lengths:
-        table.add_column(f"{measured_at.episode_steps} steps", justify="right")
-        table.add_column("score", justify="right")
-    before = None
-    for (situation, method), runs in cells.items():
-        if situation != before:
-            table.add_section()
-            table.add_row(situation, style="bold")
-            before = situation
-        used = [two for two in runs if two is not None]
-        table.add_row(f"  {method}", f"{len(used)} of {len(runs)}", *_figures(used))
-    console.print("\nRescues per episode, mean over runs", style="bold")
-    console.print(table)
-    console.print(_KEY)
-
-
-def _figures(runs: Sequence[tuple[Scores, Scores]]) -> list[str]:
-    return [
-        text
-        for length in (0, 1)
-        for text in (
-            _over_seeds([run[length].rescues_per_episode for run in runs]),
-            _over_seeds([run[length].score for run in runs]),
-        )
+    heads = [head for one in lengths for head in (f"{one.episode_steps} steps", "score")]
+    parts = [
+        section([[one.method, f"{one.used} of {one.planned}", *_means(one)] for one in own], name)
+        for name, own in groupby(scores, key=lambda one: one.situation)
     ]
+    title = "Rescues per episode, mean over runs"
+    console.print()
+    table = Table(columns(["method"], ["runs", *heads]), tuple(parts), title, _NOTES)
+    print_table(console, table, dense=True)
 
 
-def _over_seeds(values: Sequence[float | None]) -> str:
-    from innerattn.stats.intervals import student_interval
-
-    known = [value for value in values if value is not None]
-    if not known or len(known) < len(values):
-        return "-"
-    return f"{known[0]:.2f}" if len(known) == 1 else plus_minus(student_interval(known))
+def _means(scores: MethodScores) -> list[str]:
+    if scores.mean is None:
+        return ["-"] * 4
+    return [plus_minus(x) for one in scores.mean for x in (one.rescues_per_episode, one.score)]

@@ -1,0 +1,78 @@
+"""What a study of faults found, in the few numbers that its tables show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from innerattn.evaluate.faults.document import worst_robot
+from innerattn.evaluate.faults.grid import Grid, Retention
+from innerattn.measures.faults.shift_results import KindShift
+from innerattn.stats import Estimate
+
+
+@dataclass(frozen=True)
+class KindOverview:
+    """What a policy retains under one kind of fault.
+
+    Attributes:
+        kind: of the fault.
+        retention: mean over severities, robots and onsets.
+        by_severity: of a fault from the start, mean over robots; NaN where there is none.
+        worst_robot: the robot whose worst fault costs most.
+        worst: retention with that robot at the last severity.
+        early: in the first half of what follows an onset in the middle.
+        late: in the second half.
+        change: late minus early.
+    """
+
+    kind: str
+    retention: Estimate
+    by_severity: tuple[float, ...]
+    worst_robot: str
+    worst: Estimate
+    early: Estimate
+    late: Estimate
+    change: Estimate
+
+
+@dataclass(frozen=True)
+class Overview:
+    """What a policy retains.
+
+    Attributes:
+        rescues: per episode, without a fault.
+        kinds: by kind of fault.
+        retention: mean over the kinds.
+    """
+
+    rescues: Estimate
+    kinds: tuple[KindOverview, ...]
+    retention: Estimate
+
+
+def overview(grid: Grid, found: Retention) -> Overview:
+    """The numbers of one policy."""
+    areas = found.by_kind()
+    early, late = found.early.mean((1, 2)), found.late.mean((1, 2))
+    kinds = []
+    for k, kind in enumerate(grid.kinds):
+        robot, worst = worst_robot(grid, found, k)
+        kinds.append(
+            KindOverview(
+                kind=kind,
+                retention=areas[k].estimate(),
+                by_severity=tuple(found.cells.value[k, :, :, 0].mean(1).tolist()),
+                worst_robot=robot,
+                worst=worst,
+                early=early[k].estimate(),
+                late=late[k].estimate(),
+                change=(late[k] - early[k]).estimate(),
+            )
+        )
+    return Overview(found.clean.estimate(), tuple(kinds), areas.mean(0).estimate())
+
+
+def weight_without_fault(found: KindShift) -> float:
+    """Mean weight on a robot at the steps of its fault, in the same worlds without the fault."""
+    weights = [shift.after.mean.mean - shift.effect.mean.mean for shift in found.robots]
+    return sum(weights) / len(weights)

@@ -1,0 +1,123 @@
+"""What runs scored, as means over seeds: of one configuration, or of every method of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from innerattn.experiments.run import Scores
+from innerattn.experiments.scan import RunStatus
+from innerattn.measures.summary import Summary
+from innerattn.stats import Estimate
+from innerattn.stats.seeds import seed_estimate
+
+TwoLengths = tuple[Scores, Scores]
+"""Scores at the standard and at the second length of episodes."""
+
+
+@dataclass(frozen=True)
+class MeanScores:
+    """Means over runs at one length of episodes.
+
+    Attributes:
+        episode_steps: the length [control steps].
+        rescues_per_episode: over all runs.
+        score: likewise; None where a run has no score.
+    """
+
+    episode_steps: int
+    rescues_per_episode: Estimate | None
+    score: Estimate | None
+
+
+@dataclass(frozen=True)
+class SeedScores:
+    """Runs of one configuration that differ by their seed.
+
+    Attributes:
+        situation: of the worlds.
+        by_seed: scores of each run; None for a run that failed.
+        mean: over the runs that did not fail, at both lengths.
+    """
+
+    situation: str
+    by_seed: dict[int, TwoLengths | None]
+    mean: tuple[MeanScores, MeanScores]
+
+
+@dataclass(frozen=True)
+class MethodScores:
+    """Runs of one situation and method in a study.
+
+    Attributes:
+        situation: of the worlds.
+        method: how it was trained.
+        planned: number of runs.
+        used: number of finished runs, over which the means are.
+        mean: at both lengths; None where no run is finished.
+    """
+
+    situation: str
+    method: str
+    planned: int
+    used: int
+    mean: tuple[MeanScores, MeanScores] | None
+
+
+def seed_scores(summaries: Mapping[int, Summary | None]) -> SeedScores | None:
+    """Scores by seed, and their mean; None where every run failed.
+
+    Args:
+        summaries: of the runs by seed; None for a run that failed.
+    """
+    found = [summary for summary in summaries.values() if summary is not None]
+    if not found:
+        return None
+    by_seed = {seed: _scores(one) if one else None for seed, one in summaries.items()}
+    means = _means([two for two in by_seed.values() if two is not None])
+    return SeedScores(found[0].situation, by_seed, means)
+
+
+def method_scores(found: Sequence[RunStatus]) -> list[MethodScores]:
+    """Means of every situation and method of a study, in the order in which they are planned.
+
+    Args:
+        found: what is there of each planned run; only finished runs count.
+    """
+    groups: dict[tuple[str, str], list[TwoLengths | None]] = {}
+    for one in found:
+        case = one.planned.case
+        scores = one.run.scores() if one.run else None
+        groups.setdefault((case.situation, case.trained), []).append(scores)
+    listed = []
+    for (situation, method), runs in groups.items():
+        used = [two for two in runs if two is not None]
+        mean = _means(used) if used else None
+        listed.append(MethodScores(situation, method, len(runs), len(used), mean))
+    return listed
+
+
+def _scores(summary: Summary) -> TwoLengths:
+    standard, long = (
+        Scores(
+            one.episode_steps,
+            one.rescues_per_episode.mean,
+            None if one.score is None else one.score.mean,
+        )
+        for one in (summary.standard, summary.long)
+    )
+    return standard, long
+
+
+def _means(runs: Sequence[TwoLengths]) -> tuple[MeanScores, MeanScores]:
+    standard, long = (_mean([two[length] for two in runs]) for length in (0, 1))
+    return standard, long
+
+
+def _mean(runs: Sequence[Scores]) -> MeanScores:
+    scores = [run.score for run in runs]
+    return MeanScores(
+        runs[0].episode_steps,
+        seed_estimate([run.rescues_per_episode for run in runs]),
+        None if None in scores else seed_estimate(scores),
+    )

@@ -1,0 +1,119 @@
+"""The tables of the crossed design."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from innerattn.experiments.crossed.claims import idle_shown
+from innerattn.experiments.crossed.effects import Effect
+from innerattn.experiments.crossed.outcome import Outcome
+from innerattn.experiments.crossed.study import Situation
+from innerattn.report.table import Column, Row, Table, columns, csv_text, plain_table
+from innerattn.stats.text import NONE, format_estimate, format_number, format_p
+
+LAMBDA = (
+    "λ is the weight of the attention-logit regularisation (`td.attention_logit_penalty`). "
+    "Uniform attention has no logits, so one arm stands for all λ."
+)
+_LABELS = {
+    "imbalance": "imbalance",
+    "least_share": "smaller share",
+    "rescues_per_episode": "rescues per episode",
+    "score": "score",
+    "entropy_share": "entropy / ln(N − 1)",
+    "first_share": "share of the first robot",
+}
+_CSV_ARM = ("situation", "method", "credit", "penalty", "shared", "seed")
+_CSV_RUN = ("folder", "config_sha256", "weights_sha256")
+
+
+def claims_table(situations: Sequence[Situation]) -> Table:
+    """What was expected, a row for each claim, with the verdicts of all situations."""
+    heads: list[Column] = [Column("claim", right=False)]
+    for situation in situations:
+        heads += columns([f"{situation.name}: measured", f"{situation.name}: holds?"])
+    rows = []
+    for same in zip(*(situation.answers for situation in situations), strict=True):
+        cells = [cell for answer in same for cell in (answer.measured, f"**{answer.holds}**")]
+        rows.append([same[0].claim, *cells])
+    return plain_table(heads, rows)
+
+
+def seeds_table(situations: Sequence[Situation]) -> Table:
+    """How alike the runs of one seed are in which food robot does more."""
+    heads = columns(["situation", "credit"], ["seeds", "arms", "intraclass correlation [95 %]"])
+    rows = []
+    for situation in situations:
+        for one in situation.seeds:
+            ends = (one.least, one.most)
+            reach = NONE if None in ends else " to ".join(map(_fixed, ends))
+            counts = [str(one.seeds), str(one.arms), format_estimate(one.correlation)]
+            rows.append([situation.name, one.credit, *counts, reach])
+    return plain_table([*heads, Column("shares of single runs")], rows)
+
+
+def arms_table(situation: Situation) -> Table:
+    """What the runs of each arm show, means over seeds."""
+    figures = ("imbalance", "least_share", "rescues_per_episode", "score", "entropy_share")
+    numbers = [_LABELS[name] for name in figures]
+    heads = columns(["arm"], ["runs", *numbers, "seeds with an idle robot"])
+    outcomes = situation.outcomes()
+    rows = []
+    for arm, means in situation.means.items():
+        cells = [
+            format_estimate(means[name], 3 if name == "entropy_share" else 2) for name in figures
+        ]
+        rows.append([str(arm), str(len(outcomes[arm])), *cells, idle_shown(outcomes, [arm])])
+    return plain_table(heads, rows)
+
+
+def effects_table(effects: Iterable[Effect]) -> Table:
+    """Differences between arms; main effects are strong."""
+    heads = (
+        *columns(["effect", "on"], ["seeds", "difference [95 %]", "Hedges g [95 %]", "p"]),
+        *columns([], ["p (Holm)", "margin"]),
+        *columns(["alike?"]),
+    )
+    return plain_table(heads, map(_effect_row, effects))
+
+
+def _effect_row(effect: Effect) -> Row:
+    found = effect.found
+    cells = [effect.name, _LABELS[effect.figure], str(effect.seeds)]
+    if found is None or effect.holm_p is None:
+        return Row((*cells, *[NONE] * 6), effect.main)
+    cells += [
+        format_estimate(found.difference, 3),
+        format_estimate(found.hedges_g, 1),
+        format_p(found.p),
+    ]
+    cells += [
+        format_p(effect.holm_p),
+        f"{found.margin:g}",
+        "yes" if found.equivalent else "not shown",
+    ]
+    return Row(tuple(cells), effect.main)
+
+
+def runs_csv(situations: Sequence[Situation], named: dict[str, str]) -> str:
+    """One line for each run: its arm, what it shows, and what names it.
+
+    Args:
+        situations: with their runs.
+        named: how the report names each run folder, by its path.
+    """
+    names = tuple(Outcome.__dataclass_fields__)
+    rows = [
+        [
+            *(situation.name, run.arm.method, run.arm.credit, run.arm.penalty, run.arm.shared),
+            *(run.seed, *(getattr(run.outcome, name) for name in names)),
+            *(named[str(run.run.folder)], run.run.config_sha256, run.run.weights_sha256),
+        ]
+        for situation in situations
+        for run in situation.runs
+    ]
+    return csv_text([*_CSV_ARM, *names, *_CSV_RUN], rows)
+
+
+def _fixed(value: float | None) -> str:
+    return NONE if value is None else format_number(value)

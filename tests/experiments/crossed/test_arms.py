@@ -1,0 +1,30 @@
+"""The arms of the crossed design are what they say."""
+
+from itertools import product
+from pathlib import Path
+
+from innerattn.experiments.crossed.arms import ARMS, Arm, arm_of, plan_crossed
+
+METHODS = ("td-inner", "td-uniform")
+
+
+def test_all_combinations_are_planned_and_are_what_they_say() -> None:
+    runs = plan_crossed(METHODS, ("single", "mixed"), range(2), "quick", Path("study"))
+    assert len({one.folder for one in runs}) == len(runs) == 2 * 2 * 9
+    found = set()
+    for one in runs:
+        config, arm = one.config, arm_of(one.case)
+        assert config.scenario.situation == one.case.situation
+        assert (config.train.method, config.train.seed) == (one.case.method, one.case.seed)
+        assert config.network.attention == one.case.method.removeprefix("td-")
+        assert config.scenario.rescue_credit == arm.credit
+        if arm.penalty is not None:
+            assert config.td.attention_logit_penalty == arm.penalty
+        assert config.network.parameter_sharing == ("kind" if arm.shared else "none")
+        found.add((one.case.situation, one.case.seed, arm))
+    assert found == set(product(("single", "mixed"), range(2), ARMS))
+    assert [arm for arm in ARMS if arm.shared] == [Arm("team", 0.0, shared=True)]
+    inner = {(arm.credit, arm.penalty) for arm in ARMS if arm.method == "td-inner"}
+    assert inner == set(product(("helpers", "team"), (0.0, 1e-4, 1e-3)))
+    alone = plan_crossed(("td-uniform",), ("single",), (0,), "quick", Path("study"))
+    assert [one.case.variant for one in alone] == ["helpers", "team"]
