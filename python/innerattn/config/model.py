@@ -1,7 +1,4 @@
-"""What all configuration models share: strictness, checked copies and one-line errors.
-
-It knows no field of any model.
-"""
+"""What all configuration models share: strict types, checked copies, digests, one-line errors."""
 
 from __future__ import annotations
 
@@ -68,7 +65,7 @@ class Model(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _of_its_own_type(cls, value: object, info: ValidationInfo) -> object:
-        """Refuse what pydantic would take for a number or a truth: true for 1, "25" for 25."""
+        """Refuse what pydantic would convert: true to 1, "25" to 25, 1 to true."""
         kinds = set(_types(cls.model_fields[str(info.field_name)].annotation))
         if bool in kinds and not isinstance(value, bool):
             raise PydanticCustomError("type", "Input should be true or false")

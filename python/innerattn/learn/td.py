@@ -1,6 +1,6 @@
 """The off-policy learner: a maximum-entropy actor-critic with attention in the critic.
 
-It decides when to update and how; networks live in `nn`, formulas in `losses`. Sources: eqs. 2-4 of
+It decides when and how to update. Networks are in `nn`, formulas in `losses`. Sources: eqs. 2-4 of
 the paper and Iqbal & Sha 2019, sections 3.1-3.3 ("MAAC").
 """
 
@@ -38,7 +38,7 @@ _METRICS = (
 
 @dataclass(frozen=True)
 class TDNetworks(Networks):
-    """The networks of an update, with the slow copies that targets are computed by."""
+    """The networks of an update, and their slow copies, which give the targets."""
 
     target_actor: Network
     target_critic: Network
@@ -110,9 +110,9 @@ class TD(ActorCritic):
 
     @torch.no_grad()
     def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
-        """Step the policies towards given actions, and their slow copies with them.
+        """Train the policies, and set their slow copies to them; see `Learner.imitate`.
 
-        The critic's targets are then of the policies that imitate. See `Learner.imitate`.
+        The critic's targets are then those of the policies that imitate.
         """
         loss = super().imitate(obs, actions, learning_rate)
         slow, fast = self._networks.target_actor.values, self._networks.actor.values
@@ -143,7 +143,7 @@ class TD(ActorCritic):
             batch: At least one transition; rewards are normalised by the replay's statistics.
 
         Returns:
-            (6,) the values that `learn` names, in that order.
+            (6,) the metrics that `learn` names, in that order.
         """
         floor = self._config.reward_std_floor
         reward = batch.reward.to(self._device) - self.replay.reward_mean
@@ -173,13 +173,13 @@ class TD(ActorCritic):
         rate: Tensor,
     ) -> Tensor:
         target = self._targets(nets, reward, next_obs, discount, next_noise)
-        critic_figures = self._update_critic(nets, obs, actions, target, rate)
-        actor_figures = self._update_actor(nets, obs, noise, rate)
+        critic_metrics = self._update_critic(nets, obs, actions, target, rate)
+        actor_metrics = self._update_actor(nets, obs, noise, rate)
         for slow, fast in ((nets.target_actor, nets.actor), (nets.target_critic, nets.critic)):
             torch._foreach_lerp_(
                 list(slow.values.values()), list(fast.values.values()), self._config.polyak
             )
-        return torch.stack([*critic_figures, *actor_figures])
+        return torch.stack([*critic_metrics, *actor_metrics])
 
     def _targets(
         self, nets: TDNetworks, reward: Tensor, next_obs: Tensor, discount: Tensor, noise: Tensor

@@ -1,7 +1,7 @@
-"""The networks of the learners: per-robot actors, critics with and without attention.
+"""The networks of the learners: actors, and critics with and without attention.
 
-Tensors have robots first, (R, B, ...), so that every layer is one batched product over the robots.
-It knows nothing of environments, losses or files.
+Robots are the first dimension of tensors, (R, B, ...), so that every layer is one batched matrix
+product. Networks know no environment, no loss and no file.
 """
 
 from innerattn.nn.actor import Actor, action_noise, sample_actions
