@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.stats import trim_mean, ttest_rel
 
-from innerattn.experiments.paper.competence import COMPETENCE, Competence
+from innerattn.experiments.paper.competence import Competence, competence_units
 from innerattn.experiments.paper.pairs import pairs, together
 
 
 def made(situation: str, method: str, scores: dict[int, float | None]) -> Competence:
-    nothing: dict[str, float | None] = dict.fromkeys(COMPETENCE)
+    nothing: dict[str, float | None] = dict.fromkeys(competence_units())
     each = tuple(nothing | {"score": score, "imbalance": 0.1} for score in scores.values())
     return Competence(situation, method, tuple(scores), (), each, {})
 
