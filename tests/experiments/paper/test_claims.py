@@ -11,7 +11,7 @@ from innerattn.experiments.paper.claims import (
     handoff_is_own,
     handoff_moves,
 )
-from innerattn.experiments.paper.competence import COMPETENCE, Competence
+from innerattn.experiments.paper.competence import Competence, competence_units
 from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence, evidence
 from innerattn.experiments.paper.sharing_claims import judged, sharing_claims
@@ -37,8 +37,10 @@ def made_row(method: str, task: str, shares: tuple[float, ...]) -> Row:
 
 
 def made_competence(method: str, imbalance: list[float]) -> Competence:
-    each = tuple(dict.fromkeys(COMPETENCE, 0.5) | {"imbalance": value} for value in imbalance)
-    nothing: dict[str, Estimate | None] = dict.fromkeys(COMPETENCE)
+    each = tuple(
+        dict.fromkeys(competence_units(), 0.5) | {"imbalance": value} for value in imbalance
+    )
+    nothing: dict[str, Estimate | None] = dict.fromkeys(competence_units())
     seeds = tuple(range(len(each)))
     return Competence("mixed", method, seeds, ({},) * len(each), each, nothing)
 

@@ -21,7 +21,7 @@ def sharing_claims(table: Table2) -> list[Claim]:
     compared = {
         (pair.situation, f"{pair.algorithm}-inner"): pair
         for pair in pairs(table.competence)
-        if pair.figure == "imbalance"
+        if pair.measure == "imbalance"
     }
     claims = []
     for (situation, method), own in rows.items():
@@ -94,11 +94,11 @@ def _measured_share(row: Row) -> str:
 def _contrast(pair: Pair, inner: Sequence[Row], uniform: Sequence[Row]) -> Claim:
     holds: Holds = "undecided"
     measured = f"distance from 0.5: {_mean(pair.inner)} with, {_mean(pair.uniform)} without"
-    if pair.found is not None:
-        measured += f"; difference {format_estimate(pair.found.difference)}"
-        if pair.found.difference.high < 0.0:
+    if pair.contrast is not None:
+        measured += f"; difference {format_estimate(pair.contrast.difference)}"
+        if pair.contrast.difference.high < 0.0:
             holds = "yes"
-        elif pair.found.difference.low > 0.0 or pair.found.equivalent:
+        elif pair.contrast.difference.low > 0.0 or pair.contrast.equivalent:
             holds = "no"
     printed = "; ".join(
         f"{row.task}: {_distance(row.printed.row)} with, {_distance(other.printed.row)} without"

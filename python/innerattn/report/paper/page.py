@@ -127,8 +127,8 @@ def _compared(table: Table2) -> str:
     head += ["inner − uniform [95 %]", "p", "alike within"]
     rows = []
     for pair in pairs(table.competence):
-        found = pair.found
-        cells = [pair.situation, pair.algorithm, pair.figure, _seeds(pair.seeds) or NONE]
+        found = pair.contrast
+        cells = [pair.situation, pair.algorithm, pair.measure, _seeds(pair.seeds) or NONE]
         cells += [format_estimate(pair.inner), format_estimate(pair.uniform)]
         if found is None:
             rows.append([*cells, NONE, NONE, NONE])

@@ -6,7 +6,7 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 
-from innerattn.experiments.paper.competence import COMPETENCE, Competence
+from innerattn.experiments.paper.competence import Competence, competence_units
 from innerattn.experiments.paper.sharing_claims import share_shown, verdicts_shown
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import MARGIN, ChiSquared, Evenness, EvennessOfRuns
@@ -151,7 +151,7 @@ def _runs_table(rows: Sequence[Row]) -> str:
 
 def _competence_table(parts: Sequence[Competence]) -> str:
     head = ["method", "seed"]
-    for name, unit in COMPETENCE.items():
+    for name, unit in competence_units().items():
         words = name.removesuffix("_s").replace("_", " ")
         head.append(f"{words} ({unit})" if unit else words)
     lines = []
@@ -160,11 +160,11 @@ def _competence_table(parts: Sequence[Competence]) -> str:
         for seed, figures in zip(part.seeds, part.each, strict=True):
             if played and len(part.seeds) > 1:
                 continue  # a policy that learns nothing differs by its worlds alone
-            values = [figures[name] for name in COMPETENCE]
+            values = [figures[name] for name in competence_units()]
             shown_ = [NONE if value is None else format_number(value) for value in values]
             lines.append([part.method, str(seed), *shown_])
         if len(part.seeds) > 1:
-            means = [format_estimate(part.mean[name]) for name in COMPETENCE]
+            means = [format_estimate(part.mean[name]) for name in competence_units()]
             lines.append([part.method, "mean [95 %]", *means])
     return markdown_table(head, lines)
 
