@@ -25,6 +25,11 @@ def fixed(value: float, decimals: int = 2) -> str:
     return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
+def signed(value: float, decimals: int = 2) -> str:
+    """A number with its sign; none is minus zero."""
+    return f"{round(value, decimals) + 0.0:+.{decimals}f}"
+
+
 def p_shown(value: float | None) -> str:
     """A p-value."""
     if value is None:
