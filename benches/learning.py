@@ -23,8 +23,8 @@ from innerattn.experiments.paper.claims import LEAST_PAIRS
 from innerattn.experiments.paper.pairs import MARGINS
 from innerattn.report.plots.drawing import write_figure
 from innerattn.stats.comparison import contrast
-from innerattn.stats.intervals import student_interval
-from innerattn.stats.text import shown
+from innerattn.stats.student import student_interval
+from innerattn.stats.text import format_estimate
 
 PRESETS = ("mixed", "double", "single")
 METHODS = {"quick": ["td-inner"], "short": ["td-inner", "td-uniform", "ppo-inner", "ppo-uniform"]}
@@ -82,7 +82,7 @@ def attention_table(found: RunStatus) -> str:
                 cells += ["–", "–"]
                 continue
             alike = "yes" if compared.equivalent else "not shown"
-            cells += [shown(compared.difference), alike]
+            cells += [format_estimate(compared.difference), alike]
         rows.append([f"{method.removesuffix('-inner')}, {preset}", *cells])
     return table(head, rows) if rows else ""
 

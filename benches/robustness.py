@@ -23,7 +23,7 @@ from page import ROBUSTNESS, machine, publish, table
 from runs import Run, train_all
 
 from innerattn.records.run_folder import read_info
-from innerattn.stats.intervals import student_interval
+from innerattn.stats.student import student_interval
 
 METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform")
 SCRIPTED = ("greedy", "hungarian", "oracle")

@@ -3,9 +3,10 @@
 import hashlib
 import json
 import re
+from typing import Annotated
 
 import pytest
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from innerattn.config import (
     NetworkConfig,
@@ -15,6 +16,7 @@ from innerattn.config import (
     TrainConfig,
     load_run_config,
 )
+from innerattn.config.model import ADDED_LATER, Model, values_for_digest
 from innerattn.errors import ConfigError
 
 
@@ -190,9 +192,63 @@ def test_what_a_run_depends_on(method: str, warm_start: str, unused: set[str]) -
 
 def test_a_digest_is_that_of_the_values_in_use() -> None:
     config = RunConfig()
-    text = json.dumps(config.in_use(), sort_keys=True, separators=(",", ":"))
+    values = config.in_use()
+    del values["network"]["shared_gradients"]  # added later and at its default
+    text = json.dumps(values, sort_keys=True, separators=(",", ":"))
     assert config.digest() == hashlib.sha256(text.encode()).hexdigest()
     for unused in ({"ppo": {"epochs": 1}}, {"imitation": {"env_steps": 1}}):
         assert RunConfig(**unused).digest() == config.digest()
     for used in ({"td": {"gamma": 0.5}}, {"train": {"seed": 3}}, {"scenario": {"dt_s": 0.2}}):
         assert RunConfig(**used).digest() != config.digest()
+
+
+def seeded(seed: int) -> dict[str, object]:
+    return {"train.seed": seed, "train.threads": 1, "evaluate.seed": 12_345 + seed}
+
+
+TEAM_CREDIT: dict[str, object] = {"scenario.rescue_credit": "team"}
+PUBLISHED = [  # configurations of runs in docs/records, and what their digests were then
+    (("single", "td-inner", "short", seeded(9) | TEAM_CREDIT), "72116b7a620e1e982df071582e264ed1"),
+    (("single", "ppo-uniform", "short", seeded(0)), "7ba555e85597dc5945834cce35185e38"),
+    (("double", "td-uniform", "short", seeded(2)), "89d64f892e8f4d53bd38b7d2408474ce"),
+    (("mixed", "td-inner", "paper", seeded(0)), "85d6cfb65fec94f69a863a4a793d6f39"),
+]
+
+
+@pytest.mark.parametrize(("sources", "digest"), PUBLISHED)
+def test_digests_of_published_runs_stay_what_they_were(
+    sources: tuple[str, str, str, dict[str, object]], digest: str
+) -> None:
+    preset, method, budget, overrides = sources
+    config = load_run_config(preset, method, budget, overrides=overrides)
+    assert config.digest().startswith(digest)
+
+
+class Part(Model):
+    size: int = 1
+    added: Annotated[int, ADDED_LATER] = 2
+
+
+class Whole(Model):
+    part: Part = Field(default_factory=Part)
+    parts: tuple[Part, ...] = ()
+    sizes: tuple[int, ...] = (4, 5)
+    added: Annotated[Part, ADDED_LATER] = Field(default_factory=Part)
+
+
+def test_keys_added_later_count_only_where_they_are_not_at_their_default() -> None:
+    old = {"part": {"size": 1}, "parts": [{"size": 3}], "sizes": [4, 5]}
+    assert values_for_digest(Whole(parts=(Part(size=3),))) == old
+    changed = Whole(part=Part(added=7), parts=(Part(added=8),), added=Part(size=9))
+    assert values_for_digest(changed) == {
+        "part": {"size": 1, "added": 7},
+        "parts": [{"size": 1, "added": 8}],
+        "sizes": [4, 5],
+        "added": {"size": 9},
+    }
+
+
+def test_a_key_added_later_changes_the_digest_of_a_run_that_uses_it() -> None:
+    config = RunConfig(network=NetworkConfig(shared_gradients="mean"))
+    assert config.digest() != RunConfig().digest()
+    assert "shared_gradients" in RunConfig().in_use()["network"]

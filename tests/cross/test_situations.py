@@ -6,7 +6,7 @@ from scipy import stats
 
 from innerattn.config import Obstacle, Scenario, Task
 from innerattn.envs import BatchEnv
-from innerattn.policies import PolicyInput
+from innerattn.policies import PolicyInput, WorldState
 from innerattn.policies.scripted.dispatch import HungarianPolicy
 
 LEAST_P = 1e-3
@@ -101,7 +101,7 @@ def driven(scenario: Scenario, worlds: int, steps: int):
     obs = env.reset()
     for _ in range(steps):
         before = env.victims()
-        result = env.step(policy.act(PolicyInput.of(env, obs)))
+        result = env.step(policy.act(PolicyInput(obs, WorldState.of(env))))
         yield env, result, before, env.victims()
         obs = result.obs
 

@@ -9,7 +9,7 @@ from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.evaluate import play as episodes
 from innerattn.evaluate.play import run_episodes
-from innerattn.policies import PolicyInput, scripted_policy
+from innerattn.policies import PolicyInput, WorldState, scripted_policy
 from innerattn.records.record import FIELDS, Record
 
 
@@ -40,9 +40,9 @@ def test_record_against_a_plain_loop() -> None:
     events = []
     total = np.zeros((6, 4, 4))
     for t in range(12):
-        seen = PolicyInput.of(env, obs)
-        actions = policy.act(seen)
-        for name, value in [*seen._asdict().items(), ("actions", actions)]:
+        state = WorldState.of(env)
+        actions = policy.act(PolicyInput(obs, state))
+        for name, value in {"obs": obs, **state._asdict(), "actions": actions}.items():
             np.testing.assert_array_equal(record.steps[name][:, t], value)
         step = env.step(actions)
         np.testing.assert_array_equal(record.steps["rewards"][:, t].sum(-1), step.reward)
@@ -116,3 +116,63 @@ def test_no_episodes_are_refused(episodes: int) -> None:
 def test_unknown_fields_are_refused() -> None:
     with pytest.raises(ValueError, match="'smell'"):
         record_of("random", Scenario.preset("mixed"), 1, record=("smell",))
+
+
+class Watching:
+    """Stays, and keeps what it was shown."""
+
+    name = "watching"
+
+    def __init__(self, needs_true_state: bool) -> None:
+        self.needs_true_state = needs_true_state
+        self.seen: list[PolicyInput] = []
+        self.seeds: list[int] = []
+
+    def act(self, view: PolicyInput) -> np.ndarray:
+        self.seen.append(view)
+        return np.zeros(view.obs.shape[:2], np.int64)
+
+    def reset(self, seed: int) -> None:
+        self.seeds.append(seed)
+
+
+@pytest.mark.parametrize("needs", [True, False])
+def test_the_true_state_is_fetched_only_where_it_is_needed(
+    needs: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario, fetched = Scenario(episode_steps=3), []
+    whole = WorldState.of
+
+    def counted(env: BatchEnv) -> WorldState:
+        fetched.append(env)
+        return whole(env)
+
+    monkeypatch.setattr(WorldState, "of", counted)
+    policy = Watching(needs)
+    run_episodes(policy, scenario, 2, 0)
+    assert len(fetched) == (3 if needs else 0)
+    assert all((view.state is not None) == needs for view in policy.seen)
+    record = run_episodes(policy, scenario, 2, 0, record=("positions",))
+    assert len(fetched) == (6 if needs else 3)  # to be recorded
+    assert all((view.state is not None) == needs for view in policy.seen)
+    assert record.steps["positions"].shape == (2, 3, 4, 2)
+
+
+def test_a_policy_is_reset_before_it_plays_and_draws_the_same_again() -> None:
+    policy = Watching(False)
+    run_episodes(policy, Scenario(episode_steps=1), 2, 5)
+    run_episodes(policy, Scenario(episode_steps=1), 2, 5, first_episode=2)
+    assert policy.seeds[0] == 5
+    assert policy.seeds[1] not in (5, 7)
+    drawing = scripted_policy("random", Scenario(), 3)
+    first, second, other = (
+        run_episodes(drawing, Scenario(episode_steps=4), 3, seed, record=("actions",))
+        for seed in (0, 0, 1)
+    )
+    assert (first.steps["actions"] == second.steps["actions"]).all()
+    assert (first.steps["actions"] != other.steps["actions"]).any()
+
+
+def test_a_script_without_the_true_state_says_so() -> None:
+    with pytest.raises(ValueError, match="state = None"):
+        scripted_policy("greedy", Scenario()).act(PolicyInput(np.zeros((1, 4, 44), np.float32)))

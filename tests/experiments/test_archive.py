@@ -14,7 +14,7 @@ from innerattn.experiments.archive import FILE, FORMAT, read_archive, write_arch
 from innerattn.experiments.plan import plan
 from innerattn.experiments.run import FinishedRun, read_run, refuse_without_steps
 from innerattn.experiments.scan import finished_runs, scan_runs
-from innerattn.report.crossed import write_crossed
+from innerattn.report.crossed.write import write_crossed
 
 
 def test_what_is_written_is_read_but_for_steps(runs: list[FinishedRun], tmp_path: Path) -> None:

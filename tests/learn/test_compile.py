@@ -11,6 +11,7 @@ from innerattn.nn import EntityColumns
 
 NETWORK = {"hidden_width": 8, "attention_heads": 2}
 AVAILABLE = 4  # column of the observation
+BY_KIND = {"attention": "inner", "parameter_sharing": "kind"}
 ENTITIES = {"attention": "inner", "encoder": "entities"}
 ENVS, STEPS = 6, 4
 
@@ -111,7 +112,7 @@ def test_the_traced_update_agrees_by_entities() -> None:
 
 
 def test_the_traced_update_agrees_by_kind() -> None:
-    agree("td", 4, "aot_eager", {"attention": "inner", "parameter_sharing": "kind"}, {})
+    agree("td", 4, "aot_eager", {**BY_KIND, "shared_gradients": "mean"}, {})
 
 
 @pytest.mark.parametrize("algorithm", ["td", "ppo"])
@@ -122,7 +123,7 @@ def test_the_compiled_update_agrees(algorithm: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "network",
-    [ENTITIES, {"attention": "inner", "parameter_sharing": "kind"}],
+    [ENTITIES, BY_KIND],
     ids=["entities", "kind"],
 )
 def test_the_compiled_update_agrees_with_other_networks(network: dict) -> None:

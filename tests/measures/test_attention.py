@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from innerattn.config import Scenario
-from innerattn.measures.attention import entropy_of
+from innerattn.measures.attention import attention_entropy, entropy_of
 from innerattn.records.record import Record, rescue_dtype
 
 
@@ -53,3 +53,42 @@ def test_no_choice_has_no_share(robots: int) -> None:
 
 def test_no_attention_no_entropy() -> None:
     assert entropy_of(record(None, [3])) is None
+
+
+def plain_entropy(weights: np.ndarray) -> list[list[float]]:
+    batch, heads, robots, _ = weights.shape
+    rows = []
+    for robot in range(robots):
+        row = []
+        for head in range(heads):
+            total = 0.0
+            for b in range(batch):
+                for w in weights[b, head, robot]:
+                    total -= float(w) * math.log(w) if w > 0 else 0.0
+            row.append(total / batch)
+        rows.append(row)
+    return rows
+
+
+def test_entropy_against_a_plain_loop() -> None:
+    rng = np.random.default_rng(0)
+    weights = rng.dirichlet(np.full(4, 0.3), (6, 3, 4)).astype(np.float32)
+    weights[0, 0, 0] = [0, 1, 0, 0]
+    found = attention_entropy(weights)
+    assert found.shape == (4, 3)
+    np.testing.assert_allclose(found, plain_entropy(weights), atol=1e-12)
+
+
+@pytest.mark.parametrize(("robots", "nats"), [(1, 0.0), (2, 0.0), (4, 1.0986122886681098)])
+def test_entropy_of_even_attention(robots: int, nats: float) -> None:
+    even = (1 - np.eye(robots)) / max(robots - 1, 1)
+    weights = np.broadcast_to(even, (5, 2, robots, robots)).astype(np.float32)
+    np.testing.assert_allclose(attention_entropy(weights), np.full((robots, 2), nats), atol=1e-6)
+
+
+def test_entropy_takes_time_and_episodes_together() -> None:
+    rng = np.random.default_rng(1)
+    weights = rng.dirichlet(np.ones(3), (5, 7, 2, 3)).astype(np.float32)
+    np.testing.assert_allclose(
+        attention_entropy(weights), plain_entropy(weights.reshape(35, 2, 3, 3)), atol=1e-12
+    )

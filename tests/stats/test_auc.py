@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import rankdata
 
 from innerattn.stats.auc import Comparison, areas, compare
-from innerattn.stats.resampling import resampled_counts
+from innerattn.stats.bootstrap import resampled_counts
 
 
 def scores(episodes: int, samples: int, seed: int, holes: bool = True) -> np.ndarray:

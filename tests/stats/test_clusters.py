@@ -9,6 +9,7 @@ from scipy.stats import t as student
 from statsmodels.api import OLS
 from statsmodels.stats.proportion import proportion_confint
 
+from innerattn.stats import Estimate
 from innerattn.stats.clusters import ratio_interval, ratio_intervals, share_interval, share_of
 
 
@@ -32,7 +33,7 @@ def test_by_hand() -> None:
     # Three episodes with events, 5 hits of 8; residuals x - n 5/8 are -1/4, 3/4, -1/2.
     share = share_of([1, 0, 2, 2], [2, 0, 2, 4])
     assert share is not None
-    assert (share.value, share.episodes) == (0.625, 3)
+    assert (share.share, share.episodes) == (0.625, 3)
     variance = 3 / 2 * (1 / 16 + 9 / 16 + 4 / 16) / 64
     assert share.effective_events == pytest.approx(0.625 * 0.375 / variance)
 
@@ -45,7 +46,7 @@ def test_variance_and_interval_against_statsmodels(share: float) -> None:
     hit, episode = as_events(hits, events)
     fit = OLS(hit, np.ones_like(hit)).fit(cov_type="cluster", cov_kwds={"groups": episode})
     p, n = fit.params[0], found.effective_events
-    assert found.value == pytest.approx(p)
+    assert found.share == pytest.approx(p)
     assert n == pytest.approx(p * (1 - p) / fit.bse[0] ** 2)
     mean, low, high = ratio_intervals(hits.astype(float), events.astype(float))
     quantile = student.ppf(0.975, np.sum(events > 0) - 1)
@@ -54,7 +55,8 @@ def test_variance_and_interval_against_statsmodels(share: float) -> None:
     )
     # Wilson's interval at the level at which the normal quantile is Student's.
     alpha = 2 * norm.sf(quantile)
-    assert found.interval() == pytest.approx(
+    interval = found.estimate()
+    assert (interval.low, interval.high) == pytest.approx(
         proportion_confint(p * n, n, alpha=alpha, method="wilson"), abs=1e-9
     )
 
@@ -71,8 +73,10 @@ def test_interval_and_tests_agree(rows: list[tuple[int, int]], level: float) -> 
     if share is None:
         assert counts.sum() == 0
         return
-    low, high = share.interval(level)
-    assert 0.0 <= low <= share.value <= high <= 1.0
+    interval = share.estimate(level)
+    low, high = interval.low, interval.high
+    assert interval.mean == share.share
+    assert 0.0 <= low <= share.share <= high <= 1.0
     for bound in (0.2, 0.4, 0.6):
         if abs(low - bound) > 1e-9:
             assert (share.p_above(bound) < (1 - level) / 2) == (low > bound)
@@ -88,10 +92,10 @@ def test_episodes_alike_count_as_one_event_each() -> None:
         assert share.effective_events == 3
     all_hits = share_of([1] * 50, [1] * 50)
     assert all_hits is not None
-    low, high = all_hits.interval()
-    assert high == 1.0
+    interval = all_hits.estimate()
+    assert interval.high == 1.0
     t = student.ppf(0.975, 49)
-    assert low == pytest.approx(50 / (50 + t * t))
+    assert interval.low == pytest.approx(50 / (50 + t * t))
 
 
 def test_one_episode_and_none() -> None:
@@ -99,7 +103,7 @@ def test_one_episode_and_none() -> None:
     assert share_interval([0], [0]) is None
     alone = share_of([3, 0], [4, 0])
     assert alone is not None
-    assert alone.interval() == (0.0, 1.0)
+    assert alone.estimate() == Estimate(0.75, 0.0, 1.0)
     assert (alone.p_above(0.1), alone.p_below(0.9)) == (1.0, 1.0)
     assert ratio_interval([3.0, 0.0], [4, 0]) is None
     mean, low, high = ratio_intervals(np.array([[3.0, 0], [0, 0]]), np.array([[4.0, 0], [0, 0]]))

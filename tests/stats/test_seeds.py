@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from innerattn.stats import Estimate
-from innerattn.stats.intervals import student_interval
 from innerattn.stats.seeds import numbers, seed_curve, seed_estimate
+from innerattn.stats.student import student_interval
 
 
 def test_a_mean_says_how_many_runs_have_it() -> None:

@@ -6,7 +6,7 @@ from torch import Tensor
 
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
-from innerattn.policies import PolicyInput, scripted_policy
+from innerattn.policies import PolicyInput, WorldState, scripted_policy
 from innerattn.train.collect import Collector
 
 
@@ -22,7 +22,7 @@ class Scripted:
         assert not greedy  # training explores
         self.seen.append(obs)
         env = self.env
-        view = PolicyInput.of(env, obs.numpy())
+        view = PolicyInput(obs.numpy(), WorldState.of(env))
         return torch.from_numpy(self.policy.act(view))
 
 

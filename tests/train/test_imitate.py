@@ -13,7 +13,7 @@ from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
 from innerattn.learn.types import Transitions
-from innerattn.policies import PolicyInput, scripted_policy
+from innerattn.policies import PolicyInput, WorldState, scripted_policy
 from innerattn.records.run_folder import read_info
 from innerattn.train import Progress, load_policy, train
 from innerattn.train.build import build_learner
@@ -84,7 +84,7 @@ def test_labels_are_of_the_states_that_the_learner_met(small_config: Configure) 
         obs = env.reset()
         for step, (met, taken) in enumerate(zip(learner.met, learner.taken, strict=True)):
             np.testing.assert_array_equal(met, obs)
-            wanted = script.act(PolicyInput.of(env, obs))
+            wanted = script.act(PolicyInput(obs, WorldState.of(env)))
             assert figures[step]["agreement"] == pytest.approx((taken.numpy() == wanted).mean())
             for world in range(12):
                 labels[obs[world].tobytes()] = (step, wanted[world].tolist())

@@ -13,7 +13,7 @@ import pytest
 
 from innerattn.config import load_run_config
 from innerattn.train import Progress, train
-from innerattn.train.interruption import heard_interruptions
+from innerattn.train.interruption import remembered_interruptions
 
 
 @pytest.fixture(autouse=True)
@@ -30,7 +30,7 @@ def swallowed() -> None:
 
 
 def test_what_was_swallowed_is_raised_when_asked_for() -> None:
-    with heard_interruptions() as check:
+    with remembered_interruptions() as check:
         check()
         swallowed()
         for _ in range(2):
@@ -41,7 +41,7 @@ def test_what_was_swallowed_is_raised_when_asked_for() -> None:
 
 def test_other_handlers_and_threads_stay_as_they_are() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with heard_interruptions() as check:
+    with remembered_interruptions() as check:
         assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
         signal.raise_signal(signal.SIGINT)
         check()
@@ -51,7 +51,7 @@ def test_other_handlers_and_threads_stay_as_they_are() -> None:
     seen = []
 
     def elsewhere() -> None:
-        with heard_interruptions():
+        with remembered_interruptions():
             seen.append(signal.getsignal(signal.SIGINT))
 
     thread = threading.Thread(target=elsewhere)

@@ -6,7 +6,6 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,11 +19,10 @@ from innerattn.envs.batch import FAULT_KINDS
 from innerattn.report.tables.robustness import print_robustness
 
 if TYPE_CHECKING:
-    from innerattn.config import Scenario
     from innerattn.evaluate.bounds.results import Bounds
-    from innerattn.evaluate.faults.grid import Grid, MakePolicy, Retention
-    from innerattn.evaluate.trained import TrainedPolicy
+    from innerattn.evaluate.faults.grid import Grid, Retention
     from innerattn.measures.faults.shift_results import FaultAttention
+    from innerattn.policies import Policy
 
 _SCRIPTED = ("greedy", "hungarian", "oracle")
 _MOST = 1_000_000  # episodes, and steps of one
@@ -130,12 +128,13 @@ class Robustness(Command):
         seed = config.evaluate.replace(**given).seed
         scenario = config.scenario.replace(episode_steps=steps, faults=())
         grid = Grid(scenario, kinds=kinds, episodes=self.episodes, seed=seed)
-        policies: list[tuple[str, MakePolicy]] = []
+        policies: list[tuple[str, Policy]] = []
         methods: dict[str, str] = {}
         for name, run in zip(_names(self.runs), self.runs, strict=True):
-            methods[name] = load_trained(run, scenario)[0].train.method
-            policies.append((name, partial(_trained, run, scenario)))
-        policies += [(name, partial(scripted_policy, name, scenario, seed)) for name in _SCRIPTED]
+            trained, policy = load_trained(run, scenario)
+            methods[name] = trained.train.method
+            policies.append((name, policy))
+        policies += [(name, scripted_policy(name, scenario, seed)) for name in _SCRIPTED]
         with torch_threads(thread_count(config)), Evaluating() as progress:
             found = play_all(policies, grid, num_threads=config.train.threads, progress=progress)
         return grid, found, methods
@@ -168,13 +167,6 @@ class Robustness(Command):
                 for name, run in zip(_names(self.runs), self.runs, strict=True)
                 if bounds[name].attention == "inner"
             }
-
-
-def _trained(run: str, scenario: Scenario) -> TrainedPolicy:
-    """The policy of a run that fits these worlds, as if it had never acted."""
-    from innerattn.evaluate.trained import load_trained
-
-    return load_trained(run, scenario)[1]
 
 
 def _names(runs: Sequence[str]) -> list[str]:

@@ -1,6 +1,6 @@
 """Finding presets, reading TOML with errors that name the file, writing files whole.
 
-It knows no field of any model.
+It knows no key of any model.
 """
 
 from __future__ import annotations

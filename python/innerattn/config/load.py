@@ -1,4 +1,4 @@
-"""From presets, a file and single values to one `RunConfig`, and from there to TOML and back.
+"""Makes a `RunConfig` from presets, a file and single values, and writes and reads it as TOML.
 
 Later sources win: scenario preset, budget, what the algorithm changes in the budget, what it
 changes after a warm start, configuration file, single values.
@@ -21,7 +21,7 @@ from innerattn.config.scenario import Scenario
 from innerattn.errors import ConfigError
 
 _CHOOSING = ("method", "warm_start")
-"""Keys of the section `train` that choose among what a budget says."""
+"""Keys of the section `train` on which the values of a budget depend."""
 
 
 def load_run_config(

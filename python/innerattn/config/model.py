@@ -1,7 +1,4 @@
-"""What all configuration models share: strictness, checked copies and one-line errors.
-
-It knows no field of any model.
-"""
+"""What all configuration models share: strict types, checked copies, digests, one-line errors."""
 
 from __future__ import annotations
 
@@ -17,6 +14,7 @@ from pydantic import (
     ValidationInfo,
     field_validator,
 )
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from innerattn.errors import ConfigError
@@ -25,6 +23,11 @@ MOST_ROWS = 1_000_000_000
 """Upper limit of what is held in memory: far beyond what any machine holds."""
 MOST_STEPS = 1_000_000_000_000_000
 """Upper limit of what is counted in steps."""
+
+
+ADDED_LATER = "added later"
+"""Annotates a key that came after runs had been published. At its default such a key is no part of
+a digest, so that the digests of earlier runs stay what they were; its default must never change."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ class Model(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _of_its_own_type(cls, value: object, info: ValidationInfo) -> object:
-        """Refuse what pydantic would take for a number or a truth: true for 1, "25" for 25."""
+        """Refuse what pydantic would convert: true to 1, "25" to 25, 1 to true."""
         kinds = set(_types(cls.model_fields[str(info.field_name)].annotation))
         if bool in kinds and not isinstance(value, bool):
             raise PydanticCustomError("type", "Input should be true or false")
@@ -83,6 +86,27 @@ class Model(BaseModel):
             return self.model_validate(self.model_dump() | fields)
         except ValidationError as error:
             raise config_error(error, self.place) from error
+
+
+def values_for_digest(model: BaseModel) -> dict[str, Any]:
+    """JSON values of a model by key, without keys `ADDED_LATER` that have their default."""
+    known, values = type(model).model_fields, model.model_dump(mode="json")
+    for name, value in model:
+        info = known.get(name)
+        if info is not None and ADDED_LATER in info.metadata and value == _default(info):
+            del values[name]
+        elif isinstance(value, BaseModel):
+            values[name] = values_for_digest(value)
+        elif isinstance(value, tuple):
+            values[name] = [
+                values_for_digest(part) if isinstance(part, BaseModel) else given
+                for part, given in zip(value, values[name], strict=True)
+            ]
+    return values
+
+
+def _default(info: FieldInfo) -> object:
+    return info.get_default(call_default_factory=True)
 
 
 def _types(annotation: Any) -> Iterator[Any]:

@@ -17,41 +17,48 @@ class PPOConfig(AlgorithmConfig):
     place: ClassVar[str] = "ppo"
 
     gae_lambda: float = Field(
-        0.9, ge=0.0, le=1.0, description="how far advantages look: 0 one step, 1 to the end"
+        0.9, ge=0.0, le=1.0, description="horizon of advantages: 0 is one step, 1 the whole episode"
     )
     learning_rate: float = Field(0.003, gt=0.0, le=1.0, description="step size of Adam")
     final_learning_rate_share: float = Field(
         0.1,
         ge=0.0,
         le=1.0,
-        description="share of the step size left at the end of training; it falls evenly",
+        description="share of the step size left at the end of training; it falls linearly",
     )
     rollout_steps: int = Field(
         25, ge=1, le=MOST_ROWS, description="control steps of every world between updates [steps]"
     )
     epochs: int = Field(5, ge=1, le=1_000, description="passes over a rollout")
     minibatch_size: int = Field(400, ge=1, le=MOST_ROWS, description="rows of a rollout per update")
-    clip: float = Field(0.2, gt=0.0, lt=1.0, description="how far a probability ratio counts")
+    clip: float = Field(
+        0.2, gt=0.0, lt=1.0, description="largest change of a probability ratio that counts"
+    )
     value_clip: float | None = Field(
-        None, gt=0.0, description="how far a value may move per rollout; None: freely"
+        None, gt=0.0, description="largest change of a value per rollout that counts; None: any"
     )
     entropy_weight: float = Field(0.01, ge=0.0, description="weight of the policy's entropy")
     stop_at_kl: float | None = Field(
-        None, gt=0.0, description="divergence that ends a rollout's epochs [nats]; None: none does"
+        None,
+        gt=0.0,
+        description="KL divergence that ends a rollout's epochs [nats]; None: none does",
     )
     advantage: Literal["counterfactual", "value"] = Field(
         "counterfactual",
-        description="baseline: expectation of Q over the own action, or a value head; mappo needs "
-        "the latter",
+        description="baseline: expectation of Q over the robot's own actions, or a value head; "
+        "mappo needs the value head",
     )
     attention_logit_penalty: float = Field(
-        0.0, ge=0.0, description="weight of the squared attention logits in the critic's loss"
+        0.0,
+        ge=0.0,
+        description="weight of attention-logit regularisation (mean squared logits) in the "
+        "critic's loss",
     )
     critic_weight_decay: float = Field(0.0, ge=0.0, description="L2 penalty of the critic's Adam")
     critic_grad_clip: float = Field(40.0, gt=0.0, description="largest norm of critic gradients")
     actor_grad_clip: float = Field(0.5, gt=0.0, description="largest norm of an actor's gradients")
     return_deviation_floor: float = Field(
-        1e-2, gt=0.0, description="least deviation of returns that rewards are divided by"
+        1e-2, gt=0.0, description="least standard deviation of returns that rewards are divided by"
     )
 
     @property

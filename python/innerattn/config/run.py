@@ -13,7 +13,7 @@ from typing import Any, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from innerattn.config.files import preset_names
-from innerattn.config.model import Model, config_error
+from innerattn.config.model import Model, config_error, values_for_digest
 from innerattn.config.ppo import PPO, PPOConfig
 from innerattn.config.registry import (
     AlgorithmConfig,
@@ -81,18 +81,25 @@ class RunConfig(Model):
 
         Sections of other algorithms, and that of a warm start where there is none, are left out.
         """
-        unused = algorithms().keys() - {self.algorithm.place}
-        if self.train.warm_start == "none":
-            unused.add("imitation")
-        return self.model_dump(mode="json", exclude=unused)
+        return self.model_dump(mode="json", exclude=self._unused())
 
     def digest(self) -> str:
         """SHA-256, in hexadecimal, of the values `in_use` as JSON with sorted keys.
 
-        It does not depend on how a file writes them or on keys that it leaves to their defaults.
+        It does not depend on how a file writes the values, nor on whether the file gives a default.
+        Keys that were added after runs had been published count only where they are not at their
+        default; see `innerattn.config.model.ADDED_LATER`.
         """
-        text = json.dumps(self.in_use(), sort_keys=True, separators=(",", ":"), allow_nan=False)
+        values = values_for_digest(self)
+        for section in self._unused() & values.keys():
+            del values[section]
+        text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()
+
+    def _unused(self) -> set[str]:
+        """Sections that the run does not depend on."""
+        unused = algorithms().keys() - {self.algorithm.place}
+        return unused if self.train.warm_start != "none" else unused | {"imitation"}
 
     @model_validator(mode="before")
     @classmethod

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from innerattn.config.model import MOST_ROWS, MOST_STEPS, Model, OneOf
+from innerattn.config.model import ADDED_LATER, MOST_ROWS, MOST_STEPS, Model, OneOf
 from innerattn.config.registry import attentions, methods, register_attention
 
 register_attention("inner", "innerattn.nn:InnerAttention")
@@ -36,16 +36,21 @@ class NetworkConfig(Model):
     )
     encoder: Literal["flat", "entities"] = Field(
         "flat",
-        description="first layer of actors and critic: of whole observations, or of teammates and "
-        "victims apart, whatever their order; mappo needs the former",
+        description="first layer of actors and critic: flat takes the whole observation; entities "
+        "encodes teammates and victims separately, in any order; mappo needs flat",
     )
     parameter_sharing: Literal["none", "kind"] = Field(
         "none",
-        description="none: actors, encoders and critics are each robot's own; kind: robots of a "
-        "kind have the same, but for a critic without attention",
+        description="none: every robot has its own actor, encoders and critic; kind: robots of a "
+        "kind share them, except a critic without attention",
+    )
+    shared_gradients: Annotated[Literal["sum", "mean"], ADDED_LATER] = Field(
+        "sum",
+        description="gradient of layers that robots of a kind share: the sum of the robots' "
+        "gradients, or their mean; that of the attention is always the mean",
     )
     precision: Literal["float32", "bfloat16"] = Field(
-        "float32", description="of the products in an update; weights are float32 in any case"
+        "float32", description="of matrix products in an update; weights are always float32"
     )
 
     @model_validator(mode="after")
@@ -67,26 +72,29 @@ class ImitationConfig(Model):
         750_000,
         ge=1,
         le=MOST_STEPS,
-        description="length of imitation, all worlds counted [env-steps]",
+        description="length of imitation, summed over worlds [env-steps]",
     )
     critic_env_steps: int = Field(
         100_000,
         ge=0,
         le=MOST_STEPS,
-        description="last part of it in which the critic learns too [env-steps]",
+        description="last part of the imitation, in which the critic learns too [env-steps]",
     )
     batch_size: int = Field(
         1_024, ge=1, le=MOST_ROWS, description="labelled states per step of the actors"
     )
     update_every_env_steps: int = Field(
-        256, ge=1, le=MOST_STEPS, description="one step of the actors per so many steps [env-steps]"
+        256,
+        ge=1,
+        le=MOST_STEPS,
+        description="steps of all worlds per step of the actors [env-steps]",
     )
     learning_rate: float = Field(0.002, gt=0.0, le=1.0, description="step size of Adam")
     final_learning_rate_share: float = Field(
         0.02,
         ge=0.0,
         le=1.0,
-        description="share of the step size left at the end of imitation; it falls evenly",
+        description="share of the step size left at the end of imitation; it falls linearly",
     )
     memory_env_steps: int = Field(
         500_000,
@@ -111,20 +119,23 @@ class TrainConfig(Model):
         None,
         ge=1,
         le=256,
-        description="threads of worlds and networks; None: as many as are worth it",
+        description="threads of worlds and networks; None: as many as pay",
     )
     compile: Literal["auto", "on", "off"] = Field(
-        "auto", description="compile the update before training; auto: where the run is long enough"
+        "auto", description="compile the update before training; auto: if the run is long enough"
     )
     num_envs: int = Field(64, ge=1, le=1_000_000, description="worlds stepped side by side")
     env_steps: int = Field(
         150_000,
         ge=1,
         le=MOST_STEPS,
-        description="length of learning from rewards, all worlds counted [env-steps]",
+        description="length of learning from rewards, summed over worlds [env-steps]",
     )
     log_every_env_steps: int = Field(
-        5_000, ge=1, le=MOST_STEPS, description="one line of metrics per so many steps [env-steps]"
+        5_000,
+        ge=1,
+        le=MOST_STEPS,
+        description="steps of all worlds per line of metrics [env-steps]",
     )
 
 
@@ -134,7 +145,7 @@ class EvaluateConfig(Model):
     place: ClassVar[str] = "evaluate"
 
     episodes: int = Field(
-        80, ge=1, le=1_000_000, description="episodes that cooperation is counted over"
+        80, ge=1, le=1_000_000, description="episodes in which cooperation is counted"
     )
     score_episodes: int = Field(
         1_000, ge=2, le=1_000_000, description="episodes that rescues are averaged over"
@@ -144,6 +155,6 @@ class EvaluateConfig(Model):
         100, ge=1, le=100_000, description="second episode length [control steps]"
     )
     greedy_actions: bool = Field(
-        True, description="take the likeliest action instead of drawing one"
+        True, description="take the most likely action instead of drawing one"
     )
     seed: int = Field(12_345, ge=0, lt=2**63, description="seed of the evaluation's worlds")

@@ -19,21 +19,21 @@ class TDConfig(AlgorithmConfig):
         0.02, gt=0.0, le=1.0, description="step of the target networks towards the trained ones"
     )
     reward_scale: float = Field(
-        10.0, gt=0.0, description="1/temperature: higher rewards less randomness"
+        10.0, gt=0.0, description="1/temperature; a higher value rewards randomness less"
     )
     learning_rate: float = Field(0.002, gt=0.0, le=1.0, description="step size of Adam")
     final_learning_rate_share: float = Field(
         0.05,
         ge=0.0,
         le=1.0,
-        description="share of the step size left at the end of training; it falls evenly",
+        description="share of the step size left at the end of training; it falls linearly",
     )
     batch_size: int = Field(256, ge=1, le=MOST_ROWS, description="transitions per update")
     update_every_env_steps: int = Field(
         50,
         ge=1,
         le=MOST_STEPS,
-        description="one update per so many steps, all worlds counted [env-steps]",
+        description="steps of all worlds per update [env-steps]",
     )
     warmup_env_steps: int = Field(
         1_000,
@@ -45,21 +45,24 @@ class TDConfig(AlgorithmConfig):
         200_000, ge=1, le=MOST_ROWS, description="size of the replay memory"
     )
     attention_logit_penalty: float = Field(
-        0.0, ge=0.0, description="weight of the squared attention logits in the critic's loss"
+        0.0,
+        ge=0.0,
+        description="weight of attention-logit regularisation (mean squared logits) in the "
+        "critic's loss",
     )
     critic_weight_decay: float = Field(0.0, ge=0.0, description="L2 penalty of the critic's Adam")
     critic_grad_clip: float = Field(40.0, gt=0.0, description="largest norm of critic gradients")
     actor_grad_clip: float = Field(0.5, gt=0.0, description="largest norm of an actor's gradients")
     policy_gradient: Literal["expected", "sampled"] = Field(
-        "expected", description="exact expectation over the own action, or one sample"
+        "expected", description="expectation over the robot's own actions, or one sampled action"
     )
     entropy_target: Literal["consistent", "maac"] = Field(
         "consistent",
-        description="entropy term of the target: discounted and masked with the value, or as in "
-        "the MAAC reference",
+        description="entropy term of the target: discounted and masked like the value, or as in "
+        "the code of MAAC",
     )
     reward_std_floor: float = Field(
-        1e-2, gt=0.0, description="least deviation that rewards are divided by"
+        1e-2, gt=0.0, description="least standard deviation that rewards are divided by"
     )
 
     @model_validator(mode="after")

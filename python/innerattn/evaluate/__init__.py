@@ -11,7 +11,7 @@ from innerattn.policies import SCRIPTED, Policy, PolicyInput, scripted_policy
 from innerattn.records.parquet import read_records, write_records
 from innerattn.records.record import Record
 from innerattn.stats import Estimate
-from innerattn.stats.intervals import student_interval
+from innerattn.stats.student import student_interval
 
 __all__ = [
     "SCRIPTED",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
-from innerattn.policies.policy import Policy, PolicyInput
+from innerattn.policies import Policy, PolicyInput, WorldState
 from innerattn.records.record import FIELDS, Record, rescue_dtype
 
 _WORLDS_AT_ONCE = 1024
@@ -41,7 +41,7 @@ def run_episodes(
     num_threads: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Record:
-    """Run a policy for a number of episodes.
+    """Run a policy for a number of episodes; it is reset first.
 
     Args:
         policy: what drives the robots.
@@ -65,6 +65,7 @@ def run_episodes(
     unknown = set(record) - set(FIELDS)
     if unknown:
         raise ValueError(f"record = {sorted(unknown)}: known are {', '.join(FIELDS)}")
+    policy.reset(_draw_seed(seed, first_episode))
     parts = []
     for start in range(first_episode, first_episode + episodes, _WORLDS_AT_ONCE):
         count = min(_WORLDS_AT_ONCE, first_episode + episodes - start)
@@ -74,6 +75,13 @@ def run_episodes(
         if progress is not None:
             progress(count)
     return _joined(parts)
+
+
+def _draw_seed(seed: int, first_episode: int) -> int:
+    """The seed of what a policy draws; later episodes have draws of their own."""
+    if first_episode == 0:
+        return seed
+    return int(np.random.SeedSequence((seed, first_episode)).generate_state(1)[0])
 
 
 def _run_batch(
@@ -87,10 +95,13 @@ def _run_batch(
     rewards_total = np.zeros((env.num_envs, env.num_robots, len(env.reward_component_names)))
     steps: dict[str, NDArray[Any]] = {}
     events = []
+    state_needed = policy.needs_true_state or not set(record).isdisjoint(WorldState._fields)
     for step_index in range(total_steps):
-        view = PolicyInput.of(env, obs)
+        state = WorldState.of(env) if state_needed else None
+        view = PolicyInput(obs, state if policy.needs_true_state else None)
         actions = policy.act(view)
-        seen: dict[str, NDArray[Any]] = {**view._asdict(), "actions": actions}
+        seen: dict[str, NDArray[Any]] = {"obs": obs, "actions": actions}
+        seen |= {} if state is None else state._asdict()
         if "attention" in record and isinstance(policy, Attentive):
             weights = policy.attention(view, actions)
             seen |= {} if weights is None else {"attention": weights}

@@ -21,6 +21,8 @@ from innerattn.train import load_policy
 class TrainedPolicy:
     """Acts as a learner does, by drawing actions or by taking the likeliest."""
 
+    needs_true_state = False
+
     def __init__(self, learner: Learner, name: str, *, greedy: bool = False) -> None:
         """Wrap ``learner``; ``greedy`` takes the likeliest actions."""
         self.name = name
@@ -31,6 +33,10 @@ class TrainedPolicy:
         """See `Policy.act`."""
         actions = self._learner.act(torch.tensor(view.obs), greedy=self._greedy)
         return np.asarray(actions.numpy())
+
+    def reset(self, seed: int) -> None:
+        """See `Policy.reset`."""
+        self._learner.seed_draws(seed)
 
     def attention(self, view: PolicyInput, actions: NDArray[Any]) -> NDArray[np.float32] | None:
         """See `Attentive.attention`."""

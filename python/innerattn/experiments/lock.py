@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
+import sys
 from multiprocessing import reduction
 from pathlib import Path
 from types import TracebackType
@@ -11,12 +11,29 @@ from typing import Any, Self
 
 from innerattn.errors import RunError
 
+if sys.platform == "win32":
+    import msvcrt
+
+    def _lock(file: int) -> None:
+        """Lock an open file, or raise an OSError where another has it."""
+        msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+else:
+    import fcntl
+
+    def _lock(file: int) -> None:
+        """Lock an open file, or raise an OSError where another has it."""
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+_NOFOLLOW = getattr(os, "O_NOFOLLOW", 0)
+
 
 class StudyLock:
     """Keeps others out of a study's folder; a context manager.
 
     A process that is started with the lock as an argument holds it too, until it ends: where a
-    study is killed, its runs end a little later, and only then may the next study remove them.
+    study is killed, its runs end a little later, and only then may the next study remove them. On
+    Windows only the process that took the lock holds it.
     """
 
     def __init__(self, file: int) -> None:
@@ -32,12 +49,12 @@ class StudyLock:
         """
         try:
             out.mkdir(parents=True, exist_ok=True)
-            file = os.open(out / ".lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+            file = os.open(out / ".lock", os.O_RDWR | os.O_CREAT | _NOFOLLOW, 0o644)
         except OSError as error:
             raise RunError(f"{out}: cannot hold a study ({error.strerror})") from error
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
+            _lock(file)
+        except (BlockingIOError, PermissionError) as error:
             os.close(file)
             raise RunError(
                 f"{out}: another study is at work here, or its last runs are still ending; "
@@ -60,6 +77,8 @@ class StudyLock:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For a process that is being started: the same open file, and with it the same lock."""
+        if sys.platform == "win32":
+            return StudyLock, (os.open(os.devnull, os.O_RDONLY),)
         return _handed_down, (reduction.DupFd(self._file),)
 
 

@@ -16,7 +16,7 @@ from multiprocessing import connection, get_context, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 from innerattn.config import RunConfig
 from innerattn.errors import needs_no_traceback, one_line
@@ -26,8 +26,12 @@ if TYPE_CHECKING:
     from innerattn.train import Progress
 
 _SPAWN = get_context("spawn")
-_FOR_THE_FIRST = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+_FOR_THE_FIRST = {
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+}
 """Signals that only the first process minds; the others learn of the end from it."""
+_CAN_BLOCK = hasattr(signal, "pthread_sigmask")
+"""Whether a process can be started with signals blocked; on Windows it cannot."""
 _TRAINING = 0.95
 """Part of a run that is training; the rest is evaluation."""
 _REPORT_EVERY_S = 0.2
@@ -105,13 +109,14 @@ def train_side_by_side(
     """
     waiting = deque(runs)
     running: dict[Connection, tuple[Run, BaseProcess]] = {}
-    resource_tracker.ensure_running()  # would else unblock signals in the middle of a start
+    if _CAN_BLOCK:
+        resource_tracker.ensure_running()  # would else unblock signals in the middle of a start
     try:
         while waiting or running:
             while waiting and len(running) < at_once:
                 _start(waiting.popleft(), running, debug, keep)
             for pipe in connection.wait(list(running)):
-                assert isinstance(pipe, Connection)
+                pipe = cast(Connection, pipe)
                 run, process = running[pipe]
                 _hear(run, pipe, process)
                 if run.state != "running":
@@ -129,7 +134,9 @@ def _start(
     run: Run, running: dict[Connection, tuple[Run, BaseProcess]], debug: bool, keep: object
 ) -> None:
     """Start a process that Ctrl-C does not reach: what a terminal sends, it sends to all."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _FOR_THE_FIRST)  # handed down to the process
+    before = set()
+    if _CAN_BLOCK:  # what is blocked is handed down to the process
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _FOR_THE_FIRST)
     try:
         pipe, its_end = _SPAWN.Pipe()
         arguments = (run.config, run.folder, its_end, debug, keep, run.trained)
@@ -139,7 +146,8 @@ def _start(
         run.state = "running"
         running[pipe] = (run, process)
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if _CAN_BLOCK:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _hear(run: Run, pipe: Connection, process: BaseProcess) -> None:
@@ -192,6 +200,8 @@ def work(
         trained: measure it only.
     """
     del keep  # it lasts without this name
+    if not _CAN_BLOCK:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     report = _Report(pipe)
     try:
         from innerattn.evaluate import evaluate_run

@@ -1,4 +1,4 @@
-"""Learners: they act, take in transitions and improve; they know no environment and no file."""
+"""Learners: they act, store transitions and improve. They know no environment and no file."""
 
 from innerattn.learn.ppo import PPO
 from innerattn.learn.replay import Replay

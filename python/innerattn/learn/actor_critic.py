@@ -1,6 +1,6 @@
-"""What every learner here is made of: per-robot actors, a critic, and their Adams.
+"""The base of the learners: actors, a critic and their optimisers.
 
-It acts, reports attention, saves and loads; when and how to update is each learner's own.
+It acts, imitates, reports attention, saves and loads. Each learner decides when and how to update.
 """
 
 from __future__ import annotations
@@ -17,14 +17,15 @@ from innerattn.config import NetworkConfig
 from innerattn.learn import losses
 from innerattn.learn.adam import AdamStepper, Forward, Stepper
 from innerattn.learn.compiled import traced
-from innerattn.learn.networks import draw_networks
+from innerattn.learn.gradients import average_over_robots
+from innerattn.learn.networks import DrawNetworks, draw_networks
 from innerattn.learn.types import Team
-from innerattn.nn import CriticOutput, action_noise, sample_actions
+from innerattn.nn import CriticOutput, action_noise, robots_of_each_kind, sample_actions
 
 
 @dataclass(frozen=True)
 class Networks:
-    """The networks of an update, plain or traced."""
+    """The networks of an update, in their plain or in their compiled form."""
 
     actor: Stepper
     critic: Stepper
@@ -33,7 +34,7 @@ class Networks:
 class ActorCritic:
     """Networks and optimisers of a learner.
 
-    A subclass decides when to update and gives `_update_networks`.
+    A subclass adds `observe` and `learn` of the `Learner` protocol, and `_update_networks`.
 
     Attributes:
         actor: The trained policies.
@@ -42,9 +43,9 @@ class ActorCritic:
     """
 
     _update_networks: Callable[..., Tensor]
-    """All arithmetic of one update, from `Networks`, batches and the step size () to figures (n,).
+    """All arithmetic of one update: `Networks`, batches and the learning rate () to metrics (n,).
 
-    It must call networks through `Networks` only, and hold nothing that a compiler cannot follow.
+    It calls networks only through `Networks`, so that `compile` can put other forms in their place.
     """
 
     def __init__(
@@ -58,24 +59,24 @@ class ActorCritic:
         seed: int,
         device: torch.device,
         dtype: torch.dtype = torch.float32,
-        critic_outputs: int | None = None,
+        draw: DrawNetworks = draw_networks,
     ) -> None:
         """Build networks and optimisers.
 
         Args:
             team: What is known of the team.
             network: Sizes and kind of the networks.
-            learning_rate: Step size of both Adams at the start.
-            final_learning_rate_share: Share of it that is left at the end of training.
-            critic_weight_decay: Weight of the L2 penalty of the critic's Adam.
+            learning_rate: Learning rate of both optimisers at the start.
+            final_learning_rate_share: Share of the learning rate that is left at the end.
+            critic_weight_decay: Weight of the L2 penalty of the critic's optimiser.
             seed: Seed of the initial weights and of every draw.
             device: Where the networks live.
             dtype: Floating-point type of the networks.
-            critic_outputs: Values that the critic gives for each robot; None: one for each action.
+            draw: Makes the actor and the critic, with initial parameters.
 
         Raises:
             ValueError: `network.mask_unavailable` is set without a column of the observation, or as
-                in `draw_networks`.
+                ``draw`` does.
         """
         column = team.availability_column
         if network.mask_unavailable and column not in range(team.obs_width):
@@ -94,13 +95,15 @@ class ActorCritic:
         )
         self._noise = torch.Generator(device).manual_seed(noise_seed)
         # Drawn on the CPU in float32 and then moved: a seed gives the same weights everywhere.
-        weights = torch.Generator().manual_seed(weights_seed)
-        actor, critic = draw_networks(team, network, weights, critic_outputs)
+        actor, critic = draw(team, network, torch.Generator().manual_seed(weights_seed))
         self.actor, self.critic = actor.to(device, dtype), critic.to(device, dtype)
         self.actor_frozen = False
         self._actor_adam = AdamStepper(self.actor)
         self._critic_adam = AdamStepper(self.critic, critic_weight_decay)
         self._networks = Networks(self._actor_adam, self._critic_adam)
+        self._robots_of_each_kind = None
+        if network.shared_gradients == "mean" and team.kinds is not None:
+            self._robots_of_each_kind = robots_of_each_kind(team.kinds).to(device, dtype)
         self._team = team
         self._updates = 0
 
@@ -118,6 +121,10 @@ class ActorCritic:
             self._update_networks, fullgraph=True, dynamic=False, backend=backend
         )
 
+    def seed_draws(self, seed: int) -> None:
+        """Let the next actions be drawn from ``seed``; see `Learner.seed_draws`."""
+        self._noise.manual_seed(seed)
+
     @torch.no_grad()
     def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
         """Choose actions (E, R) int64 for observations (E, R, D); see `Learner.act`."""
@@ -130,7 +137,7 @@ class ActorCritic:
 
     @torch.no_grad()
     def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
-        """Step the policies towards given actions; see `Learner.imitate`."""
+        """Train the policies to take given actions; see `Learner.imitate`."""
         seen, wanted = self._robots_first(obs), actions.to(self._device).t()
 
         def loss_of(actor: Forward) -> tuple[Tensor, Tensor]:
@@ -139,11 +146,12 @@ class ActorCritic:
             return loss.sum(), loss.detach().mean()
 
         gradients, loss = self._actor_adam.gradients(loss_of)
-        self._actor_adam.step(gradients, _step_size(learning_rate))
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
+        self._actor_adam.step(gradients, _as_tensor(learning_rate))
         return float(loss)
 
     def set_progress(self, share: float) -> None:
-        """Let the step size fall evenly; see `Learner.set_progress`."""
+        """Let the learning rate fall linearly; see `Learner.set_progress`."""
         self._rate = (1.0 - (1.0 - self._final_share) * share) * self._first_rate
 
     def attention(self, obs: Tensor, actions: Tensor) -> Tensor | None:
@@ -156,19 +164,15 @@ class ActorCritic:
         return None if output.attended is None else output.attended.weights
 
     def state(self) -> dict[str, Tensor]:
-        """Copies of all weights, optimiser moments and running numbers, and the count of updates.
+        """Copies of all weights, optimiser moments and running statistics, and the update count.
 
-        What is collected and the random generators are not part of it.
+        Collected transitions and random generators are not part of it.
         """
         state = {name: tensor.detach().clone() for name, tensor in self._tensors().items()}
         return state | {"updates": torch.tensor(self._updates)}
 
     def load(self, state: dict[str, Tensor]) -> None:
-        """Take over what `state` returned, on whatever device it lies.
-
-        Raises:
-            ValueError: A name, shape or dtype is wrong; the learner is left unchanged.
-        """
+        """Restore what `state` returned, from any device; see `Learner.load`."""
         own = self._tensors() | {"updates": torch.tensor(self._updates)}
         for name in sorted(own.keys() | state.keys()):
             if name not in state:
@@ -191,7 +195,7 @@ class ActorCritic:
         return {"actor": self.actor, "critic": self.critic}
 
     def _running(self) -> dict[str, Tensor]:
-        """Live tensors of running numbers that are part of the state, by name."""
+        """Live tensors of running statistics that are part of the state, by name."""
         return {}
 
     def _tensors(self) -> dict[str, Tensor]:
@@ -205,11 +209,11 @@ class ActorCritic:
         return tensors
 
     def _update(self, *tensors: Tensor) -> Tensor:
-        """Do `_update_networks` with products of the precision that was asked for; count it."""
+        """Do `_update_networks` with matrix products in `network.precision`, and count it."""
         with torch.autocast(self._device.type, torch.bfloat16, enabled=self._bfloat16):
-            figures = self._update_networks(self._networks, *tensors, _step_size(self._rate))
+            metrics = self._update_networks(self._networks, *tensors, _as_tensor(self._rate))
         self._updates += 1
-        return figures
+        return metrics
 
     def _draw(self, shape: tuple[int, ...]) -> Tensor:
         """Noise for `sample_actions`, of the shape of the logits."""
@@ -226,6 +230,6 @@ class ActorCritic:
         return (obs[:, :, self._availability_column] > 0.5).t()
 
 
-def _step_size(rate: float) -> Tensor:
-    """() float64 on the CPU: a graph would be compiled anew for every other plain number."""
+def _as_tensor(rate: float) -> Tensor:
+    """() float64 on the CPU. A compiled graph would be compiled anew for another plain number."""
     return torch.tensor(rate, dtype=torch.float64)

@@ -1,7 +1,7 @@
-"""Advantages and the scale of returns, as functions of what was collected. Time comes first.
+"""Advantages, and the scale of returns, from collected steps. Time is the first dimension.
 
-Sources: Schulman et al. 2016, eq. 16 (generalised advantage estimation), and its treatment of time
-limits after Pardo et al. 2018: the value of the state that a time limit cut off still counts.
+Sources: Schulman et al. 2016, eq. 16 (generalised advantage estimation); for time limits Pardo et
+al. 2018: the value of the state at which a time limit ended the episode still counts.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ def generalised_advantage(
     gamma: float,
     gae_lambda: float,
 ) -> Tensor:
-    """A_t = d_t + gamma lambda A_t+1 with d_t = r_t + gamma V(s'_t) - V(s_t); episodes stay apart.
+    """A_t = d_t + gamma lambda A_t+1 with d_t = r_t + gamma V(s'_t) - V(s_t), within an episode.
 
     Args:
         reward: (T, R, E).
         value: (T, R, E) value of each step's state.
         next_value: (T, R, E) value of the state after the step, in the same episode.
         terminated: (T, E) bool; nothing comes after a termination.
-        ended: (T, E) bool, terminated or cut off by a time limit.
+        ended: (T, E) bool, terminated or truncated by a time limit.
         gamma: Discount of a control step.
         gae_lambda: lambda; 0 looks one step ahead, 1 to the end.
 
@@ -48,13 +48,13 @@ class ReturnScale:
     """Running standard deviation of discounted returns, by which rewards are divided.
 
     Attributes:
-        count: () float64, returns seen.
+        count: () float64, number of returns.
         mean: (R,) float64.
         squares: (R,) float64, sum of squared differences from the mean.
     """
 
     def __init__(self, num_robots: int, gamma: float, device: torch.device) -> None:
-        """Start with nothing seen; rewards of ``num_robots`` robots are discounted by ``gamma``."""
+        """Start without returns; rewards of ``num_robots`` robots are discounted by ``gamma``."""
         self._gamma = gamma
         self._open: Tensor | None = None
         self.count = torch.zeros((), dtype=torch.float64, device=device)
@@ -62,7 +62,7 @@ class ReturnScale:
         self.squares = torch.zeros_like(self.mean)
 
     def update(self, reward: Tensor, ended: Tensor) -> None:
-        """Take in rewards (T, R, E) and the ends of episodes (T, E) of worlds that go on."""
+        """Add rewards (T, R, E) and ends of episodes (T, E); they follow those of the last call."""
         returns = []
         before = self._open
         for step_reward, step_ended in zip(reward.double(), ended, strict=True):

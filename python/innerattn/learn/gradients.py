@@ -10,21 +10,34 @@ import torch
 from torch import Tensor
 
 from innerattn.learn.adam import Gradients
+from innerattn.nn import is_shared_by_kind
 
 _UNROLLED = 8
 """Norms that are summed at a time. Torch's compiler (2.15) writes so short a sum out; of a longer
 one it makes a loop, which it then fails to fuse with Adam."""
 
 
-def average_over_robots(gradients: Gradients, num_robots: int) -> None:
-    """Divide the gradients of the attention, which all robots share, by the number of robots.
+def average_over_robots(
+    gradients: Gradients, num_robots: int, robots_of_each_kind: Tensor | None
+) -> None:
+    """Divide gradients of what robots share by the number of these robots, before clipping.
 
-    A loss is a sum over robots, so that without this the attention would learn faster the larger
-    the team. MAAC's code does the same, also before clipping.
+    A loss is a sum over robots, and so is the gradient of what they share. MAAC's code divides that
+    of the attention, which all robots share.
+
+    Args:
+        gradients: By name; a critic's attention is called "attention".
+        num_robots: R.
+        robots_of_each_kind: (K,), to divide gradients of layers shared by kind (K, ...), too; None:
+            these stay sums.
     """
-    shared = [gradient for name, gradient in gradients.items() if name.startswith("attention.")]
-    if shared:
-        torch._foreach_div_(shared, num_robots)
+    attention = [gradient for name, gradient in gradients.items() if name.startswith("attention.")]
+    if attention:
+        torch._foreach_div_(attention, num_robots)
+    if robots_of_each_kind is not None:
+        for name, gradient in gradients.items():
+            if is_shared_by_kind(name):
+                gradient.div_(robots_of_each_kind.view(-1, *[1] * (gradient.dim() - 1)))
 
 
 def clip_norm(gradients: Gradients, limit: float) -> Tensor:

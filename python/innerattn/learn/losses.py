@@ -1,8 +1,8 @@
-"""Targets and losses of the off-policy learner, as pure functions of tensors.
+"""Targets and losses of the learners, as pure functions of tensors.
 
-Batches lie last, (R, A, B) or (R, B). A critic's loss and a policy's are means over the batch and
-sums over robots: each robot's own parameters get the gradient of its own loss, whatever the size of
-the team. Source: Iqbal & Sha 2019, sections 3.1-3.3, and their code ("MAAC").
+The batch is the last dimension, (R, A, B) or (R, B). Losses are means over the batch and sums over
+robots, so that a robot's own parameters get the gradient of its own loss, whatever the size of the
+team. Sources: Iqbal & Sha 2019, sections 3.1-3.3, and their code ("MAAC"); Schulman et al. 2017.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def expected_policy_loss(
     Args:
         log_prob: (R, A, B) log-probabilities of the current policy.
         q: (R, A, B) values of every own action, without gradient.
-        actions: (R, B) int64 actions drawn from the policy; not needed by this form.
+        actions: (R, B) int64 actions drawn from the policy; this form does not use them.
         temperature: tau.
     """
     del actions
@@ -78,7 +78,7 @@ def expected_policy_loss(
 
 
 def sampled_policy_loss(log_prob: Tensor, q: Tensor, actions: Tensor, temperature: float) -> Tensor:
-    """The loss log pi(a) [tau log pi(a) - (Q(a) - b)] for the drawn a, the bracket constant.
+    """The loss log pi(a) [tau log pi(a) - (Q(a) - b)] for the drawn a, with a constant bracket.
 
     b = sum_a pi(a) Q(a) is the counterfactual baseline. Arguments as in `expected_policy_loss`.
     """
@@ -104,12 +104,16 @@ def clipped_policy_loss(log_prob: Tensor, before: Tensor, advantage: Tensor, cli
 
 
 def clipped_value_loss(value: Tensor, before: Tensor, target: Tensor, clip: float) -> Tensor:
-    """Squared error, or that of the value held within ``clip`` of what it was, if that is larger.
+    """Squared error of the value, or of the value clipped around the one before, if that is larger.
 
-    All are (R, B).
+    Args:
+        value: (R, B).
+        before: (R, B) the value at the start of the rollout's epochs.
+        target: (R, B).
+        clip: Largest difference from the value before.
     """
-    held = before + (value - before).clamp(-clip, clip)
-    errors = torch.maximum((value - target).square(), (held - target).square())
+    clipped = before + (value - before).clamp(-clip, clip)
+    errors = torch.maximum((value - target).square(), (clipped - target).square())
     return errors.mean(dim=1).sum()
 
 

@@ -1,10 +1,12 @@
-"""The networks of a learner: which kinds a configuration asks for, with fresh parameters."""
+"""The networks that a configuration asks for, with initial parameters."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pkgutil import resolve_name
 
 import torch
+from torch import nn
 
 from innerattn.config import NetworkConfig
 from innerattn.config.registry import attentions
@@ -18,6 +20,9 @@ from innerattn.nn import (
     share_by_kind,
 )
 
+DrawNetworks = Callable[[Team, NetworkConfig, torch.Generator], tuple[Actor, nn.Module]]
+"""Makes an actor and a critic, which gives a `CriticOutput` as `Critic.forward` does."""
+
 
 def draw_networks(
     team: Team,
@@ -27,8 +32,8 @@ def draw_networks(
 ) -> tuple[Actor, Critic | JointCritic]:
     """Actors and critics with initial parameters, float32 on the CPU.
 
-    A critic without attention takes observations as they are and shares nothing between robots: its
-    input is the same for all.
+    A critic without attention takes whole observations and shares nothing between robots: its input
+    is the same for all.
 
     Args:
         team: What is known of the team.

@@ -1,12 +1,12 @@
 """The on-policy learner: proximal policy optimisation with the same actors and critics.
 
-It decides when to update and how; networks live in `nn`, formulas in `losses` and `advantage`.
+It decides when and how to update. Networks are in `nn`, formulas in `losses` and `advantage`.
 Sources: Schulman et al. 2017; the baseline of Iqbal & Sha 2019, section 3.3.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import partial
 
 import torch
 from torch import Tensor
@@ -17,6 +17,8 @@ from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
 from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
+from innerattn.learn.networks import draw_networks
+from innerattn.learn.rollout import Rollout, Steps, rows_of, standardised, steps_of
 from innerattn.learn.types import Team, Transitions
 from innerattn.nn import sample_actions
 
@@ -31,18 +33,18 @@ _METRICS = (
     "clip_share",
 )
 _CHUNK = 4096
-"""Rows that values are computed for at a time."""
+"""Rows whose values are computed at a time."""
 
 
 class PPO(ActorCritic):
     """The on-policy learner; its contract is `innerattn.learn.types.Learner`.
 
-    The baseline of robot i does not depend on its own action: with `advantage = "counterfactual"`
-    it is sum_a pi_i(a) Q_i(o, a, a_-i), and Q_i of the action taken is fitted to the lambda-return;
-    with "value" it is a value head, of the same critic or of one without attention.
+    The baseline of robot i does not depend on its own action. With `advantage = "counterfactual"`
+    it is sum_a pi_i(a) Q_i(o, a, a_-i), and Q_i of the action taken is fitted to the lambda-return.
+    With "value" it is a value head, of the same critic or of one without attention.
 
     Attributes:
-        scale: Running deviation of returns; rewards are divided by it.
+        scale: Running standard deviation of returns, by which rewards are divided.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class PPO(ActorCritic):
         Raises:
             ValueError: As in `ActorCritic`.
         """
+        outputs = None if ppo.advantage == "counterfactual" else 1
         super().__init__(
             team,
             network,
@@ -69,7 +72,7 @@ class PPO(ActorCritic):
             seed=seed,
             device=device,
             dtype=dtype,
-            critic_outputs=None if ppo.advantage == "counterfactual" else 1,
+            draw=partial(draw_networks, critic_outputs=outputs),
         )
         self._config = ppo
         self._shuffle = torch.Generator().manual_seed(self._data_seed)
@@ -80,20 +83,20 @@ class PPO(ActorCritic):
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
         """Keep one control step of E worlds until the rollout is full; see `Learner.observe`.
 
-        A rollout is of one policy: what a frozen actor did, which something else may have changed
-        since, is no part of what a learning one is judged by.
+        A rollout belongs to one policy. Steps of a frozen actor are dropped once the actor learns,
+        because imitation may have changed the policy since, and the other way round.
         """
         if self.actor_frozen != self._steps_of_frozen:
             self._steps, self._steps_of_frozen = [], self.actor_frozen
         self._steps.append((batch, truncated))
 
     def learn(self) -> dict[str, float] | None:
-        """Do the epochs of a full rollout, of `rollout_steps` control steps.
+        """Train on a full rollout, of `rollout_steps` control steps, for `epochs` passes.
 
         Returns:
-            Means over the minibatches done now; None while the rollout is not full. Names as of
-            `TD.learn`; `kl` is the mean divergence from the policy that acted, in nats, and
-            `clip_share` the share of actions whose ratio was clipped.
+            Means over the minibatches done now; None while the rollout is not full. Names are those
+            of `TD.learn`, and `kl`, the mean divergence from the policy that acted [nats], and
+            `clip_share`, the share of actions whose ratio was clipped.
         """
         if len(self._steps) < self._config.rollout_steps:
             return None
@@ -122,7 +125,7 @@ class PPO(ActorCritic):
             rows: At least one row.
 
         Returns:
-            (8,) the values that `learn` names, in that order.
+            (8,) the metrics that `learn` names, in that order.
         """
         return self._update(*rows)
 
@@ -137,9 +140,9 @@ class PPO(ActorCritic):
         target: Tensor,
         rate: Tensor,
     ) -> Tensor:
-        critic_figures = self._update_critic(nets, obs, actions, value, target, rate)
-        actor_figures = self._update_actor(nets, obs, actions, log_prob, advantage, rate)
-        return torch.stack([*critic_figures, *actor_figures])
+        critic_metrics = self._update_critic(nets, obs, actions, value, target, rate)
+        actor_metrics = self._update_actor(nets, obs, actions, log_prob, advantage, rate)
+        return torch.stack([*critic_metrics, *actor_metrics])
 
     def _update_critic(
         self,
@@ -155,7 +158,7 @@ class PPO(ActorCritic):
 
         def loss_of(critic: Forward) -> tuple[Tensor, tuple[Tensor, Tensor]]:
             output = critic(obs, actions, self._available(obs))
-            value = self._of_taken(output.q, actions)
+            value = self._fitted(output.q, actions)
             if config.value_clip is None:
                 loss = losses.critic_loss(value, target)
             else:
@@ -166,7 +169,7 @@ class PPO(ActorCritic):
             return loss, (loss.detach(), value.detach().mean())
 
         gradients, (loss, mean) = nets.critic.gradients(loss_of)
-        average_over_robots(gradients, self._team.num_robots)
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norm = clip_norm(gradients, config.critic_grad_clip)
         nets.critic.step(gradients, rate)
         return loss, mean, norm
@@ -192,6 +195,7 @@ class PPO(ActorCritic):
             return loss, (loss.detach(), entropy.detach().mean(), taken.detach() - before)
 
         gradients, (loss, entropy, change) = nets.actor.gradients(loss_of)
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norms = clip_norm_by_robot(gradients, config.actor_grad_clip)
         if not self.actor_frozen:
             nets.actor.step(gradients, rate)
@@ -202,46 +206,42 @@ class PPO(ActorCritic):
 
     @torch.no_grad()
     def _rollout(self) -> Rollout:
-        """What was collected, with advantages, targets and the policy that acted."""
+        """The collected steps with their advantages, targets and log-probabilities."""
         config = self._config
-        batches, cut = zip(*self._steps, strict=True)
-        obs = torch.stack([self._robots_first(batch.obs) for batch in batches])  # (T, R, E, D)
-        actions = torch.stack([batch.actions.to(self._device).t() for batch in batches])
-        reward = torch.stack([batch.reward.to(self._device).t() for batch in batches])
-        terminated = torch.stack([batch.terminated.to(self._device) for batch in batches])
-        ended = terminated | torch.stack([flags.to(self._device) for flags in cut])
-        self.scale.update(reward, ended)
-        deviation = self.scale.std(config.return_deviation_floor).unsqueeze(1)
-        reward = (reward / deviation).to(self._dtype)
+        steps = Steps.stack(self._steps, self._device, self._dtype)
+        self.scale.update(steps.reward, steps.ended)
+        scale = self.scale.std(config.return_deviation_floor).unsqueeze(1)
+        reward = (steps.reward / scale).to(self._dtype)
 
-        flat_obs, flat_actions = _rows(obs), _rows(actions)
-        log_prob, taken, baseline = self._evaluate(flat_obs, flat_actions)
-        value = _steps(baseline, len(batches))
-        # Where an episode goes on, the next state's value is the next step's; elsewhere the actions
-        # that would have been taken in it are drawn.
+        obs, actions = rows_of(steps.obs), rows_of(steps.actions)
+        log_prob, fitted, baseline = self._evaluate(obs, actions)
+        value = steps_of(baseline, len(reward))
+        # Within an episode, the value of the next state is that of the next step. After its last
+        # step, and after the last of the rollout, it takes actions drawn for that state.
         next_value = torch.cat([value[1:], torch.zeros_like(value[:1])])
-        drawn = ended.clone()
+        drawn = steps.ended.clone()
         drawn[-1] = True
         step, env = drawn.nonzero(as_tuple=True)
-        after = torch.stack([self._robots_first(batch.next_obs) for batch in batches])
-        after = after[step, :, env].transpose(0, 1)  # (R, n, D)
+        after = steps.next_obs[step, :, env].transpose(0, 1)  # (R, n, D)
         logits = self.actor(after)
         next_actions = sample_actions(logits, self._draw(logits.shape))
         next_value[step, :, env] = self._evaluate(after, next_actions)[2].t()
         advantage = generalised_advantage(
-            reward, value, next_value, terminated, ended, config.gamma, config.gae_lambda
+            reward,
+            value,
+            next_value,
+            steps.terminated,
+            steps.ended,
+            config.gamma,
+            config.gae_lambda,
         )
-        target = _rows(advantage + value)
-        advantage = _rows(advantage)
-        centred = advantage - advantage.mean(dim=1, keepdim=True)
-        spread = advantage.std(dim=1, correction=0, keepdim=True)
         return Rollout(
-            obs=flat_obs,
-            actions=flat_actions,
-            log_prob=losses.gather_actions(log_prob, flat_actions),
-            value=taken,
-            advantage=centred / (spread + 1e-8),
-            target=target,
+            obs=obs,
+            actions=actions,
+            log_prob=losses.gather_actions(log_prob, actions),
+            value=fitted,
+            advantage=standardised(rows_of(advantage)),
+            target=rows_of(advantage + value),
         )
 
     def _evaluate(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
@@ -256,12 +256,12 @@ class PPO(ActorCritic):
                 baseline = (log_prob.exp() * q).sum(dim=1)
             else:
                 baseline = q.squeeze(1)
-            parts.append((log_prob, self._of_taken(q, some_actions), baseline))
+            parts.append((log_prob, self._fitted(q, some_actions), baseline))
         log_probs, values, baselines = zip(*parts, strict=True)
         return torch.cat(log_probs, dim=2), torch.cat(values, dim=1), torch.cat(baselines, dim=1)
 
-    def _of_taken(self, q: Tensor, actions: Tensor) -> Tensor:
-        """(R, B) the values that are fitted: of the actions taken, or of the state."""
+    def _fitted(self, q: Tensor, actions: Tensor) -> Tensor:
+        """(R, B) the values that are fitted to targets: of the actions taken, or of the state."""
         if self._config.advantage == "counterfactual":
             return losses.gather_actions(q, actions)
         return q.squeeze(1)
@@ -273,37 +273,3 @@ class PPO(ActorCritic):
             "scale.mean": scale.mean,
             "scale.squares": scale.squares,
         }
-
-
-class Rollout(NamedTuple):
-    """Rows of a rollout, robots first.
-
-    Attributes:
-        obs: (R, B, D).
-        actions: (R, B) int64.
-        log_prob: (R, B) of the actions, under the policy that acted.
-        value: (R, B) what the critic said.
-        advantage: (R, B), of mean 0 and deviation 1 for each robot of the whole rollout.
-        target: (R, B) what the critic should have said.
-    """
-
-    obs: Tensor
-    actions: Tensor
-    log_prob: Tensor
-    value: Tensor
-    advantage: Tensor
-    target: Tensor
-
-    def take(self, rows: Tensor) -> Rollout:
-        """Some rows, by their numbers (n,) int64."""
-        return Rollout._make(tensor[:, rows] for tensor in self)
-
-
-def _rows(steps: Tensor) -> Tensor:
-    """Bring (T, R, E, ...) to (R, T * E, ...)."""
-    return steps.transpose(0, 1).flatten(1, 2)
-
-
-def _steps(rows: Tensor, count: int) -> Tensor:
-    """Bring (R, T * E) back to (T, R, E)."""
-    return rows.view(len(rows), count, -1).transpose(0, 1)

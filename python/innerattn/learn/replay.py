@@ -1,6 +1,6 @@
-"""A ring of past transitions, one contiguous row each, and statistics of the rewards it holds.
+"""A ring buffer of transitions, one contiguous row each, with statistics of their rewards.
 
-It stores and draws; it normalises nothing.
+It stores and draws; it does not normalise.
 """
 
 from __future__ import annotations

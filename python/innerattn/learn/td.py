@@ -1,6 +1,6 @@
 """The off-policy learner: a maximum-entropy actor-critic with attention in the critic.
 
-It decides when to update and how; networks live in `nn`, formulas in `losses`. Sources: eqs. 2-4 of
+It decides when and how to update. Networks are in `nn`, formulas in `losses`. Sources: eqs. 2-4 of
 the paper and Iqbal & Sha 2019, sections 3.1-3.3 ("MAAC").
 """
 
@@ -38,7 +38,7 @@ _METRICS = (
 
 @dataclass(frozen=True)
 class TDNetworks(Networks):
-    """The networks of an update, with the slow copies that targets are computed by."""
+    """The networks of an update, and their slow copies, which give the targets."""
 
     target_actor: Network
     target_critic: Network
@@ -99,20 +99,20 @@ class TD(ActorCritic):
             Network(self.target_actor),
             Network(self.target_critic),
         )
-        self._unpaid_env_steps = 0
+        self._pending_env_steps = 0
 
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
         """Store one control step of E worlds; see `Learner.observe`."""
         del truncated  # a time limit is no termination: the target looks past it
         self.replay.add(batch)
         if len(self.replay) >= min(self._config.warmup_env_steps, self.replay.capacity):
-            self._unpaid_env_steps += len(batch.obs)
+            self._pending_env_steps += len(batch.obs)
 
     @torch.no_grad()
     def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
-        """Step the policies towards given actions, and their slow copies with them.
+        """Train the policies, and set their slow copies to them; see `Learner.imitate`.
 
-        The critic's targets are then of the policies that imitate. See `Learner.imitate`.
+        The critic's targets are then those of the policies that imitate.
         """
         loss = super().imitate(obs, actions, learning_rate)
         slow, fast = self._networks.target_actor.values, self._networks.actor.values
@@ -128,7 +128,7 @@ class TD(ActorCritic):
             `critic_grad_norm` and `actor_grad_norm` (its mean over robots) are before clipping.
         """
         every = self._config.update_every_env_steps
-        due, self._unpaid_env_steps = divmod(self._unpaid_env_steps, every)
+        due, self._pending_env_steps = divmod(self._pending_env_steps, every)
         if not due:
             return None
         rows = [self.update(self.replay.sample(self._config.batch_size)) for _ in range(due)]
@@ -143,7 +143,7 @@ class TD(ActorCritic):
             batch: At least one transition; rewards are normalised by the replay's statistics.
 
         Returns:
-            (6,) the values that `learn` names, in that order.
+            (6,) the metrics that `learn` names, in that order.
         """
         floor = self._config.reward_std_floor
         reward = batch.reward.to(self._device) - self.replay.reward_mean
@@ -173,13 +173,13 @@ class TD(ActorCritic):
         rate: Tensor,
     ) -> Tensor:
         target = self._targets(nets, reward, next_obs, discount, next_noise)
-        critic_figures = self._update_critic(nets, obs, actions, target, rate)
-        actor_figures = self._update_actor(nets, obs, noise, rate)
+        critic_metrics = self._update_critic(nets, obs, actions, target, rate)
+        actor_metrics = self._update_actor(nets, obs, noise, rate)
         for slow, fast in ((nets.target_actor, nets.actor), (nets.target_critic, nets.critic)):
             torch._foreach_lerp_(
                 list(slow.values.values()), list(fast.values.values()), self._config.polyak
             )
-        return torch.stack([*critic_figures, *actor_figures])
+        return torch.stack([*critic_metrics, *actor_metrics])
 
     def _targets(
         self, nets: TDNetworks, reward: Tensor, next_obs: Tensor, discount: Tensor, noise: Tensor
@@ -208,7 +208,7 @@ class TD(ActorCritic):
             return loss, (loss.detach(), q_taken.detach().mean())
 
         gradients, (loss, q_mean) = nets.critic.gradients(loss_of)
-        average_over_robots(gradients, self._team.num_robots)
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norm = clip_norm(gradients, config.critic_grad_clip)
         nets.critic.step(gradients, rate)
         return loss, q_mean, norm
@@ -228,6 +228,7 @@ class TD(ActorCritic):
             return loss, (loss.detach(), entropy)
 
         gradients, (loss, entropy) = nets.actor.gradients(loss_of)
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norms = clip_norm_by_robot(gradients, self._config.actor_grad_clip)
         if not self.actor_frozen:
             nets.actor.step(gradients, rate)

@@ -1,4 +1,4 @@
-"""The data that a learner exchanges with whatever drives it, and the contract it keeps."""
+"""The protocol of a learner, and the data that it exchanges with the training loop."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ class Transitions(NamedTuple):
 
 
 class Learner(Protocol):
-    """A policy that improves from what it is shown.
+    """A policy that acts, and improves from transitions.
 
     Attributes:
-        actor_frozen: While set, `learn` trains all but the policy, which others may change by
-            `imitate`; to be set before `observe`.
+        actor_frozen: While set, `learn` does not train the policy, and `imitate` may; to be set
+            before `observe`.
     """
 
     actor_frozen: bool
@@ -72,8 +72,11 @@ class Learner(Protocol):
             (E, R) int64, on the device of `obs`.
         """
 
+    def seed_draws(self, seed: int) -> None:
+        """Let the actions that are drawn from now on follow from ``seed`` alone."""
+
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
-        """Take in one control step of E worlds.
+        """Store one control step of E worlds.
 
         Args:
             batch: The E transitions.
@@ -81,21 +84,21 @@ class Learner(Protocol):
         """
 
     def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
-        """Do one step of Adam of the policy towards given actions.
+        """Train the policy to take given actions, by one step of Adam.
 
-        The step goes down the cross-entropy -mean_b log pi_i(a_bi | o_bi), summed over robots i.
+        The loss is the cross-entropy -mean_b log pi_i(a_bi | o_bi), summed over robots i.
 
         Args:
             obs: (B, R, D) float32.
             actions: (B, R) int64.
-            learning_rate: Step size.
+            learning_rate: Learning rate of this step.
 
         Returns:
             The cross-entropy before the step, its mean over robots [nats].
         """
 
     def set_progress(self, share: float) -> None:
-        """Take note of how far training is; whatever changes over a run follows it.
+        """Set how far training is, for what changes over a run, such as the learning rate.
 
         Args:
             share: Part of the run that is done, 0 to 1.
@@ -113,9 +116,9 @@ class Learner(Protocol):
         """Number of updates done so far."""
 
     def compile(self) -> None:
-        """Do updates as one compiled graph from now on; the first ones wait for the compiler.
+        """Do updates as one compiled graph from now on; the first updates wait for the compiler.
 
-        Results are those of uncompiled updates but for rounding.
+        Results differ from those of uncompiled updates only by rounding.
         """
 
     def attention(self, obs: Tensor, actions: Tensor) -> Tensor | None:
@@ -131,10 +134,10 @@ class Learner(Protocol):
         """
 
     def state(self) -> dict[str, Tensor]:
-        """Everything learnt, as copies under flat names."""
+        """Copies of everything learnt, by name."""
 
     def load(self, state: dict[str, Tensor]) -> None:
-        """Take over what `state` returned.
+        """Restore what `state` returned.
 
         Raises:
             ValueError: A name, shape or dtype is wrong; the learner is left unchanged.

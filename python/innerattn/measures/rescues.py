@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from innerattn.measures.measure import Measure
 from innerattn.records.record import Record
+from innerattn.stats.bootstrap import mean_interval
 from innerattn.stats.estimate import Estimate
-from innerattn.stats.intervals import mean_interval
 
 
 def rescues_per_episode(record: Record) -> Estimate:

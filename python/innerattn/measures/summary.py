@@ -17,8 +17,8 @@ from innerattn.measures.registry import measures_of
 from innerattn.policies import SCRIPTED
 from innerattn.records.record import Record
 from innerattn.stats import Estimate
+from innerattn.stats.bootstrap import mean_interval, score_interval
 from innerattn.stats.estimate import as_json
-from innerattn.stats.intervals import mean_interval, score_interval
 
 SCHEMA_VERSION = 1
 

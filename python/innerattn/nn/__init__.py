@@ -1,7 +1,7 @@
-"""The networks of the learners: per-robot actors, critics with and without attention.
+"""The networks of the learners: actors, and critics with and without attention.
 
-Tensors have robots first, (R, B, ...), so that every layer is one batched product over the robots.
-It knows nothing of environments, losses or files.
+Robots are the first dimension of tensors, (R, B, ...), so that every layer is one batched matrix
+product. Networks know no environment, no loss and no file.
 """
 
 from innerattn.nn.actor import Actor, action_noise, sample_actions
@@ -15,7 +15,7 @@ from innerattn.nn.critic import Critic, CriticOutput
 from innerattn.nn.encoder import EntityColumns, EntityEncoder
 from innerattn.nn.joint_critic import JointCritic
 from innerattn.nn.linear import PerRobotLinear
-from innerattn.nn.sharing import share_by_kind
+from innerattn.nn.sharing import is_shared_by_kind, robots_of_each_kind, share_by_kind
 
 __all__ = [
     "Actor",
@@ -30,6 +30,8 @@ __all__ = [
     "TeammateAttention",
     "UniformAttention",
     "action_noise",
+    "is_shared_by_kind",
+    "robots_of_each_kind",
     "sample_actions",
     "share_by_kind",
 ]

@@ -1,6 +1,6 @@
-"""The actors: each robot's policy over its own actions from its own observation.
+"""The actors: each robot's policy, from its own observation to its own actions.
 
-It computes logits and draws actions from them; losses belong to the learner.
+It computes logits and draws actions from them; losses are in `innerattn.learn`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from innerattn.nn.linear import PerRobotLinear
 
 
 class Actor(nn.Module):
-    """Policies of all robots, two hidden layers each; every robot has its own parameters."""
+    """The policies of all robots, with two hidden layers; every robot has its own parameters."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class Actor(nn.Module):
             num_actions: A.
             hidden_width: Width of both hidden layers.
             generator: Source of the initial parameters, on the CPU.
-            entities: Columns of the entities that are encoded apart; None: none are.
+            entities: Columns of the entities to encode separately; None: encode the whole row.
         """
         super().__init__()
         self.num_robots = num_robots
@@ -51,7 +51,7 @@ class Actor(nn.Module):
 def action_noise(
     shape: tuple[int, ...], generator: torch.Generator, dtype: torch.dtype = torch.float32
 ) -> Tensor:
-    """Noise for `sample_actions`: log(-log(u)) of uniform u, minus a draw of Gumbel's distribution.
+    """Noise for `sample_actions`: log(-log(u)) of uniform u, which is minus a Gumbel variable.
 
     Args:
         shape: (R, A, B).
@@ -59,8 +59,8 @@ def action_noise(
         dtype: Type of the logits.
     """
     noise = torch.empty(shape, dtype=dtype, device=generator.device).uniform_(generator=generator)
-    # -log(u) is exponential, and never exactly 0 because u never is 1; an infinite Gumbel would
-    # override even an impossible action. (`exponential_` can return 0, and is slower.)
+    # -log(u) is exponential and never 0, since u is never 1. An infinite Gumbel variable would
+    # choose even an impossible action. (`exponential_` can return 0, and is slower.)
     return noise.clamp_min_(torch.finfo(dtype).tiny).log_().neg_().log_()
 
 

@@ -1,6 +1,6 @@
 """Attention of each robot over its teammates, learnt or uniform, with the same parameters.
 
-Sources: eqs. 2-4 of the paper, read as in Iqbal & Sha 2019, section 3.2: the softmax runs over
+Sources: eqs. 2-4 of the paper, read as in Iqbal & Sha 2019, section 3.2. The softmax is over
 teammates j != i, and the query comes from an encoding without the robot's own action.
 """
 
@@ -16,15 +16,15 @@ from innerattn.nn.linear import uniform_parameter
 
 
 class Attended(NamedTuple):
-    """What attention hands on.
+    """Result of an attention.
 
     Attributes:
-        mixed: (R, B, W) x_i, the weighted values of the teammates, heads side by side; zeros for a
-            robot that sees no teammate.
-        weights: (B, H, R, R) weight of robot i (row) on teammate j; rows sum to 1, or to 0 where no
-            teammate is seen; the diagonal is 0.
+        mixed: (R, B, W) x_i, the weighted values of the teammates, with heads concatenated; zeros
+            for a robot that sees no teammate.
+        weights: (B, H, R, R) weight of robot i (row) on teammate j. Rows sum to 1, or to 0 if the
+            robot sees no teammate; the diagonal is 0.
         scores: (B, H, R, R) raw scores q_i . k_j, also of pairs that do not see each other; None
-            if nothing is scored.
+            if the attention has no scores.
         visible: (1 or B, R, R) bool, whether robot i sees teammate j.
     """
 
@@ -35,11 +35,11 @@ class Attended(NamedTuple):
 
 
 def visible_teammates(num_robots: int, available: Tensor | None, device: torch.device) -> Tensor:
-    """Which teammates each robot sees: the others, as far as they are available.
+    """Which teammates each robot sees: all other robots that are available.
 
     Args:
         num_robots: R.
-        available: (B, R) bool, or None where all are.
+        available: (B, R) bool; None: all are available.
         device: Where the result lies.
 
     Returns:
@@ -50,9 +50,9 @@ def visible_teammates(num_robots: int, available: Tensor | None, device: torch.d
 
 
 class TeammateAttention(nn.Module):
-    """Base of all attentions: from encodings of the team to what each robot makes of its teammates.
+    """Base of all attentions: maps encodings of the team to one vector of teammates per robot.
 
-    The critic's optimiser takes parameters of an attention for shared by the robots.
+    All robots share the parameters: learners divide their gradients by the number of robots.
 
     Attributes:
         width: W.
@@ -111,7 +111,7 @@ class InnerAttention(_SharedMatrices):
     """Learnt attention: alpha_ij = softmax over j != i of q_i . k_j / sqrt(d), per head.
 
     Attributes:
-        attend: From queries, keys and values to what each robot makes of its teammates.
+        attend: From queries, keys and values to the result; a compiled update has another form.
     """
 
     def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
@@ -127,12 +127,13 @@ class InnerAttention(_SharedMatrices):
 
 
 class UniformAttention(_SharedMatrices):
-    """The baseline: alpha_ij = 1/(N-1) for every teammate seen; query and key go unused.
+    """The baseline: alpha_ij = 1/(N-1) for every teammate that robot i sees.
 
-    It holds the parameters of `InnerAttention` and trains 2 W^2 fewer: 32,768 at a width of 128.
+    It has the parameters of `InnerAttention`, but does not use or train query and key: 2 W^2 fewer
+    trained parameters, 32,768 at a width of 128.
 
     Attributes:
-        attend: From values to what each robot makes of its teammates.
+        attend: From values to the result; a compiled update has another form.
     """
 
     def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
@@ -167,12 +168,12 @@ def dot_product_attention(
     # much faster than one along the last, and no product below needs a copy of its operands.
     scores = torch.bmm(keys, queries.transpose(1, 2)).view(batch, heads, robots, robots)
     seen = visible.transpose(1, 2).unsqueeze(1)
-    # The least finite number instead of -inf keeps a robot without teammates free of NaN.
+    # The lowest finite number instead of -inf avoids NaN for a robot without teammates.
     lowest = torch.finfo(scores.dtype).min
     hidden = torch.zeros_like(seen, dtype=scores.dtype).masked_fill_(~seen, lowest)
     weights = torch.add(hidden, scores, alpha=(width // heads) ** -0.5).softmax(dim=2)
     if robots == 1 or available is not None:
-        weights = weights * seen  # where nobody is seen, the softmax found equal weights
+        weights = weights * seen  # if a robot sees nobody, its softmax gives equal weights
     mixed = torch.bmm(weights.flatten(0, 1).transpose(1, 2), values)
     return Attended(
         mixed.transpose(0, 1).reshape(robots, batch, width),

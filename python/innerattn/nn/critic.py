@@ -1,7 +1,7 @@
-"""The centralised critic: Q of every own action of every robot, teammates seen by attention.
+"""The centralised critic: Q of every own action of every robot, with attention over teammates.
 
-It computes values; targets and losses belong to the learner. Structure: eqs. 2-4 of the paper and
-Iqbal & Sha 2019, section 3.2.
+It computes values; targets and losses are in `innerattn.learn`. Structure: eqs. 2-4 of the paper
+and Iqbal & Sha 2019, section 3.2.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from innerattn.nn.linear import PerRobotLinear
 
 
 class CriticOutput(NamedTuple):
-    """What the critic says of a batch.
+    """Values of a batch.
 
     Attributes:
-        q: (R, A, B) Q_i(o, a, a_-i) for every own action a, or (R, outputs, B) other values; robot
-            i's own action is not an input of its own values.
-        attended: What the attention made of the teammates; None where the critic has no attention.
+        q: (R, A, B) Q_i(o, a, a_-i) for every own action a, or (R, outputs, B) other values. The
+            own action of robot i is not an input of its values.
+        attended: Result of the attention; None if the critic has no attention.
     """
 
     q: Tensor
@@ -31,7 +31,7 @@ class CriticOutput(NamedTuple):
 
 
 class Critic(nn.Module):
-    """Critics of all robots; encoders and heads are each robot's own, the attention is shared."""
+    """The critics of all robots. Every robot has its own encoders and head; attention is shared."""
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class Critic(nn.Module):
             attention: The attention over teammates; its width is the width of every layer.
             generator: Source of the initial parameters, on the CPU.
             outputs: Values for each robot; None: one for each own action.
-            entities: Columns of the entities that are encoded apart; None: none are.
+            entities: Columns of the entities to encode separately; None: encode the whole row.
         """
         super().__init__()
         width = attention.width
@@ -72,9 +72,9 @@ class Critic(nn.Module):
 
         Args:
             obs: (R, B, D) observations.
-            actions: (R, B) int64 actions; robot i's own is seen by its teammates only.
-            available: (B, R) bool; unavailable robots are masked out of the attention. None: all
-                are available.
+            actions: (R, B) int64 actions; robot i's own is an input of its teammates' values only.
+            available: (B, R) bool; the attention masks unavailable robots. None: all are
+                available.
         """
         return self.value(*self.encode(obs, actions), available)
 

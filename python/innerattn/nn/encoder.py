@@ -1,6 +1,6 @@
-"""Encoders of observations: of a whole row at once, or entity by entity.
+"""Encoders of observations: of the whole row, or entity by entity.
 
-They know how many columns belong to whom, not what a column means.
+They know which columns belong to which entity, not what a column means.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _HEAD_WIDTH = 8
 
 @dataclass(frozen=True)
 class EntityColumns:
-    """To whom the columns of an observation belong: the robot, then teammates, then victims.
+    """Which entity the columns of an observation belong to: robot, then teammates, then victims.
 
     Attributes:
         own: Columns of the robot itself.
@@ -26,7 +26,7 @@ class EntityColumns:
         teammate: Columns of each teammate.
         victims: Number of victims, at least 1.
         victim: Columns of each victim.
-        present: Which of a victim's columns says whether there is one (above 0.5).
+        present: Index among a victim's columns of the one that is above 0.5 if there is a victim.
     """
 
     own: int
@@ -43,17 +43,16 @@ class EntityColumns:
 
 
 class EntityEncoder(nn.Module):
-    """Encodes a robot, its teammates and the victims apart; the order of their slots is no input.
+    """Encodes a robot, its teammates and the victims separately, whatever the order of their slots.
 
-    For every robot, with parameters of its own, which all of its teammates (victims) share:
+    Every robot has its own parameters, and uses the same ones for all its teammates (victims):
 
         e = phi(W_own own),  v_k = phi(W_v victim_k),  t_k = phi(W_t teammate_k)
         y = W [e, sum_k alpha_k v_k, sum_k beta_k t_k]
 
-    where alpha is the softmax over the victims present of q . v_k / sqrt(d) with q = W_q e, head by
-    head, and beta likewise over teammates; where there is nobody, the sum is zero. Every layer has
-    a bias, too. Inside, the batch comes last: sums over so few entities then run along whole rows
-    of memory.
+    where alpha is the softmax over the victims present of q . v_k / sqrt(d) with q = W_q e, per
+    head, and beta likewise over teammates. The sum over no entity is zero. Every layer has a bias.
+    Inside, the batch is the last dimension, so that sums over few entities run along memory.
     """
 
     def __init__(
@@ -70,7 +69,7 @@ class EntityEncoder(nn.Module):
             num_robots: R.
             columns: The columns of an observation.
             extra_width: Further columns behind them, which belong to the robot itself.
-            out_width: Outputs per robot; what is encoded apart is a quarter as wide, in
+            out_width: Outputs per robot; encodings of entities have a quarter of this width, in
                 heads of 8.
             generator: Source of the initial parameters, on the CPU.
         """
@@ -121,7 +120,7 @@ class EntityEncoder(nn.Module):
             present: (R, K, B) bool, the entities that are there; None: all are.
 
         Returns:
-            (R, W, B) the weighted encodings, heads side by side.
+            (R, W, B) the weighted encodings, with heads concatenated.
         """
         robots, entities, batch, _ = blocks.shape
         encoded = functional.leaky_relu_(layer.batch_last(blocks.flatten(1, 2)))
@@ -131,8 +130,8 @@ class EntityEncoder(nn.Module):
         if present is None:
             weights = scores.softmax(dim=2)
         else:
-            # The least finite number instead of -inf keeps a world without victims free of NaN;
-            # there the softmax finds equal weights, which the product takes back.
+            # The lowest finite number instead of -inf avoids NaN in a world without victims; the
+            # softmax then gives equal weights, which the product sets to 0.
             seen = present.unsqueeze(1)
             scores = scores.masked_fill(~seen, torch.finfo(scores.dtype).min)
             weights = scores.softmax(dim=2) * seen
@@ -154,14 +153,14 @@ def observation_encoder(
     entities: EntityColumns | None,
     extra_width: int = 0,
 ) -> PerRobotLinear | EntityEncoder:
-    """What maps (R, B, D + extra) to (R, B, out).
+    """A layer that maps (R, B, D + extra) to (R, B, out).
 
     Args:
         num_robots: R.
         obs_width: D.
         out_width: Outputs per robot.
         generator: Source of the initial parameters, on the CPU.
-        entities: Columns of the entities that are encoded apart; None: the row is taken as it is.
+        entities: Columns of the entities to encode separately; None: encode the whole row.
         extra_width: Columns behind an observation.
     """
     if entities is None:

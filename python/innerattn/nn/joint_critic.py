@@ -1,7 +1,7 @@
-"""The plain centralised critic: each robot's values from the observations of all, no attention.
+"""The centralised critic without attention: each robot's values from all observations.
 
-It computes values; targets and losses belong to the learner. Source: Yu et al. 2022 ("MAPPO"), with
-every robot's parameters its own.
+It computes values; targets and losses are in `innerattn.learn`. Source: Yu et al. 2022 ("MAPPO"),
+with separate parameters for every robot.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from innerattn.nn.linear import PerRobotLinear
 
 
 class JointCritic(nn.Module):
-    """Critics of all robots, two hidden layers each; nothing is shared between robots."""
+    """The critics of all robots, with two hidden layers; robots share no parameters."""
 
     def __init__(
         self,
@@ -46,11 +46,11 @@ class JointCritic(nn.Module):
 
         Args:
             obs: (R, B, D) observations; every robot's values depend on all of them.
-            actions: (R, B) int64, no input: it is here because other critics have it.
-            available: (B, R) bool, no input either.
+            actions: (R, B) int64; not used, as in other critics' signature.
+            available: (B, R) bool; not used either.
         """
         del actions, available
-        joint = obs.transpose(0, 1).flatten(1)  # (B, R * D), robots side by side
+        joint = obs.transpose(0, 1).flatten(1)  # (B, R * D)
         joint = joint.expand(len(obs), -1, -1)
         hidden = functional.leaky_relu_(self.first(joint))
         hidden = functional.leaky_relu_(self.second(hidden))

@@ -1,6 +1,6 @@
-"""A linear layer with one weight per robot, all robots in one batched product.
+"""A linear layer with one weight matrix per robot, computed as one batched matrix product.
 
-It holds parameters and multiplies; activations belong to the networks that use it.
+Activations are in the networks that use it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ def uniform_parameter(
     Args:
         shape: Shape of the parameter.
         fan_in: Number of inputs of the unit that the parameter feeds.
-        generator: Source of the draw, on the CPU; the global one is left alone.
+        generator: Source of the draw, on the CPU; the global generator is not used.
     """
     bound = fan_in**-0.5
     return nn.Parameter(torch.empty(shape).uniform_(-bound, bound, generator=generator))
@@ -55,16 +55,15 @@ class PerRobotLinear(nn.Module):
         width = left.shape[2]
         weight = self.weight.transpose(1, 2)
         partial = torch.baddbmm(self.bias.unsqueeze(1), left, weight[:, :width])
-        if partial.dtype != weight.dtype:  # autocast knows no products in place
+        if partial.dtype != weight.dtype:  # autocast has no in-place products
             return torch.baddbmm(partial, right, weight[:, width:])
         return partial.baddbmm_(right, weight[:, width:])
 
     def batch_last(self, x: Tensor) -> Tensor:
         """Map (R, B, in) to (R, out, B).
 
-        For a handful of outputs this orientation is several times faster, and what follows (a
-        softmax over actions, say) then runs along whole rows of memory. The result has the
-        parameters' type, also where products are less precise.
+        For few outputs this layout is several times faster, and a following softmax over actions
+        runs along memory. The result has the dtype of the parameters, also under autocast.
         """
         weight = self.weight
         outputs = torch.baddbmm(self.bias.unsqueeze(2), weight, x.transpose(1, 2))

@@ -1,11 +1,12 @@
 """One set of parameters for all robots of a kind.
 
-The layers of a network go on seeing a row of weights for each robot; which rows are one and the
-same is decided here.
+The layers of a network still see a row of weights for each robot; this module decides which rows
+are the same.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import torch
@@ -16,11 +17,12 @@ from innerattn.nn.linear import PerRobotLinear
 
 
 def share_by_kind(network: nn.Module, kinds: Sequence[str]) -> None:
-    """Let robots of a kind have the same weights in all layers that have weights by robot.
+    """Let robots of a kind share the parameters of all layers that have weights by robot.
 
-    A kind begins with the weights of its first robot. The network's parameters then have kinds
-    instead of robots as their first dimension, (K, ...), and ``parametrizations.weight.original``
-    instead of ``weight`` in their names; a kind's gradient is the sum of its robots'.
+    The first robot of a kind gives the initial weights of the kind. The network's parameters then
+    have kinds instead of robots as their first dimension, (K, ...), in the order in which kinds
+    first occur, and ``parametrizations.weight.original`` instead of ``weight`` in their names. The
+    gradient of a kind is the sum of the gradients of its robots.
 
     Args:
         network: Changed in place; before its optimiser is made.
@@ -32,10 +34,20 @@ def share_by_kind(network: nn.Module, kinds: Sequence[str]) -> None:
             parametrize.register_parametrization(layer, name, rows)
 
 
+def is_shared_by_kind(name: str) -> bool:
+    """Whether a parameter of this name has kinds as its first dimension."""
+    return ".parametrizations." in name
+
+
+def robots_of_each_kind(kinds: Sequence[str]) -> Tensor:
+    """(K,) int64, the number of robots of each kind, in the order of `share_by_kind`."""
+    return torch.tensor(list(Counter(kinds).values()))
+
+
 class _RowsByKind(nn.Module):
     """From parameters by kind (K, ...) to parameters by robot (R, ...), and back.
 
-    Rows are taken one by one: the gradient of an index adds up in any order on several threads.
+    Rows are taken one by one: on several threads, the gradient of an index sums in any order.
     """
 
     def __init__(self, kinds: Sequence[str]) -> None:

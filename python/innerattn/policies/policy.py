@@ -1,4 +1,4 @@
-"""What a policy may look at and what it gives; shared by scripted and trained policies."""
+"""What a policy sees and gives; the one protocol of scripts, trained teams and exported actors."""
 
 from __future__ import annotations
 
@@ -10,27 +10,48 @@ from numpy.typing import NDArray
 from innerattn.envs import BatchEnv
 
 
-class PolicyInput(NamedTuple):
-    """What a policy may look at before it acts: the robots' observations and the true state.
+class WorldState(NamedTuple):
+    """The true state of a batch of worlds.
 
     Attributes:
-        obs: (E, R, D) float32.
         positions: (E, R, 2) float32 [m].
         velocities: (E, R, 2) float32 [m/s].
         victims: (E, V) structured: present, task, id, appeared_step, x, y [m].
         faults: (E, R) structured, the fields of `BatchEnv.fault_state`.
     """
 
-    obs: NDArray[np.float32]
     positions: NDArray[np.float32]
     velocities: NDArray[np.float32]
     victims: NDArray[np.void]
     faults: NDArray[np.void]
 
     @classmethod
-    def of(cls, env: BatchEnv, obs: NDArray[np.float32]) -> Self:
-        """The present view of the worlds of ``env``, whose observations are ``obs``."""
-        return cls(obs, env.positions(), env.velocities(), env.victims(), env.fault_state())
+    def of(cls, env: BatchEnv) -> Self:
+        """The present state of the worlds of ``env``."""
+        return cls(env.positions(), env.velocities(), env.victims(), env.fault_state())
+
+
+class PolicyInput(NamedTuple):
+    """What a policy sees before it acts.
+
+    Attributes:
+        obs: (E, R, D) float32, the robots' observations.
+        state: the true state; None where the policy says that it does not need it.
+    """
+
+    obs: NDArray[np.float32]
+    state: WorldState | None = None
+
+    @property
+    def known_state(self) -> WorldState:
+        """The true state, for policies that need it.
+
+        Raises:
+            ValueError: it was not given.
+        """
+        if self.state is None:
+            raise ValueError("state = None: must be given to a policy with needs_true_state")
+        return self.state
 
 
 class Policy(Protocol):
@@ -40,5 +61,12 @@ class Policy(Protocol):
     def name(self) -> str:
         """What to call it in tables."""
 
+    @property
+    def needs_true_state(self) -> bool:
+        """Whether `act` looks at `PolicyInput.state`, which is fetched only then."""
+
     def act(self, view: PolicyInput) -> NDArray[Any]:
         """Choose actions: (E, R) integers, or (E, R, 2) float32 where actions are continuous."""
+
+    def reset(self, seed: int) -> None:
+        """Forget what was seen; all that is drawn from now on follows from ``seed`` alone."""

@@ -1,9 +1,8 @@
-"""Figures over several runs that a few bad runs do not spoil, after Agarwal et al. 2021.
+"""Statistics over several runs that a few bad runs do not spoil, after Agarwal et al. 2021.
 
 "Deep reinforcement learning at the edge of the statistical precipice", NeurIPS 34, §4. Runs are
-grouped into strata (situations), and a bootstrap resamples runs within each. Its percentile
-intervals are too short where strata hold few runs; Student's interval of the mean
-(`statistics.student_interval`) is the one to trust then.
+grouped into strata (situations), and a bootstrap resamples runs within each. With few runs in each
+stratum its percentile intervals are too short: prefer `student.student_interval` of the mean then.
 """
 
 from __future__ import annotations
@@ -13,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from innerattn.stats.bootstrap import bootstrap, percentile_interval
 from innerattn.stats.estimate import Estimate
-from innerattn.stats.resampling import percentile_interval
 
 Array = NDArray[np.float64]
 
@@ -30,7 +29,7 @@ def interquartile_mean(values: ArrayLike) -> float:
     Raises:
         ValueError: there are no values, or they are not (n,).
     """
-    return float(_trimmed(_values(values, 1)[None])[0])
+    return float(_trimmed_mean(_checked(values, 1), axis=-1))
 
 
 def iqm_interval(strata: Sequence[ArrayLike], seed: int) -> Estimate:
@@ -41,14 +40,13 @@ def iqm_interval(strata: Sequence[ArrayLike], seed: int) -> Estimate:
         seed: seed of the resampling.
 
     Raises:
-        ValueError: there is no stratum, or one has less than two values.
+        ValueError: there is no stratum, or one has fewer than two values.
     """
-    groups = _groups("strata", strata)
-    rng = np.random.default_rng(seed)
-    rows = (rng.integers(0, len(values), (_RESAMPLES, len(values))) for values in groups)
-    resampled = [values[drawn] for values, drawn in zip(groups, rows, strict=True)]
-    mean = interquartile_mean(np.concatenate(groups))
-    return percentile_interval(mean, _trimmed(np.concatenate(resampled, 1)))
+    groups = _checked_groups("strata", strata)
+    resampled = bootstrap(
+        groups, _trimmed_mean, seed, resamples=_RESAMPLES, width=sum(map(len, groups))
+    )
+    return percentile_interval(float(_trimmed_mean(*groups, axis=-1)), resampled)
 
 
 def improvement_interval(x: Sequence[ArrayLike], y: Sequence[ArrayLike], seed: int) -> Estimate:
@@ -64,36 +62,38 @@ def improvement_interval(x: Sequence[ArrayLike], y: Sequence[ArrayLike], seed: i
         seed: seed of the resampling.
 
     Raises:
-        ValueError: there is no stratum, one has less than two values, or their numbers differ.
+        ValueError: there is no stratum, one has fewer than two values, or their numbers differ.
     """
-    better, worse = _groups("x", x), _groups("y", y)
-    if len(better) != len(worse):
-        raise ValueError(f"x has {len(better)} strata, y {len(worse)}: must be as many")
-    rng = np.random.default_rng(seed)
-    means, resampled = [], []
-    for ours, theirs in zip(better, worse, strict=True):
-        wins = 0.5 * (np.sign(ours[:, None] - theirs) + 1.0)
-        of_x, of_y = (
-            rng.multinomial(n, np.full(n, 1.0 / n), _RESAMPLES) / n for n in wins.shape
-        )  # how often each run is drawn
-        means.append(wins.mean())
-        resampled.append(((of_x @ wins) * of_y).sum(1))
-    return percentile_interval(float(np.mean(means)), np.mean(resampled, 0))
+    of_x, of_y = _checked_groups("x", x), _checked_groups("y", y)
+    if len(of_x) != len(of_y):
+        raise ValueError(f"x has {len(of_x)} strata, y {len(of_y)}: must be as many")
+
+    def improvement(*groups: Array, axis: int) -> Array:
+        assert axis == -1
+        strata = zip(groups[: len(of_x)], groups[len(of_x) :], strict=True)
+        wins = [np.sign(a[..., :, None] - b[..., None, :]).mean((-2, -1)) for a, b in strata]
+        return np.asarray(0.5 * (np.mean(wins, 0) + 1.0))
+
+    groups = [*of_x, *of_y]
+    pairs = sum(len(a) * len(b) for a, b in zip(of_x, of_y, strict=True))
+    resampled = bootstrap(groups, improvement, seed, resamples=_RESAMPLES, width=pairs)
+    return percentile_interval(float(improvement(*groups, axis=-1)), resampled)
 
 
-def _trimmed(values: Array) -> Array:
-    """Interquartile means of the rows of (B, n)."""
-    n = values.shape[1]
-    return np.asarray(np.sort(values, 1)[:, n // 4 : n - n // 4].mean(1))
+def _trimmed_mean(*groups: Array, axis: int) -> Array:
+    """Interquartile means of all groups together, along the last axis."""
+    from scipy.stats import trim_mean
+
+    return np.asarray(trim_mean(np.concatenate(groups, axis), 0.25, axis))
 
 
-def _groups(name: str, strata: Sequence[ArrayLike]) -> list[Array]:
+def _checked_groups(name: str, strata: Sequence[ArrayLike]) -> list[Array]:
     if not len(strata):
         raise ValueError(f"{name}: there must be at least one stratum")
-    return [_values(values, 2) for values in strata]
+    return [_checked(values, 2) for values in strata]
 
 
-def _values(values: ArrayLike, least: int) -> Array:
+def _checked(values: ArrayLike, least: int) -> Array:
     array = np.asarray(values, np.float64)
     if array.ndim != 1 or len(array) < least or not np.isfinite(array).all():
         raise ValueError(f"values {array.tolist()}: must be ({least} or more,) finite numbers")

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from innerattn.stats.bootstrap import percentile_interval
 from innerattn.stats.estimate import Estimate
-from innerattn.stats.resampling import percentile_interval
 
 
 class Comparison(NamedTuple):

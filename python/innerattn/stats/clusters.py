@@ -1,8 +1,8 @@
 """Shares and ratios over events that come in episodes, with intervals; it knows no event.
 
-Events within an episode depend on each other, episodes do not, so intervals are made of the scatter
-between whole episodes. Percentiles of resampled episodes say the same of many episodes; of few, or
-near a share of 0 or 1, they miss the truth far more often than they say.
+Events within an episode depend on each other, episodes do not, so the variance is that between
+episodes. A percentile bootstrap over episodes agrees where there are many; with few, or near a
+share of 0 or 1, its intervals miss the truth far more often than their level says.
 """
 
 from __future__ import annotations
@@ -12,66 +12,66 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import stdtr, stdtrit
 
 from innerattn.stats.estimate import Estimate
+from innerattn.stats.student import t_cdf, t_quantile
 
 
 @dataclass(frozen=True)
-class Share:
-    """A share of events, and how much it can be trusted.
+class ClusteredShare:
+    """A share of events that come in episodes.
 
-    The interval is Wilson's, with the number of events replaced by the number of independent events
-    that would scatter as much, and the normal quantile by Student's (Franco, Little, Louis & Slud
-    2019, J. Surv. Stat. Methodol. 7, 334-364). With p the share and n that number it holds every q
-    with ``|p - q| <= t sqrt(q (1 - q) / n)``.
+    Its interval is Wilson's, with the number of events replaced by the effective one, which is the
+    number of independent events of the same variance, and the normal quantile replaced by Student's
+    (Franco, Little, Louis & Slud 2019, J. Surv. Stat. Methodol. 7, 334-364). With p the share and n
+    that number it contains every q with ``|p - q| <= t sqrt(q (1 - q) / n)``.
 
     Attributes:
-        value: p in [0, 1].
+        share: p in [0, 1].
         effective_events: n.
         episodes: episodes with events, k; t has k - 1 degrees of freedom.
     """
 
-    value: float
+    share: float
     effective_events: float
     episodes: int
 
-    def interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Low and high end of the two-sided interval; [0, 1] from a single episode."""
+    def estimate(self, level: float = 0.95) -> Estimate:
+        """The share and its two-sided interval; [0, 1] from a single episode."""
         if self.episodes < 2:
-            return 0.0, 1.0
-        p, n = self.value, self.effective_events
-        t = float(stdtrit(self.episodes - 1, 0.5 + level / 2.0))
+            return Estimate(self.share, 0.0, 1.0)
+        p, n = self.share, self.effective_events
+        t = float(t_quantile(0.5 + level / 2.0, self.episodes - 1))
         centre = (p + t * t / (2.0 * n)) / (1.0 + t * t / n)
         half = t / (1.0 + t * t / n) * math.sqrt(p * (1.0 - p) / n + t * t / (4.0 * n * n))
-        # It holds p and lies in [0, 1]; rounding alone could say otherwise.
-        return min(max(centre - half, 0.0), p), max(min(centre + half, 1.0), p)
+        # It contains p and lies in [0, 1]; rounding alone could say otherwise.
+        return Estimate(p, min(max(centre - half, 0.0), p), max(min(centre + half, 1.0), p))
 
     def p_above(self, bound: float) -> float:
         """The p-value against "the share is at most ``bound``", which is in (0, 1).
 
         It is below (1 - level) / 2 exactly where the interval lies above ``bound``.
         """
-        return self._p(self.value - bound, bound)
+        return self._p(self.share - bound, bound)
 
     def p_below(self, bound: float) -> float:
         """The p-value against "the share is at least ``bound``", which is in (0, 1)."""
-        return self._p(bound - self.value, bound)
+        return self._p(bound - self.share, bound)
 
     def _p(self, excess: float, bound: float) -> float:
         if self.episodes < 2:
             return 1.0
-        deviation = math.sqrt(bound * (1.0 - bound) / self.effective_events)
-        return float(stdtr(self.episodes - 1, -excess / deviation))
+        standard_error = math.sqrt(bound * (1.0 - bound) / self.effective_events)
+        return float(t_cdf(-excess / standard_error, self.episodes - 1))
 
 
-def share_of(hits: ArrayLike, events: ArrayLike) -> Share | None:
+def share_of(hits: ArrayLike, events: ArrayLike) -> ClusteredShare | None:
     """The share of events that are hits, over episodes.
 
     With x hits of n events in an episode, X of N in all and k episodes with events, the variance of
-    X / N is ``k / (k - 1) sum (x - n X / N)² / N²`` (the linearised one of a ratio), and the number
-    of independent events is that which would give it. Where all episodes have the same share, it
-    says nothing, and every episode counts as one event.
+    X / N is ``k / (k - 1) sum (x - n X / N)² / N²`` (the linearised one of a ratio), and the
+    effective number of events is that of independent events with this variance. Where all episodes
+    have the same share the variance is 0, and every episode counts as one event.
 
     Args:
         hits: (E,) integers, hits by episode.
@@ -96,15 +96,15 @@ def share_of(hits: ArrayLike, events: ArrayLike) -> Share | None:
     scatter = (x * total - n * x.sum()).astype(np.float64) / total  # exactly 0 where shares agree
     squares = float(scatter @ scatter)
     if k < 2 or squares == 0.0:
-        return Share(share, float(k), k)
+        return ClusteredShare(share, float(k), k)
     variance = k / (k - 1) * squares / total**2
-    return Share(share, share * (1.0 - share) / variance, k)
+    return ClusteredShare(share, share * (1.0 - share) / variance, k)
 
 
 def share_interval(hits: ArrayLike, events: ArrayLike) -> Estimate | None:
     """The share of events that are hits and its 95 % interval; see `share_of`."""
     share = share_of(hits, events)
-    return None if share is None else Estimate(share.value, *share.interval())
+    return None if share is None else share.estimate()
 
 
 def ratio_intervals(
@@ -128,14 +128,14 @@ def ratio_intervals(
     mean = np.where(total > 0, sums.sum(0) / np.maximum(total, 1), np.nan)
     squares = ((sums - counts * mean) ** 2).sum(0)
     spread = np.sqrt(k / np.maximum(k - 1, 1) * squares) / np.maximum(total, 1)
-    half = np.where(k > 1, stdtrit(np.maximum(k - 1, 1), 0.975) * spread, np.nan)
+    half = np.where(k > 1, t_quantile(0.975, np.maximum(k - 1, 1)) * spread, np.nan)
     return mean, mean - half, mean + half
 
 
 def ratio_interval(sums: ArrayLike, events: ArrayLike) -> Estimate | None:
     """One mean over events, see `ratio_intervals`; None below two episodes with events."""
-    found = ratio_intervals(np.asarray(sums, np.float64), np.asarray(events, np.float64))
-    mean, low, high = map(float, found)
+    ends = ratio_intervals(np.asarray(sums, np.float64), np.asarray(events, np.float64))
+    mean, low, high = map(float, ends)
     return None if math.isnan(low) else Estimate(mean, low, high)
 
 

@@ -1,17 +1,16 @@
-"""Do methods differ, or are they alike? From runs of each with the same seeds."""
+"""Differences and equivalence of methods, from runs of each with the same seeds."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import chdtri, gammaln, nctdtrinc, stdtr, stdtrit
 
 from innerattn.stats.estimate import Estimate
+from innerattn.stats.student import difference_p, equivalence_p, student_interval
 
 ALPHA = 0.05
 """Level of every test."""
@@ -25,17 +24,15 @@ class Contrast:
     """A difference of two methods, or another weighted sum of the means of several.
 
     Attributes:
-        difference: it and its 95 % interval, by the t distribution.
-        dof: degrees of freedom of that.
+        difference: with its 95 % interval, by Student's t.
+        dof: degrees of freedom of the t distribution.
         p: two-sided, of the t-test against 0.
-        margin: differences smaller than this count as none.
-        equivalence_p: the larger of the p-values of two one-sided tests against a difference of at
-            least ``margin`` either way.
-        equivalent: equivalence_p is below 5 %, which is that the 90 % interval lies within ±
-            ``margin``.
-        hedges_g: standardised difference, ``J difference / s`` with a deviation s and J the
-            correction for few runs (Hedges 1981), and the exact 95 % interval of the true one by
-            the noncentral t.
+        margin: smaller differences than this count as none.
+        equivalence_p: of two one-sided tests against a difference of at least ``margin``.
+        equivalent: equivalence_p is below 5 %, so that the 90 % interval lies within ± ``margin``.
+        hedges_g: standardised difference, ``J difference / s`` with a standard deviation s and J
+            the correction for few runs (Hedges 1981), and the exact 95 % interval of the true one
+            by the noncentral t.
     """
 
     difference: Estimate
@@ -50,8 +47,8 @@ class Contrast:
 def contrast(values: ArrayLike, weights: Sequence[float], margin: float) -> Contrast | None:
     """Compare methods that were run with the same seeds, such as the arms of a crossed design.
 
-    The seed is the unit: each gives one weighted sum, and Student's t looks at these. Runs of one
-    seed may therefore be as alike as they like, whatever the method.
+    The seed is the unit: each gives one weighted sum, and the t-test is over these sums. Runs of
+    one seed may therefore depend on each other.
 
     Args:
         values: (n, k), a row for each seed, n >= 3, with the value of each method's run.
@@ -59,8 +56,8 @@ def contrast(values: ArrayLike, weights: Sequence[float], margin: float) -> Cont
         margin: the largest difference that does not matter, above 0, in the values' unit.
 
     Returns:
-        The comparison, ``hedges_g`` by the deviation of the weighted sum between seeds; None where
-        that is the same for all, which leaves nothing to judge it by.
+        The comparison; ``hedges_g`` is by the standard deviation of the weighted sums. None where
+        all seeds give the same sum, which leaves no variance to judge it by.
 
     Raises:
         ValueError: there are less than three seeds, the weights do not fit, or the margin is not
@@ -75,19 +72,23 @@ def contrast(values: ArrayLike, weights: Sequence[float], margin: float) -> Cont
     sums = rows @ parts
     if np.ptp(sums) <= _ROUNDING * (np.abs(rows) @ np.abs(parts)).max():
         return None
-    n, deviation = len(sums), float(sums.std(ddof=1))
-    difference = float(sums.mean())
+    n, p = len(sums), equivalence_p(sums, -margin, margin)
     return Contrast(
-        **_judged(difference, deviation / math.sqrt(n), n - 1.0, margin),
-        hedges_g=_hedges_g(difference / deviation, math.sqrt(1 / n), n - 1),
+        difference=student_interval(sums),
+        dof=n - 1.0,
+        p=difference_p(sums),
+        margin=margin,
+        equivalence_p=p,
+        equivalent=p < ALPHA,
+        hedges_g=_hedges_g(float(sums.mean() / sums.std(ddof=1)), math.sqrt(1 / n), n - 1),
     )
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """P-values adjusted for being asked together, in their order (Holm 1979).
+    """P-values adjusted for multiple testing, in their order (Holm 1979).
 
-    The chance that one of them is below 5 % while there is nothing to find is then at most 5 %,
-    however they depend on each other.
+    The chance that any of them falls below 5 % without a true effect is then at most 5 %, however
+    the tests depend on each other.
     """
     adjusted = [1.0] * len(p_values)
     largest = 0.0
@@ -97,22 +98,10 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return adjusted
 
 
-def _judged(difference: float, error: float, dof: float, margin: float) -> dict[str, Any]:
-    """What t-tests say of a difference, as fields of `Contrast`."""
-    half = float(stdtrit(dof, 1.0 - ALPHA / 2.0)) * error
-    equivalence_p = float(stdtr(dof, -(margin - abs(difference)) / error))
-    return {
-        "difference": Estimate(difference, difference - half, difference + half),
-        "dof": dof,
-        "p": float(2.0 * stdtr(dof, -abs(difference) / error)),
-        "margin": margin,
-        "equivalence_p": equivalence_p,
-        "equivalent": equivalence_p < ALPHA,
-    }
-
-
 def _hedges_g(effect: float, scale: float, dof: int) -> Estimate:
     """The corrected standardised difference; ``effect / scale`` is the t of ``dof`` degrees."""
+    from scipy.special import chdtri, gammaln, nctdtrinc
+
     correction = math.exp(gammaln(dof / 2) - gammaln((dof - 1) / 2)) / math.sqrt(dof / 2)
     t, quantiles = effect / scale, (1.0 - ALPHA / 2.0, ALPHA / 2.0)
     # The noncentrality of that t is the true effect / scale.

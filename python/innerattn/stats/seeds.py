@@ -9,10 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from innerattn.stats.estimate import Estimate
-from innerattn.stats.intervals import student_interval
+from innerattn.stats.student import student_interval, t_quantile
 
 Array = NDArray[np.float64]
 
@@ -76,7 +75,7 @@ def seed_curve(values: Array) -> SeedCurve:
     most = np.where(has, values, -np.inf).max(0)
     squares = (np.where(has, values - mean, 0.0) ** 2).sum(0)
     dof = np.maximum(n - 1, 1)
-    half = stdtrit(dof, 0.975) * np.sqrt(squares / dof / np.maximum(n, 1))
+    half = t_quantile(0.975, dof) * np.sqrt(squares / dof / np.maximum(n, 1))
     low = np.where(n > 2, mean - half, np.where(n == 2, least, np.nan))
     high = np.where(n > 2, mean + half, np.where(n == 2, most, np.nan))
     kinds: tuple[BandKind, ...] = ("none", "range", "student")

@@ -1,6 +1,6 @@
-"""Training: policy and worlds make data, a learner learns from it, a run folder keeps the result.
+"""Training: a policy acts in worlds, a learner learns from the transitions, a run folder holds all.
 
-It measures and prints nothing beyond the run's own metrics.
+It writes the run's metrics, and neither evaluates nor prints.
 """
 
 from innerattn.records.run_folder import RunInfo, read_info

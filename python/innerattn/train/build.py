@@ -1,4 +1,4 @@
-"""From a configuration to the learner it names; the only place that knows which classes exist."""
+"""Builds the learner that a configuration names, and sets up the process for training."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from innerattn.train.columns import entity_columns
 
 
 def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
-    """A fresh learner for the team in ``env``, seeded by `train.seed`.
+    """A learner with initial weights for the team in ``env``, seeded by `train.seed`.
 
     Raises:
         ConfigError: the device does not exist here, or the actions are continuous.
@@ -53,20 +53,20 @@ _ROWS_PER_THREAD = 512
 
 
 def thread_count(config: RunConfig) -> int:
-    """Threads of the networks: `train.threads`, or one for every 512 rows of a batch.
+    """Threads of the networks: `train.threads`, or one for every 512 rows of an update.
 
-    A second thread gains little on small batches, and torch's threads wait for each other: where
-    another program takes one of the cores, two are many times slower than one.
+    A second thread gains little on small batches. Torch's threads wait for each other, so that two
+    are many times slower than one where another program takes one of the cores.
     """
     worth = max(1, config.algorithm.rows_per_update // _ROWS_PER_THREAD)
     return config.train.threads or min(worth, usable_cores())
 
 
 def keep_heap_small() -> None:
-    """Give large buffers back to the system when they are freed (glibc only; elsewhere nothing).
+    """Return large buffers to the system when they are freed; glibc only.
 
-    An update makes and frees hundreds of aligned buffers. Left to itself the C library moves them
-    to its heap, finds no holes for them there, and grows by gigabytes in an hour.
+    An update allocates and frees hundreds of aligned buffers. By default glibc comes to place them
+    on its heap, which fragments and grows by gigabytes in an hour.
     """
     mmap_threshold, least_bytes = -3, 4 * 1024 * 1024
     if sys.platform == "linux":
@@ -89,7 +89,7 @@ def torch_threads(count: int) -> Iterator[None]:
 def _device(name: str) -> torch.device:
     try:
         device = torch.device(name)
-        # A well-formed name may still be of a device that is not here or that keeps no values.
+        # A valid name may still be that of a device that is not here, or that stores no values.
         torch.zeros(1, device=device).item()
     except (RuntimeError, AssertionError) as error:
         count = torch.cuda.device_count()

@@ -1,6 +1,6 @@
-"""Steps a learner's policy and a batch of worlds, and gives back what was seen.
+"""Steps a learner's policy in a batch of worlds, and returns the transitions.
 
-It learns nothing and keeps only running counts of episodes and rescues.
+It does not learn, and stores only counts of episodes and rescues.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Collector:
         return transitions, truncated
 
     def take_tally(self) -> Tally:
-        """What has happened since the last call."""
+        """Counts since the last call."""
         tally = Tally(self._episodes, self._rescues, self._total)
         self._episodes = self._rescues = 0
         return tally
@@ -76,5 +76,5 @@ class Collector:
             self._open_rescues[ended] = 0
 
     def _tensor(self, array: NDArray[Any]) -> Tensor:
-        # The worlds reuse their buffers, so a copy is made in any case.
+        # A copy, since the worlds reuse their buffers.
         return torch.tensor(array, device=self._device)

@@ -1,4 +1,4 @@
-"""Whose the columns of an observation are, read off their names."""
+"""Finds out from their names which entity the columns of an observation belong to."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from innerattn.nn import EntityColumns
 
 
 def entity_columns(names: Sequence[str]) -> EntityColumns:
-    """The columns of the robot itself, of its teammates and of the victims.
+    """Numbers of columns of the robot itself, of its teammates and of the victims.
 
     Args:
         names: Of all columns: ``own.*``, then ``teammate_0.*``, ``teammate_1.*`` and so on, then

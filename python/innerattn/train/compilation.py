@@ -1,4 +1,4 @@
-"""Whether updates run as one compiled graph: what is asked for, what pays, what works here."""
+"""Decides whether updates run as one compiled graph: as asked, if it pays, and if it works here."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from innerattn.config import RunConfig
 _log = logging.getLogger(__name__)
 
 _WORTH_ROWS = 8_000_000
-"""Rows of training from which compiling surely pays: the compiler takes up to a minute, and then
-some 15 to 30 microseconds a row are saved (`benches/compare_learner.py`)."""
+"""Rows of training from which compiling pays: the compiler takes up to a minute, and compiled
+updates save about 15 to 30 microseconds a row (`benches/compare_learner.py`)."""
 
 
 def compiles(config: RunConfig) -> bool:
-    """Whether this run's updates are to be compiled here.
+    """Whether to compile the updates of this run.
 
-    Where it is wanted but cannot be, one line of the log says so.
+    If they should be compiled and there is no working compiler, a warning says so.
     """
     choice = config.train.compile
     if choice == "off":
@@ -37,9 +37,9 @@ def compiles(config: RunConfig) -> bool:
 
 
 def _problem(device: str) -> str | None:
-    """What keeps the compiler from working there, found by compiling a line; None where it works.
+    """Why compiling fails there, found by compiling one line; None if it works.
 
-    A compiler alone is not enough: Python's headers, for one, are needed, too.
+    A compiler alone is not enough: Python's headers, for example, are needed too.
     """
 
     def line(x: Tensor) -> Tensor:

@@ -1,7 +1,7 @@
 """Imitation of a scripted policy before learning from rewards: DAgger, after Ross et al. 2011.
 
-The learner drives the worlds itself and meets its own mistakes; a script, which sees the true
-state, says what it would have done there. It knows no algorithm, only the `Learner` protocol.
+The learner acts in the worlds, so that it meets the states to which its own mistakes lead. A script
+sees the true state and labels these states with its actions. Any `Learner` can imitate.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from torch import Tensor
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.learn.types import Learner, Transitions
-from innerattn.policies import PolicyInput, scripted_policy
+from innerattn.policies import PolicyInput, WorldState, scripted_policy
 from innerattn.train.collect import Collector
 
 
 class Imitation:
-    """One learner on its way to play like a script."""
+    """One learner that imitates one script."""
 
     def __init__(
         self, config: RunConfig, env: BatchEnv, learner: Learner, collector: Collector
     ) -> None:
-        """Get ready to imitate `train.warm_start`; ``collector`` steps ``learner`` in ``env``.
+        """Prepare to imitate `train.warm_start`; ``collector`` steps ``learner`` in ``env``.
 
         Raises:
             ConfigError: no such script.
@@ -35,43 +35,47 @@ class Imitation:
         capacity = min(self._config.memory_env_steps, self._config.env_steps + env.num_envs)
         shape = (capacity, env.num_robots, env.obs_width)
         self._memory = _Memory(shape, config.train.seed)
-        self._unpaid_env_steps = 0
+        self._pending_env_steps = 0
 
     @property
     def env_steps(self) -> int:
-        """How long to imitate, all worlds counted."""
+        """Length of the imitation, summed over worlds."""
         return self._config.env_steps
 
     def step(self, share: float) -> tuple[Transitions, dict[str, float]]:
-        """One control step of all worlds, and the steps of the actors that it makes due.
+        """One control step of all worlds, and the training steps that are due.
 
         Args:
             share: Part of the imitation that is done, 0 to 1.
 
         Returns:
-            The transitions, and figures by name: `agreement`, the share of the actions now drawn
+            The transitions, and metrics by name: `agreement`, the share of the actions now drawn
             that are the script's; `imitation_loss` [nats], the mean over the actors' steps, if
             there were any; the learner's own, where its critic learnt.
         """
-        wanted = torch.from_numpy(self._script.act(PolicyInput.of(self._env, self._env.observe())))
+        wanted = torch.from_numpy(
+            self._script.act(PolicyInput(self._env.observe(), WorldState.of(self._env)))
+        )
         transitions, truncated = self._collector.step()
         self._memory.add(transitions.obs, wanted)
-        figures = {"agreement": float((transitions.actions.cpu() == wanted).float().mean())}
+        metrics = {"agreement": float((transitions.actions.cpu() == wanted).float().mean())}
         losses = self._imitate(share)
         if losses:
-            figures["imitation_loss"] = sum(losses) / len(losses)
+            metrics["imitation_loss"] = sum(losses) / len(losses)
         if (1.0 - share) * self._config.env_steps <= self._config.critic_env_steps:
             self._learner.actor_frozen = True
             self._learner.observe(transitions, truncated)
-            figures |= self._learner.learn() or {}
+            metrics |= self._learner.learn() or {}
             self._learner.actor_frozen = False
-        return transitions, figures
+        return transitions, metrics
 
     def _imitate(self, share: float) -> list[float]:
-        """Do the steps of the actors that are due; their losses."""
+        """Do the training steps of the actors that are due, and return their losses."""
         config = self._config
-        self._unpaid_env_steps += self._env.num_envs
-        due, self._unpaid_env_steps = divmod(self._unpaid_env_steps, config.update_every_env_steps)
+        self._pending_env_steps += self._env.num_envs
+        due, self._pending_env_steps = divmod(
+            self._pending_env_steps, config.update_every_env_steps
+        )
         rate = config.learning_rate * (1.0 - (1.0 - config.final_learning_rate_share) * share)
         return [
             self._learner.imitate(*self._memory.sample(config.batch_size), rate) for _ in range(due)
@@ -95,8 +99,8 @@ class _Memory:
         self._generator = torch.Generator().manual_seed(int(number))
 
     def add(self, obs: Tensor, actions: Tensor) -> None:
-        """Keep states (E, R, D) and what the script would do there (E, R)."""
-        rows = torch.arange(len(obs))[-self._capacity :]  # of more than it holds, the last
+        """Store states (E, R, D) and the actions that the script would take there (E, R)."""
+        rows = torch.arange(len(obs))[-self._capacity :]  # if more than fit, the last
         place = (self._seen + rows) % self._capacity
         self._obs[place] = obs.cpu()[rows]
         self._actions[place] = actions.to(torch.uint8)[rows]

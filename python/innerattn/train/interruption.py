@@ -1,4 +1,4 @@
-"""Interruptions are heard even where a library swallows them, as compiling does now and then."""
+"""Remembers interruptions, since libraries may swallow KeyboardInterrupt, as the compiler does."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from types import FrameType
 
 
 @contextmanager
-def heard_interruptions() -> Iterator[Callable[[], None]]:
+def remembered_interruptions() -> Iterator[Callable[[], None]]:
     """Remember every signal that raises KeyboardInterrupt.
 
-    Only the main thread hears signals; elsewhere, and of signals that do something else, nothing
-    is changed.
+    Signals with other handlers are not changed, nor is anything outside the main thread.
 
     Yields:
-        What raises KeyboardInterrupt if there has been such a signal, to be called now and then.
+        A function that raises KeyboardInterrupt if there has been such a signal; to be called
+        regularly.
     """
     asked = False
 

@@ -1,6 +1,6 @@
-"""The training loop: imitate if asked to, then collect, learn, log; save when the budget is spent.
+"""The training loop: imitate for a warm start; then collect, learn and log; save at the end.
 
-It knows no algorithm, only the `Learner` protocol, and does not evaluate.
+It knows the `Learner` protocol and no algorithm, and does not evaluate.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import torch
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.learn.types import Learner, Transitions
-from innerattn.measures.attention import attention_entropy
 from innerattn.records.run_folder import State
+from innerattn.train.attention_log import AttentionLog
 from innerattn.train.build import (
     build_learner,
     keep_heap_small,
@@ -28,14 +28,14 @@ from innerattn.train.checkpoint import RunFolder, refuse_existing
 from innerattn.train.collect import Collector
 from innerattn.train.compilation import compiles
 from innerattn.train.imitate import Imitation
-from innerattn.train.interruption import heard_interruptions
+from innerattn.train.interruption import remembered_interruptions
+from innerattn.train.matmul_backend import best_matmul_backend
 from innerattn.train.metrics import Interval, Metrics, MetricsFile, refuse_divergence
-from innerattn.train.products import best_products
 
 Stage = Literal["imitating", "training"]
 Step = Callable[[float], tuple[Transitions, Mapping[str, float] | None]]
-"""One control step of all worlds, given the share of the stage that is done; what was seen, and
-figures by name."""
+"""One control step of all worlds, from the share of the stage that is done to the transitions and
+metrics by name."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +43,11 @@ class Progress:
     """How far training is; reported after every control step."""
 
     env_steps: int
-    """Steps done in this stage, all worlds counted."""
+    """Steps done in this stage, summed over worlds."""
     total_env_steps: int
     """Steps to do in this stage."""
     updates: int
-    """Updates done in this stage; steps of imitation do not count."""
+    """Updates done in this stage; those of imitation do not count."""
     seconds: float
     """Time since this stage began [s]."""
     metrics: Metrics | None
@@ -81,7 +81,11 @@ def train(
     refuse_existing(path)
     keep_heap_small()
     threads = thread_count(config)
-    with torch_threads(threads), best_products() as products, heard_interruptions() as check:
+    with (
+        torch_threads(threads),
+        best_matmul_backend() as matmul_backend,
+        remembered_interruptions() as check,
+    ):
         env = BatchEnv(
             config.scenario,
             config.train.num_envs,
@@ -96,7 +100,7 @@ def train(
                 learner.compile()
             warm = config.train.warm_start != "none"
             imitation = Imitation(config, env, learner, collector) if warm else None
-            folder = RunFolder.create(path, config, threads, compiled, products)
+            folder = RunFolder.create(path, config, threads, compiled, matmul_backend)
             loop = _Loop(config, folder, learner, collector, env.robot_names, progress, check)
             loop.run(imitation)
     return path
@@ -119,7 +123,7 @@ class _Loop:
         self._folder = folder
         self._learner = learner
         self._collector = collector
-        self._robot_names = robot_names
+        self._attention = AttentionLog(robot_names, config.scenario.episode_steps)
         self._progress = progress
         self._check_interrupted = check_interrupted
         self._file = MetricsFile(folder.path / "metrics.jsonl")
@@ -128,10 +132,10 @@ class _Loop:
         self._env_steps = 0
 
     def run(self, imitation: Imitation | None) -> None:
-        """Imitate, if that is asked for, and learn to the end of the budget.
+        """Imitate, if there is a warm start, and learn to the end of the budget.
 
-        Whatever ends the run early is written down; only what a user interrupts is worth keeping
-        the weights of.
+        A run that ends early is marked as interrupted. Its weights are saved only if the user
+        interrupted it.
         """
         try:
             if imitation is not None:
@@ -155,14 +159,15 @@ class _Loop:
         every = self._config.log_every_env_steps
         while done < total:
             self._check_interrupted()
-            newest, figures = step(done / total)
+            newest, metrics = step(done / total)
             before = self._env_steps
             self._env_steps += self._config.num_envs
             done += self._config.num_envs
-            refuse_divergence({"losses": figures or {}}, self._env_steps)
-            self._interval.add_losses(figures or {})
+            refuse_divergence({"losses": metrics or {}}, self._env_steps)
+            self._interval.add_losses(metrics or {})
+            self._attention.add(newest.obs, newest.actions)
             if done >= total or before // every < self._env_steps // every:
-                self._log(newest)
+                self._log()
             if self._progress is not None:
                 self._progress(
                     Progress(
@@ -182,17 +187,12 @@ class _Loop:
         self._learner.set_progress(share)
         return transitions, self._learner.learn()
 
-    def _log(self, newest: Transitions) -> None:
-        weights = self._learner.attention(newest.obs, newest.actions)
-        entropy: dict[str, list[float]] = {}
-        if weights is not None:
-            rows = attention_entropy(weights.cpu().numpy()).tolist()
-            entropy = dict(zip(self._robot_names, rows, strict=True))
+    def _log(self) -> None:
         self._metrics = self._interval.close(
             self._env_steps,
             self._learner.updates,
             self._collector.take_tally(),
-            entropy,
+            self._attention.entropy(self._learner),
         )
         self._file.append(self._metrics)
         self._mark("running")

@@ -1,6 +1,6 @@
-"""Figures of a training run, one JSON line per logging interval; it decides nothing.
+"""Metrics of a training run, one JSON line per logging interval.
 
-`Interval` gathers what happens between two lines, `MetricsFile` writes a line.
+`Interval` collects what happens between two lines, `MetricsFile` writes a line.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ empty where the critic has no attention."""
 
 
 class MetricsFile:
-    """A file that only grows, by whole lines."""
+    """A file to which whole lines are appended."""
 
     def __init__(self, path: Path) -> None:
-        """Write to ``path`` from its end on; it is made when the first line comes."""
+        """Append to ``path``; the first line creates the file."""
         self._path = path
 
     def append(self, metrics: Metrics) -> None:
@@ -50,7 +50,7 @@ class MetricsFile:
 
 
 class Interval:
-    """What has happened since the last line of metrics."""
+    """Counts and losses since the last line of metrics."""
 
     def __init__(self) -> None:
         """Start at zero steps, now."""
@@ -66,14 +66,14 @@ class Interval:
         return time.perf_counter() - self._start
 
     def add_losses(self, losses: Mapping[str, float]) -> None:
-        """Take the losses of the updates of one control step; none where none was due."""
+        """Add the losses of one control step; none if no update was due."""
         for name, value in losses.items():
             self._losses.setdefault(name, []).append(value)
 
     def close(
         self, env_steps: int, updates: int, tally: Tally, entropy: Mapping[str, list[float]]
     ) -> dict[str, Any]:
-        """The line for this interval; the next one starts now."""
+        """Return the line of this interval, and start the next one."""
         seconds = self.seconds
         elapsed = max(seconds - self._seconds, 1e-9)
         line: dict[str, Any] = {
@@ -92,17 +92,17 @@ class Interval:
         return line
 
 
-def refuse_divergence(figures: Mapping[str, Any], env_steps: int) -> None:
-    """Stop training whose figures have left the finite numbers.
+def refuse_divergence(metrics: Mapping[str, Any], env_steps: int) -> None:
+    """Stop a training whose metrics are not finite.
 
     Args:
-        figures: numbers, lists of numbers and None, by name, nested or not.
+        metrics: numbers, lists of numbers and None, by name, nested or not.
         env_steps: when they were computed.
 
     Raises:
-        RunError: a figure is not finite; the message names it and its value.
+        RunError: a metric is not finite; the message names it and its value.
     """
-    for name, values in _flat(figures):
+    for name, values in _flat(metrics):
         bad = values[~np.isfinite(values)]
         if bad.size:
             raise RunError(
@@ -110,8 +110,8 @@ def refuse_divergence(figures: Mapping[str, Any], env_steps: int) -> None:
             )
 
 
-def _flat(figures: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, NDArray[Any]]]:
-    for name, value in figures.items():
+def _flat(metrics: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, NDArray[Any]]]:
+    for name, value in metrics.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{name}.")
         elif value is not None:

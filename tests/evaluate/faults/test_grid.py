@@ -1,7 +1,5 @@
 """The grid of faults: what is played, and what of it is kept."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -34,7 +32,7 @@ def test_rescues_by_step_are_those_of_the_record() -> None:
 
 
 def test_worlds_are_the_same_until_the_fault_begins() -> None:
-    played = play(partial(scripted_policy, "hungarian", WORLDS), SMALL)
+    played = play(scripted_policy("hungarian", WORLDS), SMALL)
     assert played.faulty.shape == (2, 2, 4, 2, 12, 20)
     middle = played.faulty[:, :, :, 1]
     # A rescue at the end of step 9 is the last that a fault from step 10 on cannot touch.
@@ -52,7 +50,7 @@ def test_drawn_actions_are_the_same_until_the_fault_begins() -> None:
     """Not what the policy did under other faults decides what it draws, so cells stay pairs."""
     near = WORLDS.replace(rescue_radius_m=0.4)  # chance alone rescues
     grid = Grid(near, ("blackout", "motor_gain"), severities=(0.5, 1.0), episodes=12, seed=5)
-    played = play(partial(scripted_policy, "random", near, 3), grid)
+    played = play(scripted_policy("random", near, 3), grid)
     assert played.clean[:, :10].sum() > 0
     middle = played.faulty[:, :, :, 1, :, :10]
     np.testing.assert_array_equal(middle, np.broadcast_to(played.clean[:, :10], middle.shape))
@@ -63,14 +61,12 @@ def test_drawn_actions_are_the_same_until_the_fault_begins() -> None:
 
 def test_no_severity_keeps_everything_and_the_worst_loses_the_only_medic() -> None:
     grid = Grid(WORLDS, FAULT_KINDS, severities=(0.0, 1.0), episodes=8, seed=1)
-    nothing = play_all([("greedy", partial(scripted_policy, "greedy", WORLDS))], grid)["greedy"]
+    nothing = play_all([("greedy", scripted_policy("greedy", WORLDS))], grid)["greedy"]
     np.testing.assert_array_equal(nothing.cells.value[:, 0], 1.0)
     assert (nothing.cells.value[:, 1] < 1.0).any()
     single = WORLDS.replace(situation="single", tasks=WORLDS.tasks[:1])
     grid = Grid(single, ("unavailable",), severities=(1.0,), episodes=20, seed=1)
-    lost = play_all([("hungarian", partial(scripted_policy, "hungarian", single))], grid)[
-        "hungarian"
-    ]
+    lost = play_all([("hungarian", scripted_policy("hungarian", single))], grid)["hungarian"]
     assert lost.cells.value[0, 0, 3].tolist() == [0.0, 0.0]  # medical_0
     assert (lost.cells.value[0, 0, 2] > 0.8).all()  # navigation_0 is not needed
     assert worst_robot(grid, lost, 0)[0] == "medical_0"
@@ -78,7 +74,7 @@ def test_no_severity_keeps_everything_and_the_worst_loses_the_only_medic() -> No
 
 
 def test_what_is_kept_is_the_ratio_since_the_onset() -> None:
-    played = play(partial(scripted_policy, "hungarian", WORLDS), SMALL)
+    played = play(scripted_policy("hungarian", WORLDS), SMALL)
     found = kept(played, SMALL)
     clean, faulty = played.clean, played.faulty
     assert found.cells.value[0, 1, 2, 0] == pytest.approx(faulty[0, 1, 2, 0].sum() / clean.sum())
@@ -96,7 +92,7 @@ def test_what_is_kept_is_the_ratio_since_the_onset() -> None:
 
 
 def test_the_document_holds_every_cell_and_is_the_same_twice() -> None:
-    policies = [(name, partial(scripted_policy, name, WORLDS)) for name in ("greedy", "oracle")]
+    policies = [(name, scripted_policy(name, WORLDS)) for name in ("greedy", "oracle")]
     calls: list[tuple[int, int]] = []
     documents = [
         robustness_document(

@@ -14,7 +14,7 @@ from innerattn.experiments.paper.fig4 import PRINTED_NATS, EntropyCourse, fig4, 
 from innerattn.experiments.run import FinishedRun
 from innerattn.report.paper.fig4 import fig4_csv, fig4_lines
 from innerattn.report.plots.entropy import draw_entropy
-from innerattn.stats.intervals import student_interval
+from innerattn.stats.student import student_interval
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,11 @@ from innerattn.experiments.paper.fig5 import (
     all_handoffs,
     evidence,
     evidence_json,
-    with_bystander,
+    with_control,
 )
 from innerattn.experiments.paper.scene import choose_scene, scene_json
 from innerattn.experiments.run import FinishedRun
-from innerattn.measures.sharing.handoff import handoffs
+from innerattn.measures.sharing.handoff import HANDOFF, handoffs, need_following_attention
 from innerattn.measures.sharing.handoff_attention import handoff_attention
 from innerattn.report.paper.fig5 import evidence_lines
 from innerattn.report.plots.aligned import draw_aligned
@@ -35,10 +35,22 @@ def found(inner: list[FinishedRun]) -> Evidence:
     return found
 
 
+def counted(measured: FinishedRun) -> list[np.void]:
+    """Handoffs at which the other food robot rescues nobody, in a plain loop."""
+    record, rows = measured.recorded, []
+    for row in all_handoffs(record):
+        low, high = max(row["start"], row["first"] - 7), min(row["second"], row["first"] + 8)
+        own = record.rescues[record.rescues["episode"] == row["episode"]]
+        other = own[(own["helper_0"] == 1 - row["robot"]) | (own["helper_1"] == 1 - row["robot"])]
+        if not any(low <= step <= high for step in other["step"]):
+            rows.append(row)
+    return rows
+
+
 def changes(measured: FinishedRun, role: str, *, bystander: bool) -> list[float]:
     """Mean weight after the first rescue minus that up to it, of each handoff."""
     weights, values = measured.recorded.steps["attention"], []
-    for row in all_handoffs(measured.recorded):
+    for row in counted(measured):
         robot = 1 - row["robot"] if bystander else row["robot"]
         own = weights[row["episode"], :, :, robot, row[role]].astype(float).mean(1)
         lowest = max(row["start"], row["first"] - 7)
@@ -59,7 +71,12 @@ def test_changes_of_robot_and_control_against_plain_loops(
             assert parts[role].change.mean == pytest.approx(np.mean(plain))
     own = np.subtract(found.robot["to_be"].change_by_run, found.control["to_be"].change_by_run)
     assert found.own_part_by_run == pytest.approx(own)
-    assert found.handoffs == tuple(len(all_handoffs(m.recorded)) for m in inner)
+    assert found.handoffs == tuple(len(counted(m)) for m in inner)
+    assert found.left_out == tuple(
+        len(all_handoffs(m.recorded)) - n for m, n in zip(inner, found.handoffs, strict=True)
+    )
+    assert min(found.handoffs) > 0
+    assert min(found.left_out) > 0
     beyond = own - np.divide(found.robot["to_be"].change_by_run, 2.0)
     assert found.own_part_beyond_half is not None
     assert found.own_part_beyond_half.mean == pytest.approx(beyond.mean())
@@ -67,12 +84,34 @@ def test_changes_of_robot_and_control_against_plain_loops(
         inner, found.p_by_run, found.control_p_by_run, strict=True
     ):
         record = measured.recorded
-        own = all_handoffs(record)
-        for p, of in ((own_p, own), (control_p, with_bystander(record, own))):
+        own = np.array(counted(measured), HANDOFF)
+        for p, of in ((own_p, own), (control_p, with_control(record, own))):
             attention = handoff_attention(record, of, 0)
             assert attention is not None
-            assert p == attention.p[0]
+            assert p == attention.p
     assert found.p_by_run != found.control_p_by_run
+
+
+def test_the_ceiling_is_one_where_the_control_rescues_nobody(
+    inner: list[FinishedRun], found: Evidence
+) -> None:
+    assert found.ceiling is not None
+    assert found.ceiling.mean == pytest.approx(1.0)
+    follows = []
+    for measured in inner:
+        record = measured.recorded
+        made = replace(record, steps={"attention": need_following_attention(record)})
+        follows.append(replace(measured, read=lambda made=made: [made]))
+    perfect = evidence(follows)
+    assert perfect is not None
+    assert perfect.own_part_by_run == pytest.approx([1.0] * 3)
+    assert perfect.control["to_be"].change_by_run == pytest.approx([0.0] * 3)
+    # With the control's own rescues the measure is not that of who hands over.
+    for measured in follows:
+        record, every = measured.recorded, all_handoffs(measured.recorded)
+        control = handoff_attention(record, with_control(record, every), 0)
+        assert control is not None
+        assert abs(control.to_be.change[0, 0]) > 0.01
 
 
 def test_a_run_without_handoffs_does_not_count(inner: list[FinishedRun]) -> None:
@@ -84,6 +123,7 @@ def test_a_run_without_handoffs_does_not_count(inner: list[FinishedRun]) -> None
     assert (found.seeds, found.runs, found.handoffs[2]) == ((0, 1, 2), 2, 0)
     assert found.own_part_by_run == (*of_two.own_part_by_run, None)
     assert found.p_by_run[2] is found.control_p_by_run[2] is None
+    assert found.ceiling == of_two.ceiling
     assert found.own_part == of_two.own_part
     (line,), (expected,) = evidence_lines([found]), evidence_lines([of_two])
     assert line.runs == expected.runs
@@ -95,7 +135,7 @@ def test_a_run_without_handoffs_does_not_count(inner: list[FinishedRun]) -> None
 def test_the_control_takes_no_part(inner: list[FinishedRun]) -> None:
     record = inner[0].recorded
     own = all_handoffs(record)
-    control = with_bystander(record, own)
+    control = with_control(record, own)
     assert set(own["robot"]) == {0, 1}
     assert (control["robot"] == 1 - own["robot"]).all()
     for name in ("episode", "before", "after", "start", "first", "second"):

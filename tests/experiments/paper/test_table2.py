@@ -18,8 +18,8 @@ from innerattn.measures.dispatch_quality import dispatch_quality
 from innerattn.measures.waiting import waiting
 from innerattn.records.parquet import read_records
 from innerattn.report.paper.table2 import markdown_table, table2_csv, table2_markdown
-from innerattn.stats.intervals import student_interval
-from innerattn.stats.text import fixed
+from innerattn.stats.student import student_interval
+from innerattn.stats.text import format_number
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +161,7 @@ def test_text_and_csv_hold_every_seed_and_real_counts(table: Table2) -> None:
             assert float(line["share_low"]) < float(line["share_low_90"])
             assert float(line["share_high_90"]) < float(line["share_high"])
             ends = (float(line[f"share_{end}_90"]) for end in ("low", "high"))
-            assert "[{}, {}]".format(*map(fixed, ends)) in text
+            assert "[{}, {}]".format(*map(format_number, ends)) in text
     for block in text.split("\n\n"):
         widths = {line.count("|") for line in block.splitlines() if line.startswith("|")}
         assert len(widths) <= 1
@@ -171,7 +171,11 @@ def test_text_and_csv_hold_every_seed_and_real_counts(table: Table2) -> None:
 
 def test_cells_of_text() -> None:
     assert markdown_table(["a"], [["|x|"]]) == "| a |\n| --- |\n| \\|x\\| |\n"
-    assert [fixed(-0.004), fixed(-0.006), fixed(0.125, 1)] == ["0.00", "-0.01", "0.1"]
+    assert [format_number(-0.004), format_number(-0.006), format_number(0.125, 1)] == [
+        "0.00",
+        "-0.01",
+        "0.1",
+    ]
 
 
 def test_runs_that_are_not_one_study_are_refused(runs: list[FinishedRun]) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from innerattn.measures.faults.retention import area, retention
-from innerattn.stats.resampling import Resampled, resampled_counts
+from innerattn.stats.bootstrap import Resampled, resampled_counts
 
 
 def test_ratios_by_hand() -> None:

@@ -227,7 +227,7 @@ def test_pooled_share_against_a_plain_loop() -> None:
 def test_pooled_share_of_many_runs_misses_as_often_as_it_says(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("innerattn.measures.sharing.evenness._RESAMPLES", 500)
+    monkeypatch.setattr("innerattn.measures.sharing.evenness.RESAMPLES", 500)
     rng, draws = np.random.default_rng(9), 300
     found = [runs_of(rng, 30, 0.5, 0.05).pooled_share for _ in range(draws)]
     missed = np.mean([x is None or not x.low <= 0.5 <= x.high for x in found])
@@ -245,7 +245,7 @@ def test_runs_that_tell_nothing() -> None:
 
 
 def test_verdict_over_runs_is_false_as_rarely_as_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("innerattn.measures.sharing.evenness._RESAMPLES", 2)
+    monkeypatch.setattr("innerattn.measures.sharing.evenness.RESAMPLES", 2)
     rng, draws = np.random.default_rng(8), 400
     found = [runs_of(rng, 4, 0.6, 0.05) for _ in range(draws)]
     assert within(np.mean([x.verdict == "even" for x in found]), 0.05, draws)

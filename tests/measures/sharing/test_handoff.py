@@ -9,7 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from innerattn.config import Robot, Scenario, Task
-from innerattn.measures.sharing.handoff import HANDOFF, handoffs
+from innerattn.evaluate.play import run_episodes
+from innerattn.measures.sharing.handoff import (
+    HANDOFF,
+    handoffs,
+    need_following_attention,
+    rescues_nobody,
+    window,
+)
+from innerattn.policies import scripted_policy
 from innerattn.records.record import Record, rescue_dtype
 
 # food_0, food_1, navigation_0, medical_0 are 0 to 3; task 0 needs food and medicine.
@@ -74,6 +82,55 @@ def test_against_a_plain_loop(rows: list[tuple[int, int, int, int]]) -> None:
                 start = first + 1
         found = handoffs(record, f"food_{robot}", "task_1", "task_2")
         assert found.tolist() == expected
+
+
+def test_windows_and_who_rescues_in_them_by_hand() -> None:
+    rows = [
+        (3, 1, 1, 1), (3, 4, 0, 0), (3, 6, 0, 1), (3, 9, 1, 0),  # food_1 in between
+        (4, 2, 0, 1), (4, 12, 0, 0), (4, 20, 1, 0), (4, 21, 0, 1),  # food_1 before and after
+    ]  # fmt: skip
+    record = record_of(rows, first_episode=3)
+    events = handoffs(record, "food_0", "task_1", "task_2")
+    low, high = window(events)
+    assert (low.tolist(), high.tolist()) == ([0, 5], [9, 20])
+    assert [part.tolist() for part in window(events, reach=2)] == [[3, 11], [6, 14]]
+    other = events.copy()
+    other["robot"] = 1
+    assert rescues_nobody(record, other).tolist() == [False, True]
+    assert rescues_nobody(record, other, reach=1).tolist() == [True, True]
+    assert rescues_nobody(record, events).tolist() == [False, False]
+    assert rescues_nobody(record, events[:0]).tolist() == []
+
+
+@pytest.mark.parametrize("situation", ["single", "double", "mixed"])
+def test_need_following_attention_against_a_plain_loop(situation: str) -> None:
+    scenario = Scenario.preset(situation)
+    policy = scripted_policy("hungarian", scenario)
+    record = run_episodes(policy, scenario, 12, 3, first_episode=4)
+    weights = need_following_attention(record)
+    assert weights.shape == (12, scenario.episode_steps, 1, 4, 4)
+    for e, t, robot in np.ndindex(12, scenario.episode_steps, 4):
+        later = [
+            row
+            for row in record.rescues
+            if row["episode"] == 4 + e
+            and row["step"] >= t
+            and robot in (row["helper_0"], row["helper_1"])
+        ]
+        expected = np.where(np.arange(4) == robot, 0.0, 1 / 3)
+        if later:
+            row = min(later, key=lambda row: row["step"])
+            partner = row["helper_1"] if row["helper_0"] == robot else row["helper_0"]
+            expected = np.eye(4)[partner]
+        np.testing.assert_allclose(weights[e, t, 0, robot], expected, rtol=1e-6)
+
+
+def test_several_partners_share_the_attention() -> None:
+    scenario = Scenario(tasks=(Task(name="deep", needs=("food", "information", "medicine")),))
+    events = np.zeros(1, rescue_dtype(scenario))
+    events["helper_0"], events["helper_1"], events["helper_2"] = 1, 2, 3
+    record = replace(record_of([], scenario=scenario), rescues=events)
+    np.testing.assert_allclose(need_following_attention(record)[0, 0, 0, 1], [0, 0, 0.5, 0.5])
 
 
 def test_the_same_partner_is_no_handoff() -> None:

@@ -7,7 +7,7 @@ from innerattn.config import Fault, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
 from innerattn.evaluate.play import run_episodes
-from innerattn.policies import PolicyInput
+from innerattn.policies import PolicyInput, WorldState
 from innerattn.policies.scripted.dispatch import (
     SCRIPTED,
     GreedyPolicy,
@@ -25,14 +25,14 @@ def view(positions: list, victims: list) -> PolicyInput:
     """One world at rest; a victim is (task, x, y), or None for an empty slot."""
     table = np.array([(v and (True, *v)) or (False, 0, 0, 0) for v in victims], VICTIM)[None]
     places = np.asarray([positions], np.float32)
-    return PolicyInput(
-        np.zeros((1, 4, 1), np.float32), places, np.zeros_like(places), table, HEALTHY
-    )
+    state = WorldState(places, np.zeros_like(places), table, HEALTHY)
+    return PolicyInput(np.zeros((1, 4, 1), np.float32), state)
 
 
 def chosen(policy: GreedyPolicy | HungarianPolicy, seen: PolicyInput) -> list[int]:
-    places = np.stack([seen.victims["x"], seen.victims["y"]], -1).astype(np.float64)
-    return policy.choose(seen, places)[0].tolist()
+    state = seen.known_state
+    places = np.stack([state.victims["x"], state.victims["y"]], -1).astype(np.float64)
+    return policy.choose(state, places)[0].tolist()
 
 
 DOUBLE = Scenario.preset("double")
@@ -64,8 +64,7 @@ def test_nobody_goes_where_nobody_is() -> None:
 
 
 def test_random_actions_are_even_and_seeded() -> None:
-    seen = view([(0, 0)] * 4, [(0, 0, 0)])
-    seen = PolicyInput(*(np.repeat(part, 5000, 0) for part in seen))
+    seen = PolicyInput(np.zeros((5000, 4, 1), np.float32))
     actions = RandomPolicy(DOUBLE, seed=1).act(seen)
     assert actions.shape == (5000, 4)
     counts = np.bincount(actions.ravel(), minlength=5)
@@ -121,11 +120,15 @@ def test_a_large_team_is_served_world_by_world() -> None:
     assert many > 2 * few
 
 
+def failing(seen: PolicyInput, faults: np.ndarray) -> PolicyInput:
+    return seen._replace(state=seen.known_state._replace(faults=faults))
+
+
 def with_fault(kind: str, value: float) -> PolicyInput:
     """The world of `NEAR_THE_FIRST` with a fault of food_1, which hungarian sends to victim 0."""
     faults = HEALTHY.copy()
     faults[kind][:, 1] = value
-    return NEAR_THE_FIRST._replace(faults=faults)
+    return failing(NEAR_THE_FIRST, faults)
 
 
 def test_the_oracle_of_a_healthy_team_is_hungarian() -> None:
@@ -148,7 +151,7 @@ def test_the_oracle_waits_where_there_is_hope() -> None:
     faults = HEALTHY.copy()
     faults["unavailable"][:, 3] = 1.0  # medical_0, for victim 0
     seen = view([(0, 0), (-0.1, 0), (0.8, 0), (0.5, 0.5)], [(0, 0.1, 0), (1, 0.9, 0)])
-    assert chosen(OraclePolicy(DOUBLE), seen._replace(faults=faults)) == [1, -1, 1, -1]
+    assert chosen(OraclePolicy(DOUBLE), failing(seen, faults)) == [1, -1, 1, -1]
 
 
 def test_the_oracle_keeps_more_than_one_that_knows_of_no_fault() -> None:

@@ -8,7 +8,7 @@ from innerattn.experiments.crossed.effects import effects
 from innerattn.experiments.crossed.outcome import Outcome
 from innerattn.report.crossed.tables import effects_table
 from innerattn.report.table import markdown
-from innerattn.stats.text import p_shown, shown
+from innerattn.stats.text import format_estimate, format_p
 
 
 def test_effects() -> None:
@@ -26,7 +26,11 @@ def test_effects() -> None:
             assert row[3:] == ["–"] * 6
             continue
         one = effect.found
-        assert row[3:6] == [shown(one.difference, 3), shown(one.hedges_g, 1), p_shown(one.p)]
+        assert row[3:6] == [
+            format_estimate(one.difference, 3),
+            format_estimate(one.hedges_g, 1),
+            format_p(one.p),
+        ]
         alike = "yes" if one.equivalent else "not shown"
-        assert row[6:] == [p_shown(effect.holm_p), f"{one.margin:g}", alike]
+        assert row[6:] == [format_p(effect.holm_p), f"{one.margin:g}", alike]
     assert sum(effect.found is None for effect in found) == 3

@@ -10,7 +10,7 @@ from innerattn.experiments.crossed.arms import arm_of
 from innerattn.experiments.crossed.outcome import outcome_of
 from innerattn.experiments.run import FinishedRun
 from innerattn.report.crossed.write import FILES, write_crossed
-from innerattn.stats.text import shown
+from innerattn.stats.text import format_estimate
 from innerattn.train.weights import digest_of
 
 Crossed = tuple[Path, list[FinishedRun]]
@@ -82,6 +82,6 @@ def test_the_long_tables_hold_every_arm_and_effect(crossed_study: Crossed) -> No
     by_arm = {row[0]: row for row in rows if len(row) == 8}
     for arm, means in situation.means.items():
         assert by_arm[str(arm)][1] == "2"
-        assert by_arm[str(arm)][5] == shown(means["score"])
+        assert by_arm[str(arm)][5] == format_estimate(means["score"])
     listed = [row for row in rows if len(row) == 9]
     assert len(listed) - 1 == len(situation.effects)

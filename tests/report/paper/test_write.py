@@ -39,7 +39,7 @@ def test_all_files_are_written_and_the_same_twice(
     title = json.loads((folder / "fig5.json").read_text())["title"]
     assert title.startswith("mixed, td-inner, seed 0")  # the first of those that are preferred
     for path in folder.glob("*.json"):
-        version = 2 if path.name == "fig5_evidence.json" else 1
+        version = 3 if path.name == "fig5_evidence.json" else 1
         assert json.loads(path.read_text())["schema_version"] == version
 
 

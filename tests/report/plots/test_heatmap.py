@@ -10,7 +10,7 @@ from innerattn.errors import RunError
 from innerattn.evaluate.faults.grid import Grid, Retention
 from innerattn.report.plots.drawing import check_format
 from innerattn.report.plots.heatmap import draw_heatmap, write_heatmap
-from innerattn.stats.resampling import Resampled
+from innerattn.stats.bootstrap import Resampled
 
 GRID = Grid(Scenario(), kinds=("motor_gain", "blackout"), severities=(0.5, 1.0))
 

@@ -135,13 +135,22 @@ def bounds_of_run(
         progress: called after each level.
 
     Raises:
-        RunError: there is no readable run at ``run``, or its team is one robot.
+        RunError: there is no readable run at ``run``, its team is one robot, or its critic is of an
+            extension.
         ConfigError: its configuration is not valid.
     """
     config, learner = load_policy(run)
     if config.scenario.num_robots < 2:
         raise RunError(f"{run}: its team is one robot; attention needs a teammate")
-    assert isinstance(learner, ActorCritic)
+    if (
+        config.network.attention not in _CHANGES
+        or not isinstance(learner, ActorCritic)
+        or not isinstance(learner.critic, Critic | JointCritic)
+    ):
+        raise RunError(
+            f"{run}: train.method = {config.train.method!r}: bounds are known only for built-in "
+            "critics with inner, uniform or no attention"
+        )
     seed = config.evaluate.seed if seed is None else seed
     with torch_threads(thread_count(config)):
         played = played_states(config, learner, states, seed)

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from innerattn.config import Scenario
 from innerattn.config.scenario import Fault
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.errors import RunError
@@ -30,7 +29,7 @@ from innerattn.measures.faults.shift import (
 )
 from innerattn.measures.faults.shift_results import FaultAttention, KindShift
 from innerattn.records.record import Record
-from innerattn.stats.resampling import resampled_counts
+from innerattn.stats.bootstrap import resampled_counts
 from innerattn.train.build import thread_count, torch_threads
 
 EPISODES = 100
@@ -70,7 +69,7 @@ def fault_attention_of_run(
         raise ValueError(f"kinds = {sorted(unknown)}: must be some of {', '.join(FAULT_KINDS)}")
     if episodes < 1:
         raise ValueError(f"episodes = {episodes}: must be at least 1")
-    config, _ = load_trained(run)
+    config, policy = load_trained(run)
     robots = config.scenario.robots
     if config.network.attention == "none":
         raise RunError(f"{run}: the critic of {config.train.method} has no attention")
@@ -86,7 +85,14 @@ def fault_attention_of_run(
 
     def play(*faults: Fault) -> Record:
         nonlocal plays
-        record = _play(run, worlds.replace(faults=faults), episodes, seed)
+        record = run_episodes(
+            policy,
+            worlds.replace(faults=faults),
+            episodes,
+            seed,
+            record=("attention",),
+            num_threads=config.train.threads,
+        )
         plays += 1
         if progress is not None:
             progress(plays, total)
@@ -125,13 +131,6 @@ def fault_attention_of_run(
         auc=areas_by_head(overall.comparison, draws),
         kinds=tuple(found),
     )
-
-
-def _play(run: str | Path, worlds: Scenario, episodes: int, seed: int) -> Record:
-    """Episodes of a run's policy; loaded anew, it draws the same actions as long as it can."""
-    config, policy = load_trained(run, worlds)
-    threads = config.train.threads
-    return run_episodes(policy, worlds, episodes, seed, record=("attention",), num_threads=threads)
 
 
 def twins_of(faulty: Record, healthy: Record, robot: int, onset: int) -> PairedRollouts:

@@ -9,7 +9,7 @@ from typing import Any
 from innerattn.evaluate.faults.grid import ONSETS, Grid, Retention
 from innerattn.evaluate.faults.severity import fault_of
 from innerattn.stats import Estimate
-from innerattn.stats.resampling import Resampled
+from innerattn.stats.bootstrap import Resampled
 
 SCHEMA_VERSION = 1
 

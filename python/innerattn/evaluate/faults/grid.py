@@ -21,7 +21,7 @@ from innerattn.evaluate.play import run_episodes
 from innerattn.measures.faults.retention import area, retention
 from innerattn.policies import Policy
 from innerattn.records.record import Record
-from innerattn.stats.resampling import Resampled, resampled_counts
+from innerattn.stats.bootstrap import Resampled, resampled_counts
 
 SEVERITIES = (0.25, 0.5, 0.75, 1.0)
 """From harmless (0, which needs no measuring) to the worst (1)."""
@@ -31,8 +31,6 @@ ONSETS = ("start", "middle")
 RESAMPLES = 2000
 """Of the bootstrap that all policies of a grid share."""
 
-MakePolicy = Callable[[], Policy]
-"""Makes a policy that has not acted yet."""
 ProgressCall = Callable[[int, int], None]
 """Called with the episodes done and the episodes to do."""
 
@@ -86,7 +84,7 @@ class Played:
 
 
 def play(
-    policy: MakePolicy,
+    policy: Policy,
     grid: Grid,
     *,
     num_threads: int | None = None,
@@ -95,14 +93,14 @@ def play(
     """Run a policy without and with every fault of the grid.
 
     Args:
-        policy: makes what drives the robots, anew for each fault.
+        policy: what drives the robots; it is reset before each fault.
         grid: the worlds and the faults.
         num_threads: threads that step the worlds; none: all cores.
         progress: called with the number of episodes each time some are done.
     """
 
     def rescues(worlds: Scenario) -> NDArray[np.int64]:
-        record = run_episodes(policy(), worlds, grid.episodes, grid.seed, num_threads=num_threads)
+        record = run_episodes(policy, worlds, grid.episodes, grid.seed, num_threads=num_threads)
         if progress is not None:
             progress(grid.episodes)
         return rescues_by_step(record)
@@ -174,7 +172,7 @@ def kept(played: Played, grid: Grid) -> Retention:
 
 
 def play_all(
-    policies: Sequence[tuple[str, MakePolicy]],
+    policies: Sequence[tuple[str, Policy]],
     grid: Grid,
     *,
     num_threads: int | None = None,
@@ -183,7 +181,7 @@ def play_all(
     """Run policies through the grid, in the same worlds.
 
     Args:
-        policies: names, and what makes each policy.
+        policies: names and policies.
         grid: the worlds and the faults.
         num_threads: threads that step the worlds; none: all cores.
         progress: called each time some episodes are done.

@@ -21,7 +21,7 @@ from innerattn.experiments.paper.claims import EVEN_ENTROPY, Holds
 from innerattn.stats import Estimate
 from innerattn.stats.comparison import Contrast, contrast
 from innerattn.stats.seeds import seed_estimate
-from innerattn.stats.text import NONE, shown
+from innerattn.stats.text import NONE, format_estimate
 
 LEAST_WITHOUT_IDLE = 10
 """So many seeds without an idle robot say that there is none; fewer say nothing."""
@@ -152,7 +152,9 @@ def _above_0(found: Contrast | None) -> tuple[str, Holds]:
     """Whether a difference is above 0."""
     if found is None:
         return NONE, "undecided"
-    measured = f"difference {shown(found.difference, 3)}, g {shown(found.hedges_g, 1)}"
+    measured = (
+        f"difference {format_estimate(found.difference, 3)}, g {format_estimate(found.hedges_g, 1)}"
+    )
     if found.difference.low > 0.0:
         return measured, "yes"
     return measured, "no" if found.difference.high < 0.0 or found.equivalent else "undecided"
@@ -164,7 +166,7 @@ def _makes_even(outcomes: Outcomes, penalties: Sequence[float]) -> tuple[str, Ho
     inner, uniform = rows[:, :-1].mean(axis=1), rows[:, -1]
     parts = (inner, uniform, inner - uniform, inner - uniform / 2.0)
     means = [seed_estimate(values.tolist()) for values in parts]
-    with_, without, difference, left = map(shown, means, (2, 2, 3, 2))
+    with_, without, difference, left = map(format_estimate, means, (2, 2, 3, 2))
     holds: Holds = "undecided"
     if _ends(means[1])[0] > LEAST_UNEVEN:
         low, high = _ends(means[3])
@@ -198,7 +200,7 @@ def _even_in_all(outcomes: Outcomes, groups: Mapping[str, Sequence[Arm]]) -> tup
     """Whether sharing is even in all groups of arms, by their names."""
     means = {name: _mean(outcomes, arms, "imbalance") for name, arms in groups.items()}
     measured = "; ".join(
-        f"{name} {shown(means[name])}, idle {idle_shown(outcomes, arms)}"
+        f"{name} {format_estimate(means[name])}, idle {idle_shown(outcomes, arms)}"
         for name, arms in groups.items()
     )
     idle = any(idle_seeds(outcomes, arms)[0] for arms in groups.values())
@@ -213,7 +215,7 @@ def _even_in_all(outcomes: Outcomes, groups: Mapping[str, Sequence[Arm]]) -> tup
 def _held_even(outcomes: Outcomes) -> tuple[str, Holds]:
     mean = _mean(outcomes, [Arm(credit, _HELD) for credit in CREDITS], "entropy_share")
     low, high = _ends(mean)
-    measured = f"share of ln(N − 1) {shown(mean, 3)}"
+    measured = f"share of ln(N − 1) {format_estimate(mean, 3)}"
     if low > EVEN_ENTROPY:
         return measured, "yes"
     return measured, "no" if high < EVEN_ENTROPY else "undecided"

@@ -16,7 +16,7 @@ from innerattn.experiments.paper.fig5 import Evidence
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION
 from innerattn.measures.sharing.evenness import MARGIN
 from innerattn.stats import Estimate
-from innerattn.stats.text import NONE, fixed, shown, signed
+from innerattn.stats.text import NONE, format_estimate, format_number, format_signed
 
 Holds = Literal["yes", "no", "undecided"]
 
@@ -68,9 +68,10 @@ RULES = f"""\
   rescue, minus that before, decides. Yes if its interval is above 0 and its mean is {LEAST_MOVE} or
   more. No if the interval is below {LEAST_MOVE}.
 - **Attention moves more than the bystander's**: that change minus the change of the bystander
-  decides, the food robot that takes no part. Yes if the interval is above 0 and the mean is at
-  least half the change. No if the interval of this difference minus half the change is below 0:
-  then the bystander shows most of the change, too. Asked only where attention moves.
+  decides, the other food robot, over handoffs during which it rescues nobody. Yes if the interval
+  is above 0 and the mean is at least half the change. No if the interval of this difference minus
+  half the change is below 0: then the bystander shows most of the change, too. Asked only where
+  attention moves.
 """
 """How `Claim.holds` is found, in Markdown."""
 
@@ -115,16 +116,16 @@ def entropy_claims(courses: Sequence[EntropyCourse]) -> list[Claim]:
                 course,
                 ENDS_BELOW,
                 (f"about {PRINTED_NATS} of {math.log(3):.2f} nats", f"{PRINTED_NATS} nats"),
-                f"{shown(end)} of {even:.2f} nats",
-                f"{fixed(end.mean)} nats",
+                f"{format_estimate(end)} of {even:.2f} nats",
+                f"{format_number(end.mean)} nats",
                 _decided(end, EVEN_ENTROPY * even),
             ),
             _claim(
                 course,
                 FALLS,
                 (f"falls to about {PRINTED_NATS} nats", "falls"),
-                f"from {begin.mean:.2f} to {end.mean:.2f} nats: {shown(change)}",
-                f"{signed(change.mean)} nats",
+                f"from {begin.mean:.2f} to {end.mean:.2f} nats: {format_estimate(change)}",
+                f"{format_signed(change.mean)} nats",
                 _falls(change, least_fall),
             ),
         ]
@@ -143,17 +144,18 @@ def handoff_claims(found: Sequence[Evidence]) -> list[Claim]:
                 part,
                 MOVES,
                 ("rises on the next partner, falls on the last", "rises"),
-                f"next partner {shown(change)}, last partner {shown(before)} "
+                f"next partner {format_estimate(change)}, last partner {format_estimate(before)} "
                 f"({sum(part.handoffs):,} handoffs)",
-                signed(change.mean) if change else NONE,
+                format_signed(change.mean) if change else NONE,
                 moves,
             ),
             _claim(
                 part,
                 MOVES_MORE,
                 ("taken for granted", NONE),
-                f"{shown(own)} more than the bystander ({shown(control)})",
-                signed(own.mean) if own else NONE,
+                f"{format_estimate(own)} more than the bystander ({format_estimate(control)}), "
+                f"of at most {format_estimate(part.ceiling)}",
+                format_signed(own.mean) if own else NONE,
                 handoff_is_own(part) if moves == "yes" else "undecided",
             ),
         ]

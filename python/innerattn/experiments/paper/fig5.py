@@ -1,24 +1,34 @@
-"""Fig. 5's evidence over many runs: what attention does around all handoffs, and a control.
+"""Fig. 5's evidence over many runs: attention around all handoffs, and a control.
 
 A handoff is one robot's rescue with one partner and its next with another; the handoffs of both
-robots that share an ability, in both orders of the tasks, are taken together. The control looks at
-the same moments at the other of these robots, which takes no part: what it shows as well follows
-from the victims that are there, not from who hands over.
+robots that share an ability, in both orders of the tasks, are taken together. The control is the
+other of these robots at the same steps. What its attention does too follows from the victims that
+are there, not from who hands over.
+
+A control that rescues somebody itself has work of its own to attend to, so that the difference of
+the two says little. Only handoffs count in whose window the control takes part in no rescue, and
+the difference is shown beside its ceiling: what it is in the same windows if every robot attends to
+the partner of its own next rescue alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.experiments.run import FinishedRun
 from innerattn.measures.cooperation import shared_abilities
-from innerattn.measures.sharing.handoff import HANDOFF, handoffs
+from innerattn.measures.sharing.handoff import (
+    HANDOFF,
+    handoffs,
+    need_following_attention,
+    rescues_nobody,
+)
 from innerattn.measures.sharing.handoff_attention import (
     Attended,
     HandoffAttention,
@@ -28,7 +38,7 @@ from innerattn.records.record import Record
 from innerattn.stats import Estimate
 from innerattn.stats.seeds import Array, SeedCurve, seed_curve, seed_estimate
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 ROLES = ("to_be", "before")
 """The partner of the second rescue, and that of the first."""
@@ -39,7 +49,7 @@ _SEED = 0  # of the permutations
 
 @dataclass(frozen=True)
 class RoleEvidence:
-    """The weight on the partner in one role, meant over heads; N runs, W offsets.
+    """The weight on the partner in one role, averaged over heads; N runs, W offsets.
 
     Attributes:
         weight: over runs, by offset (W,); each run is a mean over its own handoffs.
@@ -62,31 +72,34 @@ class RoleEvidence:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Attention around all handoffs of one situation and method.
+    """Attention around the handoffs of one situation and method.
 
     Attributes:
         situation: of the worlds.
         method: of training.
         seeds: of the N runs.
-        handoffs: (N,) how many.
-        episodes: (N,) how many episodes they come from, of those recorded step by step.
+        handoffs: (N,) how many in whose window the control rescues nobody.
+        left_out: (N,) how many in whose window the control takes part in a rescue.
+        episodes: (N,) how many episodes the handoffs come from, of those recorded step by step.
         offsets: (W,) int64 steps since the first rescue's; those above 0 are after it.
         step_s: length of a step [s].
         even: 1 / (R - 1), the weight of even attention.
         robot: by role, of the robot that hands over.
-        control: by role, of the robot that takes no part, with the same partners.
+        control: by role, of the control, with the same partners.
         own_part: over runs, the change on the partner-to-be of the robot minus the control's.
         own_part_by_run: (N,) None for a run without handoffs.
+        ceiling: over runs, ``own_part`` of attention that follows each robot's own next rescue.
         own_part_beyond_half: over runs, that part minus half the robot's change.
         p_by_run: (N,) of the permutation test, see `handoff_attention`; None for a run without
             handoffs.
-        control_p_by_run: (N,) the same of the robot that takes no part.
+        control_p_by_run: (N,) the same of the control.
     """
 
     situation: str
     method: str
     seeds: tuple[int, ...]
     handoffs: tuple[int, ...]
+    left_out: tuple[int, ...]
     episodes: tuple[int, ...]
     offsets: NDArray[np.int64]
     step_s: float
@@ -95,6 +108,7 @@ class Evidence:
     control: dict[str, RoleEvidence]
     own_part: Estimate | None
     own_part_by_run: tuple[float | None, ...]
+    ceiling: Estimate | None
     own_part_beyond_half: Estimate | None
     p_by_run: tuple[float | None, ...]
     control_p_by_run: tuple[float | None, ...]
@@ -106,14 +120,24 @@ class Evidence:
 
     def to_json(self) -> dict[str, Any]:
         """As a JSON object."""
-        names = ("situation", "method", "seeds", "handoffs", "episodes", "step_s", "even")
+        names = [
+            "situation",
+            "method",
+            "seeds",
+            "handoffs",
+            "left_out",
+            "episodes",
+            "step_s",
+            "even",
+        ]
         return {
             **{name: getattr(self, name) for name in names},
             "offsets": self.offsets.tolist(),
-            "robot": {role: found.to_json() for role, found in self.robot.items()},
-            "control": {role: found.to_json() for role, found in self.control.items()},
+            "robot": {role: part.to_json() for role, part in self.robot.items()},
+            "control": {role: part.to_json() for role, part in self.control.items()},
             "own_part": self.own_part.to_json() if self.own_part else None,
             "own_part_by_run": list(self.own_part_by_run),
+            "ceiling": self.ceiling.to_json() if self.ceiling else None,
             "own_part_beyond_half": (
                 self.own_part_beyond_half.to_json() if self.own_part_beyond_half else None
             ),
@@ -129,12 +153,12 @@ def all_handoffs(record: Record) -> NDArray[np.void]:
         (N,) `HANDOFF`, by robot, then by order of the tasks.
     """
     tasks = [task.name for task in record.scenario.tasks if len(task.needs) == 2]
-    found = [
+    rows = [
         handoffs(record, robot, first, later)
         for robot in alike_robots(record)
         for first, later in permutations(tasks, 2)
     ]
-    return np.concatenate([np.zeros(0, HANDOFF), *found])
+    return np.concatenate([np.zeros(0, HANDOFF), *rows])
 
 
 def alike_robots(record: Record) -> tuple[str, ...]:
@@ -143,17 +167,26 @@ def alike_robots(record: Record) -> tuple[str, ...]:
     return tuple(robot.name for robot in robots if shared and shared[0] in robot.abilities)
 
 
-def with_bystander(record: Record, found: NDArray[np.void]) -> NDArray[np.void]:
+def with_control(record: Record, events: NDArray[np.void]) -> NDArray[np.void]:
     """The same handoffs with ``robot`` replaced by the next of the robots alike."""
     alike = [record.robot_names.index(name) for name in alike_robots(record)]
     other = dict(zip(alike, alike[1:] + alike[:1], strict=True))
-    control = found.copy()
-    control["robot"] = [other[robot] for robot in found["robot"].tolist()]
+    control = events.copy()
+    control["robot"] = [other[robot] for robot in events["robot"].tolist()]
     return control
 
 
+class _Run(NamedTuple):
+    """Attention around one run's handoffs; None where there are none."""
+
+    robot: HandoffAttention | None
+    control: HandoffAttention | None
+    ceiling: float | None
+    left_out: int
+
+
 def evidence(group: Sequence[FinishedRun]) -> Evidence | None:
-    """What attention does around handoffs in runs of one situation and method.
+    """Attention around handoffs in runs of one situation and method.
 
     Returns:
         None where no run has handoffs and attention that chooses, rather than being even.
@@ -161,49 +194,61 @@ def evidence(group: Sequence[FinishedRun]) -> Evidence | None:
     first = group[0].recorded
     if not any(_chooses(measured.recorded) for measured in group):
         return None
-    seen: list[HandoffAttention | None] = []
-    controls: list[HandoffAttention | None] = []
-    for measured in group:
-        found = all_handoffs(measured.recorded)
-        control = with_bystander(measured.recorded, found)
-        seen.append(handoff_attention(measured.recorded, found, _SEED))
-        controls.append(handoff_attention(measured.recorded, control, _SEED))
-    known = [run for run in seen if run is not None]
+    runs = [_of_run(measured.recorded) for measured in group]
+    known = [run.robot for run in runs if run.robot is not None]
     if not known:
         return None
-    robot = {role: _role(seen, role) for role in ROLES}
-    control_ = {role: _role(controls, role) for role in ROLES}
-    changes = (robot["to_be"].change_by_run, control_["to_be"].change_by_run)
-    pairs = list(zip(*changes, strict=True))
-    own, beyond_half = (
-        tuple(
-            None if ours is None or theirs is None else part * ours - theirs
-            for ours, theirs in pairs
-        )
-        for part in (1.0, 0.5)
-    )
+    robot = {role: _role([run.robot for run in runs], role) for role in ROLES}
+    control = {role: _role([run.control for run in runs], role) for role in ROLES}
+    changes = zip(robot["to_be"].change_by_run, control["to_be"].change_by_run, strict=True)
+    pairs = [None if one is None or other is None else (one, other) for one, other in changes]
+    own = tuple(None if pair is None else pair[0] - pair[1] for pair in pairs)
+    beyond_half = tuple(None if pair is None else 0.5 * pair[0] - pair[1] for pair in pairs)
     return Evidence(
         situation=group[0].situation,
         method=group[0].method,
         seeds=tuple(measured.seed for measured in group),
-        handoffs=tuple(run.handoffs if run else 0 for run in seen),
-        episodes=tuple(run.episodes if run else 0 for run in seen),
+        handoffs=tuple(run.robot.handoffs if run.robot else 0 for run in runs),
+        left_out=tuple(run.left_out for run in runs),
+        episodes=tuple(run.robot.episodes if run.robot else 0 for run in runs),
         offsets=known[0].offsets,
         step_s=first.scenario.dt_s,
         even=1.0 / (first.scenario.num_robots - 1),
         robot=robot,
-        control=control_,
+        control=control,
         own_part=seed_estimate(own),
         own_part_by_run=own,
+        ceiling=seed_estimate([run.ceiling for run in runs]),
         own_part_beyond_half=seed_estimate(beyond_half),
-        p_by_run=tuple(float(run.p[0]) if run else None for run in seen),
-        control_p_by_run=tuple(float(run.p[0]) if run else None for run in controls),
+        p_by_run=tuple(run.robot.p if run.robot else None for run in runs),
+        control_p_by_run=tuple(run.control.p if run.control else None for run in runs),
     )
 
 
-def evidence_json(found: Sequence[Evidence]) -> dict[str, Any]:
+def _of_run(record: Record) -> _Run:
+    """The handoffs of a record in whose window the control rescues nobody."""
+    events = all_handoffs(record)
+    control = with_control(record, events)
+    idle = rescues_nobody(record, control)
+    left_out = int((~idle).sum())
+    events, control = events[idle], control[idle]
+    follows = replace(record, steps={"attention": need_following_attention(record)})
+    changes = [
+        float(around.to_be.change[0, 0])
+        for around in (handoff_attention(follows, rows, _SEED) for rows in (events, control))
+        if around is not None
+    ]
+    return _Run(
+        handoff_attention(record, events, _SEED),
+        handoff_attention(record, control, _SEED),
+        changes[0] - changes[1] if changes else None,
+        left_out,
+    )
+
+
+def evidence_json(parts: Sequence[Evidence]) -> dict[str, Any]:
     """The document of ``fig5_evidence.json``."""
-    return {"schema_version": SCHEMA_VERSION, "evidence": [part.to_json() for part in found]}
+    return {"schema_version": SCHEMA_VERSION, "evidence": [part.to_json() for part in parts]}
 
 
 def _chooses(record: Record) -> bool:

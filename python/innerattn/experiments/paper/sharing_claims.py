@@ -16,7 +16,7 @@ from innerattn.experiments.paper.printed import TEXT, PrintedRow
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import Verdict
 from innerattn.stats import Estimate
-from innerattn.stats.text import NONE, fixed, shown, signed
+from innerattn.stats.text import NONE, format_estimate, format_number, format_signed
 
 
 def sharing_claims(table: Table2) -> list[Claim]:
@@ -43,7 +43,7 @@ def sharing_claims(table: Table2) -> list[Claim]:
                 method=method,
                 printed="; ".join(filter(None, map(_printed_share, own))) or NONE,
                 printed_brief=", ".join(
-                    fixed(row.printed.row.shares[0]) for row in own if row.printed
+                    format_number(row.printed.row.shares[0]) for row in own if row.printed
                 )
                 or NONE,
                 measured="; ".join(_measured_share(row) for row in own),
@@ -73,7 +73,7 @@ def judged(row: Row) -> Verdict:
 def share_shown(sharing: Sharing) -> str:
     """The share of the first robot in all runs; without an interval where it has none."""
     whole = sharing.all
-    return shown(whole.share) if whole.share else _share(sharing)
+    return format_estimate(whole.share) if whole.share else _share(sharing)
 
 
 def verdicts_shown(sharing: Sharing) -> str:
@@ -103,8 +103,8 @@ def _share(sharing: Sharing) -> str:
     """The share of the first robot in all runs, without an interval."""
     whole, rescues = sharing.all, sum(sharing.all.rescues)
     if whole.share:
-        return fixed(whole.share.mean)
-    return fixed(whole.rescues[0] / rescues) if rescues else NONE
+        return format_number(whole.share.mean)
+    return format_number(whole.rescues[0] / rescues) if rescues else NONE
 
 
 def _contrast(pair: Pair, inner: Sequence[Row], uniform: Sequence[Row]) -> Claim:
@@ -112,8 +112,8 @@ def _contrast(pair: Pair, inner: Sequence[Row], uniform: Sequence[Row]) -> Claim
     measured, brief = f"imbalance {_mean(pair.inner)}, uniform {_mean(pair.uniform)}", NONE
     if pair.found is not None:
         difference = pair.found.difference
-        measured += f"; difference {shown(difference)}"
-        brief = signed(difference.mean)
+        measured += f"; difference {format_estimate(difference)}"
+        brief = format_signed(difference.mean)
         if difference.high < 0.0:
             holds = "yes"
         elif difference.low > 0.0 or pair.found.equivalent:
@@ -129,7 +129,7 @@ def _contrast(pair: Pair, inner: Sequence[Row], uniform: Sequence[Row]) -> Claim
         situation=pair.situation,
         method=inner[0].method,
         printed="; ".join(f"{task} {a:.2f}, uniform {b:.2f}" for task, a, b in printed) or NONE,
-        printed_brief=signed(gain) if printed else NONE,
+        printed_brief=format_signed(gain) if printed else NONE,
         measured=measured,
         brief=brief,
         runs=len(pair.seeds),

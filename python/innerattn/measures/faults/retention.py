@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.stats.resampling import Resampled
+from innerattn.stats.bootstrap import Resampled
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from innerattn.measures.faults.label_shuffle import shuffled_labels
 from innerattn.measures.faults.shift_results import CURVE_STEPS, ByHead, Shift
 from innerattn.stats import Estimate
 from innerattn.stats.auc import Comparison, areas, compare
-from innerattn.stats.resampling import percentile_interval
+from innerattn.stats.bootstrap import percentile_interval
 
 
 class PairedRollouts(NamedTuple):

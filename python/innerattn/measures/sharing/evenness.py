@@ -12,24 +12,20 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import stdtr, stdtrit
-from scipy.stats import chisquare
 
 from innerattn.measures.cooperation import shared_abilities
 from innerattn.records.record import Record
 from innerattn.stats import Estimate
+from innerattn.stats.bootstrap import RESAMPLES, percentile_interval
 from innerattn.stats.clusters import share_of
 from innerattn.stats.estimate import as_json
-from innerattn.stats.intervals import student_interval
-from innerattn.stats.resampling import percentile_interval, resampled_means
+from innerattn.stats.student import equivalence_p, student_interval
 
 MARGIN = (0.4, 0.6)
 """Shares between which sharing counts as even, 0.5 ± 0.1."""
 
 ALPHA = 0.05
 """Level of every test."""
-
-_RESAMPLES = 4000
 
 Verdict = Literal["even", "uneven", "undecided"]
 """even: the equivalence test passes, which is that the 90 % interval lies within `MARGIN`; uneven:
@@ -147,13 +143,13 @@ def evenness(counts: ArrayLike) -> Evenness:
     first, second = by_episode.sum(0).tolist()
     if share is None:
         return Evenness((0, 0), len(by_episode), None, None, None, None, "undecided")
-    inner, outer = share.interval(1.0 - 2.0 * ALPHA), share.interval(1.0 - ALPHA)
+    inner, outer = share.estimate(1.0 - 2.0 * ALPHA), share.estimate(1.0 - ALPHA)
     return Evenness(
         rescues=(first, second),
         episodes=len(by_episode),
         chi_squared=_chi_squared(first, second),
-        share=Estimate(share.value, *outer),
-        interval_90=inner,
+        share=outer,
+        interval_90=(inner.low, inner.high),
         equivalence_p=max(share.p_above(MARGIN[0]), share.p_below(MARGIN[1])),
         verdict=_verdict(inner, outer),
     )
@@ -177,17 +173,21 @@ def evenness_of_runs(runs: Sequence[ArrayLike], seed: int) -> EvennessOfRuns:
     verdicts: dict[Verdict, int] = {"even": 0, "uneven": 0, "undecided": 0}
     for run in each:
         verdicts[run.verdict] += 1
-    share, inner, p = _over_runs([run.share.mean for run in each if run.share is not None])
+    shares = [run.share.mean for run in each if run.share is not None]
+    outer = inner = p = None
+    if len(set(shares)) > 1:
+        outer, inner = student_interval(shares), student_interval(shares, 1.0 - 2.0 * ALPHA)
+        p = equivalence_p(shares, *MARGIN)
     return EvennessOfRuns(
         runs=each,
         verdicts=verdicts,
         rescues=(first, second),
         chi_squared=_chi_squared(first, second) if first + second else None,
-        share=share,
-        interval_90=inner,
+        share=outer,
+        interval_90=(inner.low, inner.high) if inner else None,
         equivalence_p=p,
         pooled_share=_pooled(counts, seed),
-        verdict=_verdict(inner, (share.low, share.high)) if share and inner else "undecided",
+        verdict=_verdict(inner, outer) if inner and outer else "undecided",
     )
 
 
@@ -203,41 +203,30 @@ def _checked(counts: ArrayLike) -> NDArray[np.int64]:
 
 
 def _chi_squared(first: int, second: int) -> ChiSquared:
-    found = chisquare([first, second])
-    return ChiSquared(float(found.statistic), float(found.pvalue), bool(found.pvalue < ALPHA))
+    from scipy.stats import chisquare
+
+    test = chisquare([first, second])
+    return ChiSquared(float(test.statistic), float(test.pvalue), bool(test.pvalue < ALPHA))
 
 
-def _verdict(inner: tuple[float, float], outer: tuple[float, float]) -> Verdict:
-    if MARGIN[0] < inner[0] and inner[1] < MARGIN[1]:
+def _verdict(inner: Estimate, outer: Estimate) -> Verdict:
+    if MARGIN[0] < inner.low and inner.high < MARGIN[1]:
         return "even"
-    return "uneven" if outer[1] < MARGIN[0] or outer[0] > MARGIN[1] else "undecided"
-
-
-def _over_runs(
-    shares: list[float],
-) -> tuple[Estimate | None, tuple[float, float] | None, float | None]:
-    """Student's 95 % and 90 % intervals and the equivalence test of the runs' shares."""
-    if len(set(shares)) < 2:
-        return None, None, None
-    outer = student_interval(shares)
-    mean, dof = outer.mean, len(shares) - 1
-    error = float(np.std(shares, ddof=1) / np.sqrt(len(shares)))
-    half = float(stdtrit(dof, 1.0 - ALPHA)) * error
-    nearer = min(mean - MARGIN[0], MARGIN[1] - mean)  # the larger p is that of the nearer end
-    return outer, (mean - half, mean + half), float(stdtr(dof, -nearer / error))
+    return "uneven" if outer.high < MARGIN[0] or outer.low > MARGIN[1] else "undecided"
 
 
 def _pooled(runs: list[NDArray[np.int64]], seed: int) -> Estimate | None:
-    """The share in all rescues, by a bootstrap of runs and of the episodes of each drawn."""
+    """The share in all rescues, by a nested bootstrap of runs and of their episodes."""
     total = np.sum([run.sum(0) for run in runs], 0)
     if not total.sum():
         return None
     rng = np.random.default_rng(seed)
-    drawn = rng.integers(0, len(runs), (_RESAMPLES, len(runs)))
+    drawn = rng.integers(0, len(runs), (RESAMPLES, len(runs)))
     sums = np.empty((*drawn.shape, 2))
     for index, run in enumerate(runs):
         times = drawn == index
-        means = resampled_means(run.astype(np.float64), int(rng.integers(2**32)), int(times.sum()))
-        sums[times] = means * len(run)
+        episodes = np.random.default_rng(int(rng.integers(2**32)))
+        rows = episodes.integers(0, len(run), (int(times.sum()), len(run)))
+        sums[times] = np.stack([column[rows].sum(1) for column in run.T], 1)
     first, all_ = sums[..., 0].sum(1), sums.sum((1, 2))
     return percentile_interval(total[0] / total.sum(), first[all_ > 0] / all_[all_ > 0])

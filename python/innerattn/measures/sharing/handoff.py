@@ -1,6 +1,6 @@
 """Handoffs (Fig. 5): a robot completes one task with one partner, the next with another.
 
-They are found in rescue events; `handoff_attention` measures what attention does around them.
+They are found in rescue events; `handoff_attention` measures attention around them.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.records.record import Record
+
+Steps = NDArray[np.int64]
 
 HANDOFF = np.dtype(
     [
@@ -19,6 +21,9 @@ HANDOFF = np.dtype(
 """A handoff. episode: its number; robot: who hands over; before, after: its partners in the first
 and the second rescue; start: step after its last rescue before these, or 0; first, second: steps of
 the two rescues. Fig. 5's pre-stage is start to first, its later stages first + 1 to second."""
+
+REACH = 8
+"""Steps on either side of the first rescue that the window of a handoff has at most."""
 
 
 def handoffs(record: Record, robot: str, first_task: str, later_task: str) -> NDArray[np.void]:
@@ -55,14 +60,82 @@ def handoffs(record: Record, robot: str, first_task: str, later_task: str) -> ND
     wanted = (events["task"][:-1] == tasks[0]) & (events["task"][1:] == tasks[1])
     partner = np.where(helpers[:, 0] == index, helpers[:, 1], helpers[:, 0])
     chosen = np.flatnonzero(same & wanted & (partner[1:] != partner[:-1]))
-    found = np.zeros(len(chosen), HANDOFF)
+    rows = np.zeros(len(chosen), HANDOFF)
     earlier = np.maximum(chosen - 1, 0)
     again = (chosen > 0) & (events["episode"][earlier] == events["episode"][chosen])
-    found["episode"], found["robot"] = events["episode"][chosen], index
-    found["before"], found["after"] = partner[chosen], partner[chosen + 1]
-    found["start"] = np.where(again, events["step"][earlier] + 1, 0)
-    found["first"], found["second"] = events["step"][chosen], events["step"][chosen + 1]
-    return found
+    rows["episode"], rows["robot"] = events["episode"][chosen], index
+    rows["before"], rows["after"] = partner[chosen], partner[chosen + 1]
+    rows["start"] = np.where(again, events["step"][earlier] + 1, 0)
+    rows["first"], rows["second"] = events["step"][chosen], events["step"][chosen + 1]
+    return rows
+
+
+def window(handoffs: NDArray[np.void], reach: int = REACH) -> tuple[Steps, Steps]:
+    """First and last step, (N,) each, of the handoffs' own stages within reach of the first rescue.
+
+    Args:
+        handoffs: (N,) `HANDOFF`.
+        reach: steps up to the first rescue's, and steps after it.
+    """
+    return (
+        np.maximum(handoffs["start"], handoffs["first"] + 1 - reach),
+        np.minimum(handoffs["second"], handoffs["first"] + reach),
+    )
+
+
+def rescues_nobody(
+    record: Record, handoffs: NDArray[np.void], reach: int = REACH
+) -> NDArray[np.bool_]:
+    """Whether the robot in ``robot`` takes part in no rescue within the window, (N,) bool.
+
+    With ``robot`` replaced by another one, these are the handoffs at which the other does nothing.
+
+    Args:
+        record: the one that the handoffs were found in.
+        handoffs: (N,) `HANDOFF`.
+        reach: see `window`.
+    """
+    low, high = window(handoffs, reach)
+    idle = np.ones(len(handoffs), np.bool_)
+    for robot in np.unique(handoffs["robot"]):
+        events = record.rescues[_own_rescues(record.rescues, int(robot))]
+        own = handoffs["robot"] == robot
+        same = handoffs["episode"][own, None] == events["episode"]
+        within = (low[own, None] <= events["step"]) & (events["step"] <= high[own, None])
+        idle[own] = ~(same & within).any(1)
+    return idle
+
+
+def need_following_attention(record: Record) -> NDArray[np.float32]:
+    """The attention of robots that each attend to the partners of their own next rescue alone.
+
+    It is the reference that recorded attention is compared with: no attention that follows the
+    work of a robot changes more at a handoff.
+
+    Returns:
+        (E, T, 1, R, R) weights; even where a robot takes part in no later rescue of the episode.
+    """
+    robots = record.scenario.num_robots
+    even = (1.0 - np.eye(robots)) / max(robots - 1, 1)
+    shape = (record.num_episodes, record.scenario.episode_steps, 1, robots, robots)
+    weights = np.broadcast_to(even, shape).astype(np.float32)
+    helpers = np.zeros((len(record.rescues), robots), np.bool_)
+    for name in record.rescues.dtype.names or ():
+        if name.startswith("helper_"):
+            someone = record.rescues[name] >= 0
+            helpers[someone, record.rescues[name][someone]] = True
+    for robot in range(robots):
+        begin = np.zeros(record.num_episodes, np.int64)
+        for event in _own_rescues(record.rescues, robot):
+            episode = record.rescues["episode"][event] - record.first_episode
+            step = record.rescues["step"][event] + 1
+            partners = helpers[event].copy()
+            partners[robot] = False
+            if partners.any():
+                share = partners / partners.sum()
+                weights[episode, begin[episode] : step, 0, robot] = share
+            begin[episode] = step
+    return weights
 
 
 def _own_rescues(events: NDArray[np.void], robot: int) -> NDArray[np.int64]:

@@ -1,6 +1,6 @@
-"""Does attention pass on with the work? A robot's weights on two partners around handoffs.
+"""A robot's attention to its two partners around handoffs, over many handoffs together.
 
-It looks at all handoffs together; one chosen episode, as in Fig. 5, is an illustration.
+A single chosen episode, as in Fig. 5, is an illustration; this is the evidence.
 """
 
 from __future__ import annotations
@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from innerattn.measures.sharing.handoff import REACH
 from innerattn.records.record import Record
 from innerattn.stats.clusters import ratio_intervals
+from innerattn.stats.permutation import permutation_test
 
 Array = NDArray[np.float64]
 
-_SHUFFLES = 9_999
-_CHUNK = 2**21  # numbers gathered at once, 16 MB
+_PERMUTATIONS = 9_999
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ class HandoffAttention:
         counts: (W,) int64 handoffs with such a step.
         to_be: the partner of the second rescue.
         before: the partner of the first.
-        p: (K,) float64 two-sided, of the change on the partner to be minus that on the one before.
+        p: two-sided, of the change on the partner to be minus that on the one before; of weights
+            averaged over heads.
     """
 
     handoffs: int
@@ -58,30 +60,29 @@ class HandoffAttention:
     counts: NDArray[np.int64]
     to_be: Attended
     before: Attended
-    p: Array
+    p: float
 
 
 def handoff_attention(
-    record: Record, handoffs: NDArray[np.void], seed: int, reach: int = 8
+    record: Record, handoffs: NDArray[np.void], seed: int, reach: int = REACH
 ) -> HandoffAttention | None:
     """How attention moves from one partner to the next.
 
-    The p-values are of a permutation test: if attention does not know which of its two partners is
-    next, their names can be exchanged. They are or are not in each episode, for all its handoffs,
-    which are not independent; p is the share of 9,999 draws, and of what is seen, in which the
-    change on the partner to be minus that on the one before is at least as large either way.
-    Teammates that are no partners are left out, since attention that passes from them to both
-    partners alike does not move from one to the other. A change that always goes with one
-    partner, whatever the work, is not told apart unless handoffs in both orders are given.
+    The p-value is of a permutation test: if attention does not depend on which of its two partners
+    is next, they can be exchanged. Handoffs of one episode are not independent, so they are
+    exchanged together. Teammates that are no partners are left out, since attention that passes
+    from them to both partners alike does not move from one to the other. A change towards one
+    partner whatever the work cancels only if handoffs in both orders are given.
 
-    Attention may pass on because other victims need other robots, whoever goes. As a control give
-    the same handoffs with ``robot`` replaced by one that takes no part in them.
+    Attention may also pass on because other victims need other robots, whoever goes. As a control
+    give the same handoffs with ``robot`` replaced by one that does nothing in their windows, see
+    `handoff.rescues_nobody`.
 
     Args:
         record: with attention.
         handoffs: (N,) `handoff.HANDOFF` of this record, of any robots.
         seed: seed of the permutations.
-        reach: steps looked at on either side, W / 2.
+        reach: steps on either side of the first rescue, W / 2.
 
     Returns:
         None where there is no handoff or the record has no attention.
@@ -114,7 +115,7 @@ def handoff_attention(
         counts=counted.sum(0),
         to_be=to_be,
         before=before,
-        p=_exchange_p(on_next - on_last, episode, seed),
+        p=_exchange_p((on_next - on_last)[:, 0], episode, seed),
     )
 
 
@@ -140,8 +141,8 @@ def aligned_weights(
     teammates = np.stack([np.delete(robots, robot) for robot in robots])
     robot = handoffs["robot"]
     episode = handoffs["episode"] - record.first_episode
-    shown = np.where(inside, step, 0)
-    heads = attention[episode[:, None], shown, :, robot[:, None]].astype(np.float64)
+    existing = np.where(inside, step, 0)
+    heads = attention[episode[:, None], existing, :, robot[:, None]].astype(np.float64)
     heads = np.take_along_axis(heads, teammates[robot][:, None, None], -1)
     weights = np.concatenate([heads.mean(2, keepdims=True), heads], 2)
     return np.where(inside[..., None, None], weights, np.nan), inside
@@ -179,21 +180,19 @@ def _by_episode(values: NDArray[np.generic], episode: NDArray[np.int64]) -> Arra
     return sums
 
 
-def _exchange_p(differences: Array, episode: NDArray[np.int64], seed: int) -> NDArray[np.float64]:
-    """p-values (K,) of the sums of differences that an exchange of the partners turns round.
+def _exchange_p(differences: Array, episode: NDArray[np.int64], seed: int) -> float:
+    """The p-value of the sum of differences (N,), whose signs an exchange of partners turns round.
 
     Args:
-        differences: (N, K) what one partner has more than the other.
-        episode: (N,) from 0; all of an episode are turned round together.
+        differences: (N,) change on one partner minus that on the other.
+        episode: (N,) from 0; the differences of an episode are turned round together.
         seed: seed of the exchanges.
     """
+
+    def total(*samples: Array, axis: int) -> Array:
+        return np.asarray(samples[0].sum(axis))
+
     sums = _by_episode(differences, episode)
-    seen = np.abs(sums.sum(0))
-    rng = np.random.default_rng(seed)
-    larger = np.ones(len(seen))
-    step = max(1, _CHUNK // len(sums))
-    for start in range(0, _SHUFFLES, step):
-        count = min(step, _SHUFFLES - start)
-        signs = 2.0 * rng.integers(0, 2, (count, len(sums))) - 1.0
-        larger += (np.abs(signs @ sums) >= seen - 1e-12).sum(0)
-    return larger / (_SHUFFLES + 1)
+    if len(sums) < 2:
+        return 1.0  # with one sign there is nothing to compare with
+    return permutation_test([sums], total, "samples", seed, _PERMUTATIONS).p

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from innerattn.config import Scenario
 from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
 from innerattn.errors import ConfigError
-from innerattn.policies.policy import Policy, PolicyInput
+from innerattn.policies.policy import Policy, PolicyInput, WorldState
 from innerattn.policies.scripted.assignment import Needs, assign, can_be_rescued, pair_costs
 from innerattn.policies.scripted.steering import Steering
 
@@ -24,6 +24,7 @@ class RandomPolicy:
     """Every robot draws every action at random, all with the same chance."""
 
     name = "random"
+    needs_true_state = False
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
         """Take the kind of actions from ``scenario``; ``seed`` fixes the draws.
@@ -31,19 +32,24 @@ class RandomPolicy:
         They follow each other: how many worlds are stepped at once decides who gets which.
         """
         self._continuous = scenario.actions == "continuous"
-        self._rng = np.random.default_rng(seed)
+        self.reset(seed)
 
     def act(self, view: PolicyInput) -> NDArray[Any]:
         """See `Policy.act`."""
-        shape = view.positions.shape
+        envs, robots, _ = view.obs.shape
         if self._continuous:
-            return self._rng.uniform(-1.0, 1.0, shape).astype(np.float32)
-        return self._rng.integers(0, NUM_DISCRETE_ACTIONS, shape[:2])
+            return self._rng.uniform(-1.0, 1.0, (envs, robots, 2)).astype(np.float32)
+        return self._rng.integers(0, NUM_DISCRETE_ACTIONS, (envs, robots))
+
+    def reset(self, seed: int) -> None:
+        """See `Policy.reset`."""
+        self._rng = np.random.default_rng(seed)
 
 
 class _Dispatcher(ABC):
     """What all dispatching policies share: every step, targets first and then actions."""
 
+    needs_true_state = True
     knows_faults = False
     """Whether the robots reckon with faults, or take all to be healthy."""
 
@@ -54,17 +60,23 @@ class _Dispatcher(ABC):
 
     def act(self, view: PolicyInput) -> NDArray[Any]:
         """See `Policy.act`; robots without a victim are drawn to the centre."""
-        places = np.stack([view.victims["x"], view.victims["y"]], -1).astype(np.float64)
-        chosen = self.choose(view, places)
+        state = view.known_state
+        places = np.stack([state.victims["x"], state.victims["y"]], -1).astype(np.float64)
+        chosen = self.choose(state, places)
         targets = np.take_along_axis(places, np.maximum(chosen, 0)[..., None], 1)
         targets = np.where(chosen[..., None] >= 0, targets, 0.0)
-        return self.steering.actions(view.positions, view.velocities, targets, self._faults(view))
+        faults = self._faults(state)
+        return self.steering.actions(state.positions, state.velocities, targets, faults)
 
-    def _faults(self, view: PolicyInput) -> NDArray[np.void] | None:
-        return view.faults if self.knows_faults else None
+    def reset(self, seed: int) -> None:
+        """See `Policy.reset`; there is nothing to forget and nothing is drawn."""
+        del seed
+
+    def _faults(self, state: WorldState) -> NDArray[np.void] | None:
+        return state.faults if self.knows_faults else None
 
     @abstractmethod
-    def choose(self, view: PolicyInput, places: NDArray[np.float64]) -> NDArray[np.int64]:
+    def choose(self, state: WorldState, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """The victim slot that each robot goes to (E, R), -1 for none; ``places`` are (E, V, 2)."""
 
 
@@ -73,10 +85,10 @@ class GreedyPolicy(_Dispatcher):
 
     name = "greedy"
 
-    def choose(self, view: PolicyInput, places: NDArray[np.float64]) -> NDArray[np.int64]:
+    def choose(self, state: WorldState, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """See `_Dispatcher.choose`."""
-        helpful = self.needs.permitted(view.victims["present"], view.victims["task"]).any(-1)
-        way = places[:, None] - view.positions[:, :, None]
+        helpful = self.needs.permitted(state.victims["present"], state.victims["task"]).any(-1)
+        way = places[:, None] - state.positions[:, :, None]
         distance = np.where(helpful, (way * way).sum(-1), np.inf)
         return np.where(helpful.any(-1), distance.argmin(-1), -1)
 
@@ -86,15 +98,15 @@ class HungarianPolicy(_Dispatcher):
 
     name = "hungarian"
 
-    def choose(self, view: PolicyInput, places: NDArray[np.float64]) -> NDArray[np.int64]:
+    def choose(self, state: WorldState, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """See `_Dispatcher.choose`."""
-        permitted = self.needs.permitted(view.victims["present"], view.victims["task"])
-        faults = self._faults(view)
+        permitted = self.needs.permitted(state.victims["present"], state.victims["task"])
+        faults = self._faults(state)
         if faults is not None:
             needed = np.asarray(permitted.any(1))
             permitted &= (faults["unavailable"] < 1.0)[:, :, None, None]
             permitted &= can_be_rescued(permitted, needed)[:, None, :, None]
-        times = self.steering.arrival_times(view.positions, view.velocities, places, faults)
+        times = self.steering.arrival_times(state.positions, state.velocities, places, faults)
         need = assign(pair_costs(times, permitted))
         return np.where(need >= 0, need // permitted.shape[-1], -1)
 

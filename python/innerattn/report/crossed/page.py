@@ -15,7 +15,7 @@ from innerattn.report.crossed.tables import (
     seeds_table,
 )
 from innerattn.report.table import markdown
-from innerattn.stats.text import seeds_shown, shown
+from innerattn.stats.text import format_estimate, format_seeds
 
 TITLE = "# What makes the food robots share evenly?\n"
 
@@ -30,7 +30,7 @@ def crossed_page(situations: Sequence[Situation], budget: str, left_out: Sequenc
         *(missing if left_out else []),
         "![Share of the first food robot, by seed](crossed_seeds.png)\n",
         f"Each dot is one of the runs with parameters of their own: {count} runs in all, budget "
-        f"`{budget}`, seeds {seeds_shown(seeds)}. {_correlations(situations)} {LAMBDA}\n",
+        f"`{budget}`, seeds {format_seeds(seeds)}. {_correlations(situations)} {LAMBDA}\n",
         "## Claims\n",
         markdown(claims_table(situations)),
         "Intervals are 95 % over seeds. *Idle* counts seeds in which a food robot takes part in "
@@ -73,7 +73,7 @@ def crossed_tables(situations: Sequence[Situation]) -> str:
 def _correlations(situations: Sequence[Situation]) -> str:
     """What the seed says about who does more under team credit."""
     found = [
-        f"{shown(one.correlation)} in {situation.name}"
+        f"{format_estimate(one.correlation)} in {situation.name}"
         for situation in situations
         for one in situation.seeds
         if one.credit == "team" and one.correlation is not None

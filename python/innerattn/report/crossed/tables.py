@@ -9,7 +9,7 @@ from innerattn.experiments.crossed.effects import Effect
 from innerattn.experiments.crossed.outcome import Outcome
 from innerattn.experiments.crossed.study import Situation
 from innerattn.report.table import Column, Row, Table, columns, csv_text, plain_table
-from innerattn.stats.text import NONE, fixed, p_shown, shown
+from innerattn.stats.text import NONE, format_estimate, format_number, format_p
 
 LAMBDA = (
     "λ is the weight of the attention-logit regularisation (`td.attention_logit_penalty`). "
@@ -47,7 +47,7 @@ def seeds_table(situations: Sequence[Situation]) -> Table:
         for one in situation.seeds:
             ends = (one.least, one.most)
             reach = NONE if None in ends else " to ".join(map(_fixed, ends))
-            counts = [str(one.seeds), str(one.arms), shown(one.correlation)]
+            counts = [str(one.seeds), str(one.arms), format_estimate(one.correlation)]
             rows.append([situation.name, one.credit, *counts, reach])
     return plain_table([*heads, Column("shares of single runs")], rows)
 
@@ -60,7 +60,9 @@ def arms_table(situation: Situation) -> Table:
     outcomes = situation.outcomes()
     rows = []
     for arm, means in situation.means.items():
-        cells = [shown(means[name], 3 if name == "entropy_share" else 2) for name in figures]
+        cells = [
+            format_estimate(means[name], 3 if name == "entropy_share" else 2) for name in figures
+        ]
         rows.append([str(arm), str(len(outcomes[arm])), *cells, idle_shown(outcomes, [arm])])
     return plain_table(heads, rows)
 
@@ -80,9 +82,13 @@ def _effect_row(effect: Effect) -> Row:
     cells = [effect.name, _LABELS[effect.figure], str(effect.seeds)]
     if found is None or effect.holm_p is None:
         return Row((*cells, *[NONE] * 6), effect.main)
-    cells += [shown(found.difference, 3), shown(found.hedges_g, 1), p_shown(found.p)]
     cells += [
-        p_shown(effect.holm_p),
+        format_estimate(found.difference, 3),
+        format_estimate(found.hedges_g, 1),
+        format_p(found.p),
+    ]
+    cells += [
+        format_p(effect.holm_p),
         f"{found.margin:g}",
         "yes" if found.equivalent else "not shown",
     ]
@@ -110,4 +116,4 @@ def runs_csv(situations: Sequence[Situation], named: dict[str, str]) -> str:
 
 
 def _fixed(value: float | None) -> str:
-    return NONE if value is None else fixed(value)
+    return NONE if value is None else format_number(value)

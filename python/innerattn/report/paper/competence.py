@@ -10,7 +10,7 @@ from innerattn.experiments.paper.pairs import Pair, Together
 from innerattn.measures.registry import MEASURES
 from innerattn.policies import SCRIPTED
 from innerattn.report.table import Column, Row, Table, columns, plain_table
-from innerattn.stats.text import NONE, fixed, p_shown, shown, signed
+from innerattn.stats.text import NONE, format_estimate, format_number, format_p, format_signed
 
 
 def competence_terms() -> str:
@@ -39,7 +39,7 @@ def competence_table(parts: Sequence[Competence]) -> Table:
                 for seed, values in zip(part.seeds, part.each, strict=True)
             ]
         if several:
-            means = (shown(part.mean[name]) for name in COMPETENCE)
+            means = (format_estimate(part.mean[name]) for name in COMPETENCE)
             rows.append(Row((part.method, "mean [95 %]", *means), strong=True))
     return plain_table(heads, rows)
 
@@ -54,13 +54,18 @@ def pairs_table(pairs: Sequence[Pair]) -> Table:
     rows = []
     for pair in pairs:
         cells = [pair.situation, pair.algorithm.upper(), _words(pair.figure), str(len(pair.seeds))]
-        cells += [shown(pair.inner), shown(pair.uniform)]
+        cells += [format_estimate(pair.inner), format_estimate(pair.uniform)]
         found = pair.found
         if found is None:
             rows.append([*cells, *[NONE] * 4])
             continue
         alike = "yes" if found.equivalent else "not shown"
-        cells += [shown(found.difference, 3), p_shown(found.p), f"{found.margin:g}", alike]
+        cells += [
+            format_estimate(found.difference, 3),
+            format_p(found.p),
+            f"{found.margin:g}",
+            alike,
+        ]
         rows.append(cells)
     return plain_table(heads, rows)
 
@@ -73,7 +78,11 @@ def together_table(found: Sequence[Together]) -> Table:
         [
             [
                 *(one.algorithm.upper(), ", ".join(one.situations)),
-                *(shown(one.inner), shown(one.uniform), shown(one.better)),
+                *(
+                    format_estimate(one.inner),
+                    format_estimate(one.uniform),
+                    format_estimate(one.better),
+                ),
             ]
             for one in found
         ],
@@ -85,15 +94,15 @@ def merit_table(found: Sequence[ImbalanceScoreCorrelation]) -> Table:
     heads = columns(["situation"], ["runs", "correlation", "p", "imbalance of hungarian"])
     rows = []
     for one in found:
-        correlation = NONE if one.correlation is None else signed(one.correlation)
+        correlation = NONE if one.correlation is None else format_signed(one.correlation)
         rows.append(
-            [one.situation, str(one.runs), correlation, p_shown(one.p), _value(one.script[0])]
+            [one.situation, str(one.runs), correlation, format_p(one.p), _value(one.script[0])]
         )
     return plain_table(heads, rows)
 
 
 def _value(value: float | None) -> str:
-    return NONE if value is None else fixed(value)
+    return NONE if value is None else format_number(value)
 
 
 def _words(name: str) -> str:

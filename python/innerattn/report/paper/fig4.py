@@ -11,7 +11,7 @@ from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.report.plots.entropy import EntropyLines
 from innerattn.report.table import Table, columns, csv_text, plain_table
 from innerattn.stats.seeds import BAND_NAMES, SeedCurve
-from innerattn.stats.text import NONE, shown
+from innerattn.stats.text import NONE, format_estimate
 
 
 def entropy_table(courses: Sequence[EntropyCourse]) -> Table:
@@ -27,7 +27,11 @@ def entropy_table(courses: Sequence[EntropyCourse]) -> Table:
     for course in courses:
         if course.chooses:
             end, even = course.end.mean, course.even_nats
-            cells = [shown(course.begin), shown(course.end), shown(course.change)]
+            cells = [
+                format_estimate(course.begin),
+                format_estimate(course.end),
+                format_estimate(course.change),
+            ]
             cells += [f"{end / even:.2f}" if even else NONE, f"{np.exp(end):.2f}"]
             rows.append([course.situation, course.method, *cells])
     return plain_table(heads, rows)

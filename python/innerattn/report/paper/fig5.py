@@ -10,12 +10,13 @@ from innerattn.experiments.paper.fig5 import ROLES, Evidence
 from innerattn.report.plots.aligned import AlignedLines
 from innerattn.report.table import Row, Table, columns, plain_table
 from innerattn.stats.seeds import BAND_NAMES
-from innerattn.stats.text import NONE, p_shown, shown, signed
+from innerattn.stats.text import NONE, format_estimate, format_p, format_signed
 
 _CHANGES = (
     "change on the next partner",
     "bystander's",
     "difference",
+    "ceiling",
     "difference − half the change",
     "change on the last partner",
     "bystander's",
@@ -24,7 +25,7 @@ _CHANGES = (
 
 def evidence_summary(found: Sequence[Evidence]) -> Table:
     """Means over the runs of each situation and method."""
-    heads = columns(["situation", "method"], ["handoffs", *_CHANGES])
+    heads = columns(["situation", "method"], ["handoffs of all", *_CHANGES])
     return plain_table(heads, [_means(part) for part in found])
 
 
@@ -32,7 +33,7 @@ def evidence_table(found: Sequence[Evidence]) -> Table:
     """Every run, and the means."""
     heads = columns(
         ["situation", "method"],
-        ["seed", "handoffs", "episodes", *_CHANGES, "p", "bystander's p"],
+        ["seed", "handoffs of all", "episodes", *_CHANGES, "p", "bystander's p"],
     )
     rows: list[Row] = []
     for part in found:
@@ -47,10 +48,11 @@ def evidence_table(found: Sequence[Evidence]) -> Table:
 def _means(part: Evidence) -> list[str]:
     to_be, control = part.robot["to_be"], part.control["to_be"]
     before, before_control = part.robot["before"], part.control["before"]
-    changes = (to_be.change, control.change, part.own_part, part.own_part_beyond_half)
+    used = sum(part.handoffs)
     return [
-        *(part.situation, part.method, f"{sum(part.handoffs):,}"),
-        *map(shown, (*changes, before.change, before_control.change)),
+        *(part.situation, part.method, f"{used:,} of {used + sum(part.left_out):,}"),
+        *map(format_estimate, (to_be.change, control.change, part.own_part, part.ceiling)),
+        *map(format_estimate, (part.own_part_beyond_half, before.change, before_control.change)),
     ]
 
 
@@ -58,15 +60,16 @@ def _run(part: Evidence, index: int) -> Row:
     to_be, control = part.robot["to_be"], part.control["to_be"]
     before, before_control = part.robot["before"], part.control["before"]
     changes = [to_be.change_by_run, control.change_by_run, part.own_part_by_run]
+    used = part.handoffs[index]
     last = [before.change_by_run, before_control.change_by_run]
     return Row(
         (
             *(part.situation, part.method, str(part.seeds[index])),
-            *(str(part.handoffs[index]), str(part.episodes[index])),
+            *(f"{used} of {used + part.left_out[index]}", str(part.episodes[index])),
             *(_signed(values[index]) for values in changes),
-            NONE,
+            *(NONE, NONE),
             *(_signed(values[index]) for values in last),
-            *(p_shown(part.p_by_run[index]), p_shown(part.control_p_by_run[index])),
+            *(format_p(part.p_by_run[index]), format_p(part.control_p_by_run[index])),
         )
     )
 
@@ -97,4 +100,4 @@ def evidence_lines(found: Sequence[Evidence]) -> list[AlignedLines]:
 
 
 def _signed(value: float | None) -> str:
-    return NONE if value is None else signed(value)
+    return NONE if value is None else format_signed(value)

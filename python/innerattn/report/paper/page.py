@@ -14,7 +14,7 @@ from innerattn.report.paper.fig4 import entropy_table, logged
 from innerattn.report.paper.fig5 import evidence_summary
 from innerattn.report.paper.table2 import sharing_summary
 from innerattn.report.table import markdown
-from innerattn.stats.text import seeds_shown
+from innerattn.stats.text import format_seeds
 
 _FILES = {
     "table2": "[table2.md](table2.md) has sharing, every run and competence in all situations, "
@@ -63,8 +63,8 @@ def _opening(findings: Findings, budget: str) -> str:
     if findings.claims:
         table = markdown(claims_summary(findings.claims))
     text = (
-        f"{table}\n{len(findings.runs)} runs, budget `{budget}`, seeds {seeds_shown(seeds)}. Cells "
-        "without TD or PPO are about both. Shares are those of the first food robot, by task; "
+        f"{table}\n{len(findings.runs)} runs, budget `{budget}`, seeds {format_seeds(seeds)}. "
+        "Cells without TD or PPO are about both. Shares are those of the first food robot, by task; "
         "changes are means over runs. The paper does not say which situation it shows; we assume "
         f"{PRINTED_SITUATION}, since its text speaks of a variety of tasks. "
         "[claims.md](claims.md) has every claim in full.\n"
@@ -110,9 +110,9 @@ def _compared(found: Comparison) -> str:
         text += (
             f"{chr(10) if text else ''}## Do uneven runs score more?\n\n"
             f"{markdown(merit_table(found.merit))}\n"
-            "Correlation of a run's imbalance and its score, each less its method's mean: above 0 "
-            "if uneven runs score more. p takes runs of one seed as independent, and each "
-            "situation by itself.\n"
+            "Correlation of a run's imbalance and its score, each minus its method's mean: above 0 "
+            "if uneven runs score more. p is of a permutation test that exchanges whole seeds, "
+            "since runs of one seed are not independent, and of each situation by itself.\n"
         )
     return text
 
@@ -138,10 +138,12 @@ def _fig5(findings: Findings) -> str:
         table = markdown(evidence_summary(findings.evidence))
         text += (
             f"![All handoffs](fig5_evidence.png)\n\n{table}\n"
-            "All handoffs of both food robots, in both orders of the tasks. A change is the mean "
+            "Handoffs of both food robots, in both orders of the tasks. A change is the mean "
             "weight after the first rescue minus that before, a mean over heads. The *bystander* "
-            "is the other food robot, which takes no part: what it shows too follows from which "
-            f"victims are there, not from who hands over. {_FILES['evidence']}\n"
+            "is the other food robot: what it shows too follows from which victims are there, not "
+            "from who hands over. Only handoffs count during which it rescues nobody. The ceiling "
+            "is the difference that attention would show which follows each robot's own next "
+            f"rescue. {_FILES['evidence']}\n"
         )
     else:
         text += "No run has handoffs and attention that chooses.\n"

@@ -9,7 +9,7 @@ from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import MARGIN, ChiSquared, Evenness, EvennessOfRuns
 from innerattn.report.paper.competence import competence_table, competence_terms
 from innerattn.report.table import Column, Table, columns, markdown, plain_table
-from innerattn.stats.text import NONE, fixed, p_shown, shown
+from innerattn.stats.text import NONE, format_estimate, format_number, format_p
 
 _TERMS = f"""\
 - **Share**: the part of a task's rescues in which the first food robot helped. Over several runs
@@ -56,7 +56,7 @@ def sharing_summary(table: Table2, situation: str) -> Table:
         cells = [row.method, row.task, f"{sum(whole.rescues):,}", share_shown(row.scored)]
         cells += [whole.verdict, verdicts_shown(row.scored)]
         if printed:
-            cells.append(fixed(row.printed.row.shares[0]) if row.printed else NONE)
+            cells.append(format_number(row.printed.row.shares[0]) if row.printed else NONE)
         lines.append(cells)
     return plain_table(heads, lines)
 
@@ -76,7 +76,7 @@ def _sharing_table(rows: Sequence[Row], name: str) -> Table:
         cells = [row.method, row.task, str(len(row.seeds))]
         cells += [f"{first + second} ({first} + {second})", share_shown(sharing)]
         cells += [*_tost(sharing.all), verdicts_shown(sharing)]
-        cells += [shown(sharing.together.pooled_share) if sharing.together else NONE]
+        cells += [format_estimate(sharing.together.pooled_share) if sharing.together else NONE]
         cells += [_chi_squared(sharing.all.chi_squared)]
         if printed and row.printed:
             shares, was = row.printed.row.shares, row.printed.row
@@ -100,7 +100,7 @@ def _runs_table(rows: Sequence[Row]) -> Table:
             cells = [row.method, row.task, str(seed)]
             for sharing in (row.scored, row.recorded):
                 run = sharing.each[index]
-                cells += [f"{run.rescues[0]} + {run.rescues[1]}", shown(run.share)]
+                cells += [f"{run.rescues[0]} + {run.rescues[1]}", format_estimate(run.share)]
                 cells += [*_tost(run), _chi_squared(run.chi_squared)]
             lines.append(cells)
     return plain_table(heads, lines)
@@ -109,15 +109,15 @@ def _runs_table(rows: Sequence[Row]) -> Table:
 def _tost(found: Evenness | EvennessOfRuns) -> list[str]:
     """The interval that decides whether work is even, the p-value and the verdict."""
     ends = found.interval_90
-    interval = f"[{fixed(ends[0])}, {fixed(ends[1])}]" if ends else NONE
-    return [interval, p_shown(found.equivalence_p), found.verdict]
+    interval = f"[{format_number(ends[0])}, {format_number(ends[1])}]" if ends else NONE
+    return [interval, format_p(found.equivalence_p), found.verdict]
 
 
 def _chi_squared(found: ChiSquared | None) -> str:
     if found is None:
         return NONE
     verdict = ", rejected" if found.rejected else ""
-    return f"{found.statistic:.2f} ({p_shown(found.p)}){verdict}"
+    return f"{found.statistic:.2f} ({format_p(found.p)}){verdict}"
 
 
 def _listed(values: Sequence[int]) -> str:

@@ -5,18 +5,20 @@ import itertools
 import numpy as np
 import pytest
 
-from innerattn.stats.intervals import (
+from innerattn.stats import Estimate
+from innerattn.stats.bootstrap import (
+    Resampled,
+    bootstrap,
     mean_interval,
+    resampled_counts,
     score_interval,
-    student_interval,
 )
-from innerattn.stats.resampling import resampled_counts, resampled_means
 
 
 def test_resampling_against_every_possible_resample() -> None:
     values = np.array([0.0, 1.0, 5.0, 2.0])
     every = np.array([np.mean(rows) for rows in itertools.product(values, repeat=4)])
-    drawn = resampled_means(values[:, None], seed=0, resamples=200_000)[:, 0]
+    drawn = bootstrap([values], np.mean, seed=0, resamples=200_000)
     assert drawn.mean() == pytest.approx(every.mean(), abs=0.01)
     assert drawn.std() == pytest.approx(every.std(), rel=0.01)
     grid = np.unique(every)
@@ -35,10 +37,38 @@ def test_interval_of_a_large_sample_is_the_normal_one() -> None:
     assert interval.high == pytest.approx(values.mean() + half, abs=0.1 * half)
 
 
-def test_columns_stay_paired() -> None:
-    columns = np.random.default_rng(0).normal(size=(50, 1)) * [1.0, -2.0] + [0.0, 3.0]
-    means = resampled_means(columns, seed=0)
-    np.testing.assert_allclose(means[:, 1], 3.0 - 2.0 * means[:, 0], atol=1e-12)
+def means(*samples: np.ndarray, axis: int) -> np.ndarray:
+    return np.stack([sample.mean(axis) for sample in samples])
+
+
+def test_samples_stay_paired_where_they_are() -> None:
+    sample = np.random.default_rng(0).normal(size=50)
+    one, other = bootstrap([sample, 3.0 - 2.0 * sample], means, seed=0, paired=True)
+    np.testing.assert_allclose(other, 3.0 - 2.0 * one, atol=1e-12)
+    one, other = bootstrap([sample, 3.0 - 2.0 * sample], means, seed=0)
+    assert abs(np.corrcoef(one, other)[0, 1]) < 0.1
+
+
+def test_a_single_episode_is_drawn_every_time() -> None:
+    assert mean_interval([4.0], seed=0) == Estimate(4.0, 4.0, 4.0)
+    resampled = bootstrap([np.ones(1), np.zeros(1)], means, seed=0, resamples=5, paired=True)
+    np.testing.assert_array_equal(resampled, [[1.0] * 5, [0.0] * 5])
+
+
+def test_many_episodes_are_drawn_in_parts_alike() -> None:
+    values = np.random.default_rng(0).normal(size=(2**21 // 1500) + 1)
+    plain = np.random.default_rng(3)  # 1,499 resamples at once
+    rows = [plain.integers(0, len(values), (count, len(values))) for count in (1499, 501)]
+    expected = values[np.concatenate(rows)].mean(1)
+    drawn = bootstrap([values], np.mean, seed=3, resamples=2000)
+    np.testing.assert_array_equal(drawn, expected)
+
+
+def test_an_interval_is_unbounded_where_a_resample_has_no_value() -> None:
+    one = Resampled(np.array([1.0, 2.0]), np.array([[0.5, 1.5, 1.0], [2.0, np.nan, 2.0]]))
+    assert one[0].estimate().bounded
+    assert one[1].estimate() == Estimate(2.0)
+    assert one.mean(0).estimate() == Estimate(1.5)
 
 
 def test_counts_of_a_resample_are_those_of_drawing_one_by_one() -> None:
@@ -77,8 +107,8 @@ def test_intervals_over_episodes_hold_the_truth_as_often_as_they_say() -> None:
     rng, draws = np.random.default_rng(5), 500
     missed = {"mean": 0, "score": 0}
     for seed in range(draws):
-        worlds = rng.normal(0.0, 0.5, 300)  # easy and hard ones, for all policies alike
-        played = rng.normal([[2.0], [0.2], [3.0]], 1.0, (3, 300)) + worlds
+        worlds = rng.normal(0.0, 0.5, 100)  # easy and hard ones, for all policies alike
+        played = rng.normal([[2.0], [0.2], [3.0]], 1.0, (3, 100)) + worlds
         mean, score = mean_interval(played[0], seed), score_interval(*played, seed)
         missed["mean"] += not mean.low <= 2.0 <= mean.high
         missed["score"] += score is None or not score.low <= 1.8 / 2.8 <= score.high
@@ -113,26 +143,3 @@ def test_what_is_not_a_sample_is_refused(values: object) -> None:
         mean_interval(values, 0)
     with pytest.raises(ValueError, match="must be"):
         score_interval([1.0], [1.0, 2.0], [1.0], 0)
-
-
-@pytest.mark.parametrize(("n", "quantile"), [(2, 12.7062), (5, 2.7764), (30, 2.0452)])
-def test_interval_over_runs_has_the_quantiles_of_the_tables(n: int, quantile: float) -> None:
-    values = np.random.default_rng(n).normal(7.0, 2.0, n)
-    interval = student_interval(values)
-    deviation = np.sqrt(np.sum((values - values.mean()) ** 2) / (n - 1))
-    assert interval.mean == pytest.approx(values.mean())
-    assert interval.high - interval.mean == pytest.approx(
-        quantile * deviation / np.sqrt(n), rel=1e-4
-    )
-    assert interval.mean - interval.low == pytest.approx(interval.high - interval.mean)
-
-
-def test_interval_over_few_runs_holds_the_truth_as_often_as_it_says() -> None:
-    samples = np.random.default_rng(0).normal(3.0, 1.0, (4000, 4))
-    intervals = [student_interval(sample) for sample in samples]
-    assert np.mean([x.low <= 3.0 <= x.high for x in intervals]) == pytest.approx(0.95, abs=0.012)
-
-
-def test_interval_over_runs_needs_two() -> None:
-    with pytest.raises(ValueError, match="at least 2"):
-        student_interval([1.0])

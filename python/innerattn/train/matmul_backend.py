@@ -1,8 +1,8 @@
 """Which library multiplies matrices: the faster one for this processor, if it is as exact.
 
-PyTorch multiplies float32 matrices on a CPU by MKL, which keeps to AVX2 on AMD processors that have
-AVX-512; oneDNN uses it. The choice follows from the processor alone, never from a measured time, so
-that a run gives the same numbers every time.
+PyTorch multiplies float32 matrices on a CPU by MKL. On AMD processors with AVX-512, MKL uses only
+AVX2, and oneDNN uses AVX-512. The choice depends on the processor alone, never on a measured time,
+so that a run gives the same numbers every time.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ _LARGEST_ERROR = 1e-5
 
 
 @contextmanager
-def best_products() -> Iterator[str]:
+def best_matmul_backend() -> Iterator[str]:
     """Use the best library inside the block.
 
     Yields:
-        What is used and how exact it was found to be, for the record.
+        The library and its measured error, e.g. "onednn, error 2.1e-07", for ``run.json``.
     """
     if not _onednn_is_faster():
         yield f"default, error {_error():.1e}"
@@ -40,8 +40,8 @@ def best_products() -> Iterator[str]:
 def _onednn() -> Iterator[None]:
     """Let oneDNN multiply.
 
-    The name of the setting allows less exact products, which oneDNN uses only on processors that
-    have instructions for them; that is why the error is measured.
+    The setting allows TF32. On processors that have instructions for such a format, oneDNN may then
+    really be less exact; that is why the error is measured.
     """
     mkldnn: Any = torch.backends.mkldnn  # older versions have no such setting
     matmul = mkldnn.matmul

@@ -1,0 +1,56 @@
+"""The entropy of attention that training logs, over the steps of a whole episode.
+
+All worlds begin their episodes together, and attention changes in the course of an episode. The
+entropy at one control step would therefore rise and fall with the phase of the episode it was
+logged in, whatever is learnt.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from math import ceil
+
+import torch
+from torch import Tensor
+
+from innerattn.learn.types import Learner
+from innerattn.measures.attention import attention_entropy
+
+_MOST_WORLDS = 64
+_MOST_STEPS = 50
+
+
+class AttentionLog:
+    """What the critic attended to in the last control steps, as many as an episode has."""
+
+    def __init__(self, robot_names: Sequence[str], episode_steps: int) -> None:
+        """Keep steps of an episode of ``episode_steps``, evenly spread where they are many."""
+        self._robot_names = tuple(robot_names)
+        self._stride = ceil(episode_steps / _MOST_STEPS)
+        self._seen: deque[tuple[Tensor, Tensor]] = deque(maxlen=ceil(episode_steps / self._stride))
+        self._steps = 0
+
+    def add(self, obs: Tensor, actions: Tensor) -> None:
+        """Take one control step of E worlds, of which the first are kept.
+
+        Args:
+            obs: (E, R, D) float32, before the step.
+            actions: (E, R) int64.
+        """
+        if self._steps % self._stride == 0:
+            self._seen.append((obs[:_MOST_WORLDS].clone(), actions[:_MOST_WORLDS].clone()))
+        self._steps += 1
+
+    def entropy(self, learner: Learner) -> dict[str, list[float]]:
+        """Mean entropy by robot and head [nats] over the steps kept, with today's weights.
+
+        Returns:
+            Empty where the critic has no attention.
+        """
+        obs, actions = (torch.cat(parts) for parts in zip(*self._seen, strict=True))
+        weights = learner.attention(obs, actions)
+        if weights is None:
+            return {}
+        rows = attention_entropy(weights.cpu().numpy()).tolist()
+        return dict(zip(self._robot_names, rows, strict=True))

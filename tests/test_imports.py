@@ -1,0 +1,30 @@
+"""The rooms below the learner import neither torch nor scipy, which are slow to import."""
+
+import subprocess
+import sys
+
+import pytest
+
+ROOMS = ("config", "envs", "records", "stats", "policies", "measures")
+
+_IMPORT = """
+import importlib, pkgutil, sys
+room = importlib.import_module(sys.argv[1])
+for module in pkgutil.walk_packages(room.__path__, f"{room.__name__}."):
+    importlib.import_module(module.name)
+print(" ".join(name for name in ("torch", "scipy") if name in sys.modules))
+"""
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_module_of_the_room_imports_torch_or_scipy(room: str) -> None:
+    command = [sys.executable, "-c", _IMPORT, f"innerattn.{room}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == []
+
+
+def test_the_check_finds_what_is_imported() -> None:
+    command = [sys.executable, "-c", _IMPORT, "innerattn.nn"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "torch" in done.stdout.split()
