@@ -106,14 +106,16 @@ def _course(panel: Axes, line: EntropyLines) -> dict[str, Artist]:
     for r, robot in enumerate(line.robots):
         colour = ROBOT_COLOURS[r % len(ROBOT_COLOURS)]
         (handles[robot],) = panel.plot(steps, line.by_robot[:, r], color=colour, linewidth=0.8)
-    (handles["mean over robots"],) = panel.plot(steps, mean, color=BLACK, linewidth=1.5)
+    (handles["mean over robots"],) = panel.plot(steps, mean, color=BLACK, linewidth=1.3)
     return handles
 
 
 def _heads(panel: Axes, line: EntropyLines) -> None:
     """A strip beside the courses: the heads of each robot in a column of their own."""
-    first, last = float(line.env_steps[0]) / 1000.0, float(line.env_steps[-1]) / 1000.0
-    strip = _HEADS * max(last, 1e-3)
+    from matplotlib.ticker import MaxNLocator
+
+    last = float(line.env_steps[-1]) / 1000.0
+    strip = _HEADS * last
     places = last + strip * (np.arange(len(line.robots)) + 1.0) / (len(line.robots) + 0.5)
     for r, place in enumerate(places):
         values = line.heads[:, r].ravel()
@@ -128,7 +130,15 @@ def _heads(panel: Axes, line: EntropyLines) -> None:
             alpha=0.6,
         )
     panel.axvline(last + 0.03 * strip, color=_GREY, linewidth=0.7)
-    panel.set_xticks([tick for tick in panel.get_xticks() if first < tick <= 1.001 * last])
+    panel.annotate(
+        "heads",
+        (last + 0.55 * strip, 0.02),
+        xycoords=("data", "axes fraction"),
+        fontsize=6,
+        ha="center",
+    )
+    ticks = MaxNLocator(nbins=4, steps=[1, 2, 5, 10]).tick_values(0.0, last)
+    panel.set_xticks([tick for tick in ticks if 0.0 <= tick <= 1.001 * last])
     panel.set_xlim(-0.03 * last, last + 1.08 * strip)
 
 
