@@ -7,7 +7,7 @@ import pytest
 
 from innerattn.config import Scenario
 from innerattn.evaluate.play import run_episodes
-from innerattn.measures import MEASURES, Measure, measures_of, needed_fields, register
+from innerattn.measures import MEASURES, Measure, measure_of, measures_of, needed_fields, register
 from innerattn.measures.dispatch_quality import dispatch_quality
 from innerattn.measures.waiting import waiting
 from innerattn.policies import scripted_policy
@@ -86,6 +86,7 @@ def test_a_measure_is_over_the_episodes_that_have_what_it_needs(record: Record) 
     values, whole, begin = measures_of(first, rest), measures_of(record), measures_of(first)
     for name, measure in MEASURES.items():
         assert values[name] == (begin if measure.needs else whole)[name]
+        assert measure_of(name, first, rest) == values[name]
     nothing = measures_of(rest)
     assert all((nothing[name] is None) == bool(m.needs) for name, m in MEASURES.items())
 

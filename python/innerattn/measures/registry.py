@@ -62,14 +62,24 @@ def measures_of(*parts: Record) -> dict[str, Value]:
         ValueError: the parts are not consecutive episodes of one policy.
     """
     _refuse_gaps(parts)
-    whole: dict[tuple[str, ...], Record | None] = {}
-    values: dict[str, Value] = {}
-    for name, measure in MEASURES.items():
-        if measure.needs not in whole:
-            whole[measure.needs] = _with_fields(parts, measure.needs)
-        record = whole[measure.needs]
-        values[name] = None if record is None else measure.of(record)
-    return values
+    joined = {needs: _with_fields(parts, needs) for needs in {m.needs for m in MEASURES.values()}}
+    return {name: _value(measure, joined[measure.needs]) for name, measure in MEASURES.items()}
+
+
+def measure_of(name: str, *parts: Record) -> Value:
+    """One measure of one policy's episodes; see `measures_of`.
+
+    Raises:
+        KeyError: no measure has this name.
+        ValueError: the parts are not consecutive episodes of one policy.
+    """
+    measure = MEASURES[name]
+    _refuse_gaps(parts)
+    return _value(measure, _with_fields(parts, measure.needs))
+
+
+def _value(measure: Measure, record: Record | None) -> Value:
+    return None if record is None else measure.of(record)
 
 
 def _refuse_gaps(parts: Sequence[Record]) -> None:

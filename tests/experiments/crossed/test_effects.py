@@ -37,7 +37,7 @@ def test_effects_against_plain_means(figure: str) -> None:
     }
     alike = outcomes[Arm("team", 0.0, shared=True)].values()
     shared = np.mean([getattr(run, figure) for run in alike])
-    found = {e.name: e.found for e in effects("mixed", outcomes) if e.figure == figure}
+    found = {e.name: e.contrast for e in effects("mixed", outcomes) if e.outcome == figure}
     inner = {c: np.mean([mean[c, p] for p in (0.0, 1e-4, 1e-3)]) for c in ("helpers", "team")}
     uniform = {c: mean[c, None] for c in inner}
     expected = {
@@ -73,7 +73,7 @@ def test_effects_against_plain_means(figure: str) -> None:
 def test_p_values_are_adjusted_among_all_of_their_kind() -> None:
     for main in (True, False):
         kind = [one for one in effects("mixed", random_outcomes(5)) if one.main == main]
-        p_values = [one.found.p for one in kind if one.found]
+        p_values = [one.contrast.p for one in kind if one.contrast]
         assert len(p_values) == len(kind) == 3 * sum(m == main for _, m, _ in contrasts())
         expected = multipletests(p_values, method="holm")[1]
         assert [one.holm_p for one in kind] == pytest.approx(list(expected))
@@ -84,10 +84,10 @@ def test_effects_need_three_seeds_with_all_arms() -> None:
     for seed in (0, 2):
         del outcomes[Arm("team", None)][seed]
     del outcomes[Arm("team", 0.0)][3]
-    found = {e.name: e for e in effects("mixed", outcomes) if e.figure == "score"}
-    assert found["team − helpers credit, uniform"].found is None
+    found = {e.name: e for e in effects("mixed", outcomes) if e.outcome == "score"}
+    assert found["team − helpers credit, uniform"].contrast is None
     assert found["team − helpers credit, uniform"].seeds == 2
-    assert found["team − helpers credit, inner λ = 0"].found is not None
+    assert found["team − helpers credit, inner λ = 0"].contrast is not None
     assert found["team − helpers credit, inner λ = 0"].seeds == 3
     assert found["inner λ = 0 − uniform, team"].seeds == 1
-    assert all(one.found is None for one in effects("mixed", {}))
+    assert all(one.contrast is None for one in effects("mixed", {}))

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from innerattn.experiments.paper.claims import (
+    EVEN_WITH,
+    MORE_EVEN,
+    UNEVEN_WITHOUT,
     Holds,
     entropy_claims,
     handoff_is_own,
     handoff_moves,
 )
-from innerattn.experiments.paper.competence import COMPETENCE, Competence
+from innerattn.experiments.paper.competence import Competence, competence_units
 from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence, evidence
 from innerattn.experiments.paper.sharing_claims import judged, sharing_claims
@@ -37,8 +40,10 @@ def made_row(method: str, task: str, shares: tuple[float, ...]) -> Row:
 
 
 def made_competence(method: str, imbalance: list[float]) -> Competence:
-    each = tuple(dict.fromkeys(COMPETENCE, 0.5) | {"imbalance": value} for value in imbalance)
-    nothing: dict[str, Estimate | None] = dict.fromkeys(COMPETENCE)
+    each = tuple(
+        dict.fromkeys(competence_units(), 0.5) | {"imbalance": value} for value in imbalance
+    )
+    nothing: dict[str, Estimate | None] = dict.fromkeys(competence_units())
     seeds = tuple(range(len(each)))
     return Competence("mixed", method, seeds, ({},) * len(each), each, nothing)
 
@@ -50,7 +55,7 @@ def claims_of(**shares: list[tuple[float, ...]]) -> dict[tuple[str, str], Holds]
         rows += [made_row(method, f"task_{index}", task) for index, task in enumerate(tasks, 1)]
         beside.append(made_competence(method, np.abs(np.array(tasks) - 0.5).mean(0).tolist()))
     found = sharing_claims(Table2(tuple(rows), tuple(beside)))
-    return {(claim.claim.split()[0], claim.method): claim.holds for claim in found}
+    return {(claim.claim, claim.method): claim.holds for claim in found}
 
 
 def test_a_task_is_judged_by_its_runs_and_not_by_their_mean_alone() -> None:
@@ -73,15 +78,15 @@ def test_claims_about_sharing() -> None:
         td_inner=[EVEN, EVEN], td_uniform=[UNEVEN, UNEVEN], ppo_inner=[EVEN, UNEVEN], mappo=[EVEN]
     )
     assert found == {
-        ("even", "td-inner"): "yes",
-        ("more", "td-inner, td-uniform"): "yes",
-        ("uneven", "td-uniform"): "yes",
-        ("even", "ppo-inner"): "no",
+        (EVEN_WITH, "td-inner"): "yes",
+        (MORE_EVEN, "td-inner"): "yes",
+        (UNEVEN_WITHOUT, "td-uniform"): "yes",
+        (EVEN_WITH, "ppo-inner"): "no",
     }
     found = claims_of(td_inner=[EVEN, EVEN], td_uniform=[EVEN, UNEVEN])
-    assert found["uneven", "td-uniform"] == "no"
+    assert found[UNEVEN_WITHOUT, "td-uniform"] == "no"
     found = claims_of(td_inner=[EVEN, EVEN], td_uniform=[(0.52, 0.5, 0.48), (0.5, 0.49, 0.51)])
-    assert found["more", "td-inner, td-uniform"] == "no"
+    assert found[MORE_EVEN, "td-inner"] == "no"
     found = claims_of(td_inner=[(0.5,), (0.5,)], td_uniform=[(0.8,), (0.8,)])
     assert set(found.values()) == {"undecided"}
 

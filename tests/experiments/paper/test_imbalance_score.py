@@ -9,7 +9,7 @@ import pytest
 import statsmodels.api as sm
 from scipy.stats import pearsonr
 
-from innerattn.experiments.paper.competence import COMPETENCE, Competence
+from innerattn.experiments.paper.competence import Competence, competence_units
 from innerattn.experiments.paper.imbalance_score import (
     correlation_over_seeds,
     imbalance_score_correlations,
@@ -18,12 +18,12 @@ from innerattn.stats.seeds import seed_estimate
 
 
 def made(method: str, imbalance: list[float], scores: list[float | None]) -> Competence:
-    nothing: dict[str, float | None] = dict.fromkeys(COMPETENCE)
+    nothing: dict[str, float | None] = dict.fromkeys(competence_units())
     each = tuple(
         nothing | {"imbalance": one, "score": other}
         for one, other in zip(imbalance, scores, strict=True)
     )
-    mean = {name: seed_estimate([values[name] for values in each]) for name in COMPETENCE}
+    mean = {name: seed_estimate([values[name] for values in each]) for name in competence_units()}
     return Competence("double", method, tuple(range(len(each))), (), each, mean)
 
 

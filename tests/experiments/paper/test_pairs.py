@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.stats import trim_mean, ttest_rel
 
-from innerattn.experiments.paper.competence import COMPETENCE, Competence
+from innerattn.experiments.paper.competence import Competence, competence_units
 from innerattn.experiments.paper.pairs import pairs, together
 
 
 def made(situation: str, method: str, scores: dict[int, float | None]) -> Competence:
-    nothing: dict[str, float | None] = dict.fromkeys(COMPETENCE)
+    nothing: dict[str, float | None] = dict.fromkeys(competence_units())
     each = tuple(nothing | {"score": score, "imbalance": 0.1} for score in scores.values())
     return Competence(situation, method, tuple(scores), (), each, {})
 
@@ -21,17 +21,17 @@ UNIFORM = {4: 0.9, 2: 0.6, 1: 0.85, 3: 0.1}
 def test_seeds_are_compared_pairwise() -> None:
     found = pairs([made("mixed", "td-inner", {**INNER}), made("mixed", "td-uniform", {**UNIFORM})])
     score, imbalance = found
-    assert (score.figure, score.seeds) == ("score", (1, 2, 4))
+    assert (score.measure, score.seeds) == ("score", (1, 2, 4))
     ours, theirs = [0.8, 0.7, 0.95], [0.85, 0.6, 0.9]
     assert score.inner is not None
     assert score.uniform is not None
     assert (score.inner.mean, score.uniform.mean) == pytest.approx((np.mean(ours), np.mean(theirs)))
-    assert score.found is not None
+    assert score.contrast is not None
     expected = ttest_rel(ours, theirs)
-    assert score.found.p == pytest.approx(expected.pvalue)
+    assert score.contrast.p == pytest.approx(expected.pvalue)
     ends = expected.confidence_interval()
-    assert score.found.difference.low == pytest.approx(ends.low)
-    assert imbalance.found is None  # all differences are the same
+    assert score.contrast.difference.low == pytest.approx(ends.low)
+    assert imbalance.contrast is None  # all differences are the same
 
 
 def test_what_has_no_counterpart_or_too_few_seeds_is_not_compared() -> None:
@@ -43,8 +43,8 @@ def test_what_has_no_counterpart_or_too_few_seeds_is_not_compared() -> None:
         for kind, score in (("inner", 0.6), ("uniform", None))
     ]
     score, imbalance = pairs(two)
-    assert (score.seeds, score.found) == ((0,), None)
-    assert (imbalance.seeds, imbalance.found) == ((0, 1), None)
+    assert (score.seeds, score.contrast) == ((0,), None)
+    assert (imbalance.seeds, imbalance.contrast) == ((0, 1), None)
     assert together(two) == []  # a single run of one has a score
 
 

@@ -22,10 +22,10 @@ def test_effects() -> None:
     for row, effect in zip(rows, found, strict=True):
         assert row[0] == (f"**{effect.name}**" if effect.main else effect.name)
         assert row[2] == str(effect.seeds)
-        if effect.found is None:
+        if effect.contrast is None:
             assert row[3:] == ["–"] * 6
             continue
-        one = effect.found
+        one = effect.contrast
         assert row[3:6] == [
             format_estimate(one.difference, 3),
             format_estimate(one.hedges_g, 1),
@@ -33,4 +33,4 @@ def test_effects() -> None:
         ]
         alike = "yes" if one.equivalent else "not shown"
         assert row[6:] == [format_p(effect.holm_p), f"{one.margin:g}", alike]
-    assert sum(effect.found is None for effect in found) == 3
+    assert sum(effect.contrast is None for effect in found) == 3

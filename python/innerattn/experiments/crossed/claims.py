@@ -136,7 +136,7 @@ def _ends(mean: Estimate | None) -> tuple[float, float]:
 
 
 def _effect(effects: Sequence[Effect], name: str, figure: str) -> Contrast | None:
-    (found,) = [one.found for one in effects if (one.name, one.figure) == (name, figure)]
+    (found,) = [one.contrast for one in effects if (one.name, one.outcome) == (name, figure)]
     return found
 
 

@@ -1,7 +1,7 @@
-"""Effects of attention, credit and penalty on the runs' figures; the seed is the unit.
+"""Effects of attention, credit and regularisation on the runs' outcomes; the seed is the unit.
 
-An effect is a contrast of arms: a weighted sum of their means. With uniform weights there is no
-penalty, so that one arm stands against those with learnt attention at every penalty.
+An effect is a contrast of arms: a weighted sum of their means. Uniform attention has nothing to
+regularise, so that its one arm is compared with those of learnt attention at every weight.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ MARGINS = {
     "score": pairs.MARGINS["score"],
     "entropy_share": ENTROPY_MARGIN,
 }
-"""The figures that effects are asked of, and the largest difference that counts as none."""
+"""The outcomes that effects are estimated for, and the largest difference that counts as none."""
 
 LEAST_SEEDS = 3
 """An effect needs so many seeds that have a run of each arm."""
@@ -38,30 +38,31 @@ class Effect:
 
     Attributes:
         situation: of the worlds.
-        figure: one of `MARGINS`.
+        outcome: one of `MARGINS`.
         name: what is compared with what.
-        main: it is an average over penalties, or more, or an interaction; else of single arms.
-        seeds: how many have the figure in each of the compared arms.
-        found: None where these are less than `LEAST_SEEDS`, or do not differ.
-        holm_p: its p-value, adjusted for all that is asked at once in its situation: the main
-            effects on all figures together, and likewise all the others.
+        main: it is an average over weights of the regularisation, or more, or an interaction; else
+            it is of single arms.
+        seeds: how many have the outcome in each of the compared arms.
+        contrast: None where these are fewer than `LEAST_SEEDS`, or do not differ.
+        holm_p: its p-value, adjusted within its family: the main effects on all outcomes in a
+            situation, or all other effects there.
     """
 
     situation: str
-    figure: str
+    outcome: str
     name: str
     main: bool
     seeds: int
-    found: Contrast | None
+    contrast: Contrast | None
     holm_p: float | None = None
 
 
 def contrasts() -> list[tuple[str, bool, Weights]]:
-    """All effects that are asked for: name, whether it is a main effect, weights of arms."""
+    """All effects: name, whether it is a main effect, weights of arms."""
     least, most = PENALTIES[0], PENALTIES[-1]
     attention = {credit: _attention(credit) for credit in CREDITS}
     helpers, team = (attention[credit] for credit in ("helpers", "team"))
-    asked: list[tuple[str, bool, Weights]] = [
+    named: list[tuple[str, bool, Weights]] = [
         (ATTENTION, True, _mean([helpers, team])),
         ("inner − uniform under team credit, mean over λ", True, team),
         (CREDIT, True, _credit(CROSSED)),
@@ -73,7 +74,7 @@ def contrasts() -> list[tuple[str, bool, Weights]]:
         ("(inner − uniform) under team − under helpers credit", True, _minus(team, helpers)),
     ]
     for credit in CREDITS:
-        asked += [
+        named += [
             (
                 f"inner λ = {penalty:g} − uniform, {credit}",
                 False,
@@ -81,56 +82,56 @@ def contrasts() -> list[tuple[str, bool, Weights]]:
             )
             for penalty in PENALTIES
         ]
-        asked += [
+        named += [
             (f"λ = {penalty:g} − λ = {least:g}, {credit}", False, _penalty(credit, penalty))
             for penalty in PENALTIES[1:]
         ]
     for penalty in (None, *PENALTIES):
         arms = [Arm(credit, penalty) for credit in CREDITS]
         words = "uniform" if penalty is None else f"inner λ = {penalty:g}"
-        asked.append((f"team − helpers credit, {words}", False, _credit(arms)))
+        named.append((f"team − helpers credit, {words}", False, _credit(arms)))
     own = Arm(SHARED.credit, SHARED.penalty)
     name = f"shared parameters − own parameters, {own.credit}, inner λ = {least:g}"
-    return [*asked, (name, False, {SHARED: 1.0, own: -1.0})]
+    return [*named, (name, False, {SHARED: 1.0, own: -1.0})]
 
 
 def effects(situation: str, outcomes: Outcomes) -> list[Effect]:
-    """All effects on all figures in one situation.
+    """All effects on all outcomes in one situation.
 
     Args:
         situation: of the worlds.
-        outcomes: figures of the runs of each arm; arms without runs may be missing.
+        outcomes: of the runs of each arm; arms without runs may be missing.
     """
-    found = []
-    for figure, margin in MARGINS.items():
+    every = []
+    for outcome, margin in MARGINS.items():
         for name, main, weights in contrasts():
-            rows = by_seed(outcomes, list(weights), figure)
+            rows = by_seed(outcomes, list(weights), outcome)
             enough = len(rows) >= LEAST_SEEDS
             compared = contrast(rows, list(weights.values()), margin) if enough else None
-            found.append(Effect(situation, figure, name, main, len(rows), compared))
-    return _adjusted(found, main=True) + _adjusted(found, main=False)
+            every.append(Effect(situation, outcome, name, main, len(rows), compared))
+    return _adjusted(every, main=True) + _adjusted(every, main=False)
 
 
-def _adjusted(asked: Sequence[Effect], main: bool) -> list[Effect]:
-    """The effects of one kind, with their p-values adjusted for each other."""
-    kind = [one for one in asked if one.main == main]
-    adjusted = iter(holm([one.found.p for one in kind if one.found is not None]))
-    return [replace(one, holm_p=next(adjusted)) if one.found else one for one in kind]
+def _adjusted(every: Sequence[Effect], main: bool) -> list[Effect]:
+    """The effects of one family, with their p-values adjusted for each other."""
+    family = [one for one in every if one.main == main]
+    adjusted = iter(holm([one.contrast.p for one in family if one.contrast is not None]))
+    return [replace(one, holm_p=next(adjusted)) if one.contrast else one for one in family]
 
 
 def _attention(credit: Credit) -> Weights:
-    """Learnt attention, averaged over penalties, minus uniform weights."""
+    """Learnt attention, averaged over weights of the regularisation, minus uniform attention."""
     inner = {Arm(credit, penalty): 1.0 / len(PENALTIES) for penalty in PENALTIES}
     return {**inner, Arm(credit, None): -1.0}
 
 
 def _penalty(credit: Credit, penalty: float) -> Weights:
-    """A penalty minus the least one."""
+    """A weight of the regularisation minus the least one."""
     return {Arm(credit, penalty): 1.0, Arm(credit, PENALTIES[0]): -1.0}
 
 
 def _credit(arms: Sequence[Arm]) -> Weights:
-    """Team's credit minus helpers', averaged over attentions, then over penalties."""
+    """Team minus helpers credit, averaged over attentions, then over weights."""
     weights = {}
     attentions = {arm.method for arm in arms}
     for arm in arms:

@@ -1,4 +1,4 @@
-"""What one run shows of even sharing, of competence and of attention."""
+"""What a run is compared by: how it shares work, how well it does, how even its attention is."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ OUTCOMES = {
     "entropy_share": "entropy of attention as a share of ln(N - 1), over robots and heads",
     "first_share": "share of all rescues by the first food robot",
 }
-"""The figures of a run and what they are."""
+"""The outcomes of a run and what they are."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Figures of one run by the names of `OUTCOMES`; None where it has none."""
+    """The outcomes of one run by the names of `OUTCOMES`; None where it has none."""
 
     imbalance: float | None
     least_share: float | None
@@ -39,19 +39,19 @@ class Outcome:
 
 
 Outcomes = Mapping[Arm, Mapping[int, Outcome]]
-"""What the runs of each arm show, by their seeds."""
+"""The outcomes of the runs of each arm, by their seeds."""
 
 
-def outcome_of(measured: FinishedRun) -> Outcome:
-    """The figures of a run, sharing over all its episodes of the standard length.
+def outcome_of(run: FinishedRun) -> Outcome:
+    """The outcomes of a run; shares are over all its episodes of the standard length.
 
     Raises:
         RunError: a task is not one that two robots share.
     """
-    total = np.sum(list(rescues_by_task(measured).values()), axis=0)
-    summary = measured.summary
+    total = np.sum(list(rescues_by_task(run).values()), axis=0)
+    summary = run.summary
     return Outcome(
-        imbalance=workload_imbalance(measured),
+        imbalance=workload_imbalance(run),
         least_share=float(total.min() / total.sum()) if total.sum() else None,
         rescues_per_episode=float(summary["rescues_per_episode"]["mean"]),
         score=None if summary["score"] is None else float(summary["score"]["mean"]),
@@ -60,11 +60,11 @@ def outcome_of(measured: FinishedRun) -> Outcome:
     )
 
 
-def by_seed(outcomes: Outcomes, arms: Sequence[Arm], figure: str) -> NDArray[np.float64]:
-    """A figure of the runs of some arms: (n, k), a row for each seed that has it in all k arms."""
+def by_seed(outcomes: Outcomes, arms: Sequence[Arm], name: str) -> NDArray[np.float64]:
+    """An outcome of the runs of some arms: (n, k), a row for each seed that has it in all k."""
     runs = [outcomes.get(arm, {}) for arm in arms]
     seeds = sorted(set.intersection(*(set(of_arm) for of_arm in runs)))
-    rows = [[getattr(of_arm[seed], figure) for of_arm in runs] for seed in seeds]
+    rows = [[getattr(of_arm[seed], name) for of_arm in runs] for seed in seeds]
     return np.array([row for row in rows if None not in row], np.float64).reshape(-1, len(arms))
 
 

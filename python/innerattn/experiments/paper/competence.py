@@ -1,4 +1,4 @@
-"""How well the runs of one method do: rescues, score, dispatch and waiting, over runs.
+"""How well the runs of one method do: the score and all measures, over runs.
 
 Scripted policies in the same worlds stand beside them: evenness is no merit by itself, and how good
 a dispatch can be depends on the situation.
@@ -16,20 +16,17 @@ from innerattn.policies import SCRIPTED
 from innerattn.stats import Estimate
 from innerattn.stats.seeds import seed_estimate
 
-COMPETENCE = {
-    "rescues_per_episode": "",
-    "score": "0 random play, 1 scripted dispatch",
-    **{
-        name: measure.unit
-        for name, measure in MEASURES.items()
-        if not measure.is_count and name != "rescues_per_episode"
-    },
-}
-"""Values of competence and their units: the score (see `measures.summary.Performance`) and
-all `MEASURES` that are no counts. What needs steps is of the episodes recorded step by step, which
-with scripted policies are all."""
 
-_COUNTS = tuple(name for name, measure in MEASURES.items() if measure.is_count)
+def competence_units() -> dict[str, str]:
+    """The values of competence and their units.
+
+    These are the score, see `innerattn.measures.summary.Performance`, and all `MEASURES` that are
+    no counts. What needs steps is of the episodes recorded step by step, which with scripted
+    policies are all.
+    """
+    units = {name: measure.unit for name, measure in MEASURES.items() if not measure.is_count}
+    score = {"score": "0 random play, 1 scripted dispatch"}
+    return {"rescues_per_episode": units.pop("rescues_per_episode"), **score, **units}
 
 
 @dataclass(frozen=True)
@@ -40,10 +37,10 @@ class Competence:
         situation: of the worlds.
         method: of training, or a scripted policy.
         seeds: of the runs; a scripted policy has those of the runs in whose worlds it was played.
-        counts: by run, what the figures are over: score_episodes, episodes, and where these were
+        counts: by run, what the values are over: score_episodes, episodes, and where these were
             recorded step by step choices, rescued, left.
-        each: by run, the figures that `COMPETENCE` names; None where a run has none.
-        mean: of each figure over runs.
+        each: by run, the values that `competence_units` names; None where a run has none.
+        mean: of each value over runs.
     """
 
     situation: str
@@ -79,7 +76,7 @@ def _over_runs(
     counts: tuple[dict[str, int], ...],
     each: tuple[dict[str, float | None], ...],
 ) -> Competence:
-    mean = {name: seed_estimate([values[name] for values in each]) for name in COMPETENCE}
+    mean = {name: seed_estimate([values[name] for values in each]) for name in competence_units()}
     seeds = tuple(run.seed for run in group)
     return Competence(group[0].situation, method, seeds, counts, each, mean)
 
@@ -116,8 +113,9 @@ def _joined(
 ) -> tuple[dict[str, int], dict[str, float | None]]:
     """Counts and values; what was not measured is None."""
     counts = {"score_episodes": int(run.summary["score_episodes"]), "episodes": episodes}
-    counts |= {name: int(value) for name in _COUNTS if (value := values.get(name)) is not None}
-    return counts, {name: values.get(name) for name in COMPETENCE}
+    counted = [name for name, measure in MEASURES.items() if measure.is_count]
+    counts |= {name: int(value) for name in counted if (value := values.get(name)) is not None}
+    return counts, {name: values.get(name) for name in competence_units()}
 
 
 def _stored(run: FinishedRun, policy: str) -> dict[str, float | None]:

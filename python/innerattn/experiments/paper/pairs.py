@@ -1,4 +1,4 @@
-"""Learnt attention beside uniform weights: seed by seed, and over all situations together."""
+"""Learnt attention beside uniform attention: seed by seed, and over all situations together."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from innerattn.stats.comparison import Contrast, contrast
 from innerattn.stats.seeds import seed_estimate
 
 MARGINS = {"score": 0.05, "imbalance": 0.5 - MARGIN[0]}
-"""The figures that are compared, and the largest difference that counts as none."""
+"""The values that are compared, and the largest difference that counts as none."""
 
 _SEED = 0  # of the bootstraps
 _LEAST_RUNS = 2  # of a method in a situation, for a bootstrap
@@ -22,26 +22,26 @@ _LEAST_RUNS = 2  # of a method in a situation, for a bootstrap
 
 @dataclass(frozen=True)
 class Pair:
-    """Learnt and uniform attention with one algorithm in one situation, by one figure.
+    """Learnt and uniform attention with one algorithm in one situation, by one value of the runs.
 
     Attributes:
         situation: of the worlds.
         algorithm: such as "td".
-        figure: one of `MARGINS`.
-        seeds: those that have a run of each with the figure.
+        measure: one of `MARGINS`.
+        seeds: those that have a run of each with the value.
         inner: mean over these of learnt attention.
-        uniform: the same of uniform weights.
-        found: inner minus uniform with the seed as the unit; None where there are less than
+        uniform: the same of uniform attention.
+        contrast: inner minus uniform with the seed as the unit; None where there are fewer than
             `LEAST_PAIRS` seeds, or all have the same difference.
     """
 
     situation: str
     algorithm: str
-    figure: str
+    measure: str
     seeds: tuple[int, ...]
     inner: Estimate | None
     uniform: Estimate | None
-    found: Contrast | None
+    contrast: Contrast | None
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Together:
         algorithm: such as "td".
         situations: these.
         inner: interquartile mean of the score with learnt attention.
-        uniform: the same with uniform weights.
-        better: how probably a run with learnt attention scores higher than one without.
+        uniform: the same with uniform attention.
+        better: probability that a run with learnt attention scores higher than one without.
     """
 
     algorithm: str
@@ -64,29 +64,29 @@ class Together:
 
 
 def pairs(competence: Sequence[Competence]) -> list[Pair]:
-    """All pairs of a situation and algorithm with both attentions, figure by figure."""
-    found = []
-    for (situation, algorithm), (inner, uniform) in _matched(competence).items():
-        for figure, margin in MARGINS.items():
-            ours, theirs = _by_seed(inner, figure), _by_seed(uniform, figure)
-            seeds = tuple(sorted(ours.keys() & theirs.keys()))
-            values = [(ours[seed], theirs[seed]) for seed in seeds]
+    """All pairs of a situation and algorithm with both attentions, by each of `MARGINS`."""
+    all_pairs = []
+    for (situation, algorithm), both in _matched(competence).items():
+        for measure, margin in MARGINS.items():
+            inner, uniform = (_by_seed(runs, measure) for runs in both)
+            seeds = tuple(sorted(inner.keys() & uniform.keys()))
+            values = [(inner[seed], uniform[seed]) for seed in seeds]
             enough = len(seeds) >= LEAST_PAIRS
-            found.append(
+            all_pairs.append(
                 Pair(
-                    *(situation, algorithm, figure, seeds),
-                    inner=seed_estimate([one for one, _ in values]),
-                    uniform=seed_estimate([other for _, other in values]),
-                    found=contrast(values, (1.0, -1.0), margin) if enough else None,
+                    *(situation, algorithm, measure, seeds),
+                    inner=seed_estimate([inner[seed] for seed in seeds]),
+                    uniform=seed_estimate([uniform[seed] for seed in seeds]),
+                    contrast=contrast(values, (1.0, -1.0), margin) if enough else None,
                 )
             )
-    return found
+    return all_pairs
 
 
 def together(competence: Sequence[Competence]) -> list[Together]:
     """Each algorithm over all situations, by the score."""
     matched = _matched(competence)
-    found = []
+    algorithms = []
     for algorithm in dict.fromkeys(algorithm for _, algorithm in matched):
         strata = {
             situation: [list(_by_seed(one, "score").values()) for one in both]
@@ -96,7 +96,7 @@ def together(competence: Sequence[Competence]) -> list[Together]:
         whole = {s: both for s, both in strata.items() if min(map(len, both)) >= _LEAST_RUNS}
         if whole:
             inner, uniform = ([both[i] for both in whole.values()] for i in (0, 1))
-            found.append(
+            algorithms.append(
                 Together(
                     algorithm,
                     tuple(whole),
@@ -105,7 +105,7 @@ def together(competence: Sequence[Competence]) -> list[Together]:
                     improvement_interval(inner, uniform, _SEED),
                 )
             )
-    return found
+    return algorithms
 
 
 def _matched(
@@ -121,9 +121,9 @@ def _matched(
     }
 
 
-def _by_seed(runs: Competence, figure: str) -> Mapping[int, float]:
+def _by_seed(runs: Competence, measure: str) -> Mapping[int, float]:
     return {
         seed: value
-        for seed, figures in zip(runs.seeds, runs.each, strict=True)
-        if (value := figures[figure]) is not None
+        for seed, values in zip(runs.seeds, runs.each, strict=True)
+        if (value := values[measure]) is not None
     }

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from innerattn.errors import RunError
 from innerattn.experiments.run import FinishedRun
-from innerattn.measures.registry import measures_of
+from innerattn.measures.registry import measure_of
 from innerattn.measures.sharing.evenness import counts_by_episode
 
 
@@ -35,5 +35,5 @@ def workload_imbalance(run: FinishedRun) -> float | None:
         RunError: a task is not one that two robots share.
     """
     rescues_by_task(run)
-    value = measures_of(*run.scored)["imbalance"]
+    value = measure_of("imbalance", *run.scored)
     return value if isinstance(value, float) else None

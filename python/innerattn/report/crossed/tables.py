@@ -78,8 +78,8 @@ def effects_table(effects: Iterable[Effect]) -> Table:
 
 
 def _effect_row(effect: Effect) -> Row:
-    found = effect.found
-    cells = [effect.name, _LABELS[effect.figure], str(effect.seeds)]
+    found = effect.contrast
+    cells = [effect.name, _LABELS[effect.outcome], str(effect.seeds)]
     if found is None or effect.holm_p is None:
         return Row((*cells, *[NONE] * 6), effect.main)
     cells += [

@@ -83,7 +83,7 @@ def _document(situations: Sequence[Situation], out: Path, budget: str) -> dict[s
         "schema_version": SCHEMA_VERSION,
         "note": smoke_note(budget),
         "budget": budget,
-        "figures": OUTCOMES,
+        "outcomes": OUTCOMES,
         "situations": [_situation(situation, out) for situation in situations],
     }
 
