@@ -12,6 +12,8 @@ METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform")
 """The methods that are compared."""
 SITUATIONS = ("single", "double", "mixed")
 """The built-in scenarios that they are compared in."""
+
+
 @dataclass(frozen=True)
 class Case:
     """What tells the runs of one study apart.
