@@ -45,7 +45,7 @@ format: setup ## format all code
 bench: setup ## speed of worlds and learner on this machine, beside their peers; fills docs/performance.md
 	maturin develop --release --quiet --locked --extras dev,peers || \
 	{ echo "Without peers: they cannot be installed here."; maturin develop --release --quiet --locked --extras dev; }
-	cargo bench --quiet
+	cargo bench --quiet -p innerattn-benches
 	python benches/compare_envs.py
 	python benches/env_cost.py
 	python benches/fault_cost.py
