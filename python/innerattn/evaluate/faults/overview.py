@@ -16,6 +16,7 @@ class KindOverview:
 
     Attributes:
         kind: of the fault.
+        rescues: per episode with a fault from the start, mean over severities and robots.
         retention: mean over severities, robots and onsets.
         by_severity: of a fault from the start, mean over robots; NaN where there is none.
         worst_robot: the robot whose worst fault costs most.
@@ -26,6 +27,7 @@ class KindOverview:
     """
 
     kind: str
+    rescues: Estimate
     retention: Estimate
     by_severity: tuple[float, ...]
     worst_robot: str
@@ -41,11 +43,13 @@ class Overview:
 
     Attributes:
         rescues: per episode, without a fault.
+        rescues_with_fault: per episode with a fault from the start, mean over the kinds.
         kinds: by kind of fault.
         retention: mean over the kinds.
     """
 
     rescues: Estimate
+    rescues_with_fault: Estimate
     kinds: tuple[KindOverview, ...]
     retention: Estimate
 
@@ -53,13 +57,15 @@ class Overview:
 def overview(grid: Grid, found: Retention) -> Overview:
     """The numbers of one policy."""
     areas = found.by_kind()
-    early, late = found.early.mean((1, 2)), found.late.mean((1, 2))
+    rescues = found.rescues_by_kind
+    early, late = (part.retention.mean((1, 2)) for part in (found.early, found.late))
     kinds = []
     for k, kind in enumerate(grid.kinds):
         robot, worst = worst_robot(grid, found, k)
         kinds.append(
             KindOverview(
                 kind=kind,
+                rescues=rescues[k].estimate(),
                 retention=areas[k].estimate(),
                 by_severity=tuple(found.cells.value[k, :, :, 0].mean(1).tolist()),
                 worst_robot=robot,
@@ -69,7 +75,12 @@ def overview(grid: Grid, found: Retention) -> Overview:
                 change=(late[k] - early[k]).estimate(),
             )
         )
-    return Overview(found.clean.estimate(), tuple(kinds), areas.mean(0).estimate())
+    return Overview(
+        rescues=found.clean.estimate(),
+        rescues_with_fault=rescues.mean(0).estimate(),
+        kinds=tuple(kinds),
+        retention=areas.mean(0).estimate(),
+    )
 
 
 def weight_without_fault(found: KindShift) -> float:
