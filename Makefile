@@ -4,11 +4,15 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 RUST := Cargo.toml Cargo.lock $(shell find rust_env -name '*.rs' -o -name Cargo.toml)
+CONSTRAINTS ?= constraints.txt
 TRAIN ?= --preset mixed --method td-inner --budget quick
 export VIRTUAL_ENV := $(CURDIR)/$(VENV)
+export PIP_CONSTRAINT := $(if $(CONSTRAINTS),$(CURDIR)/$(CONSTRAINTS))
+export PIP_QUIET := 1
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train test test-slow lint format bench docs setup clean
+.PHONY: train test test-pool test-slow lint format bench lock docs setup clean
 
 train: setup ## train TD-innerATT on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -17,7 +21,10 @@ test: setup lint ## every check but the long one
 	cargo test --quiet --locked
 	pytest -n auto --dist worksteal
 
-test-slow: setup ## the long checks: ten million env-steps of contacts, compilers at their slowest
+test-pool: ## the pool of threads under every order of events that the memory model allows
+	RUSTFLAGS='--cfg loom' cargo test --quiet --locked --target-dir target/loom -p innerattn-pool
+
+test-slow: setup test-pool ## the long checks: ten million env-steps of contacts, compilers at their slowest
 	INNERATTN_SLOW=1 cargo test --quiet --test worlds containment
 	pytest -m slow
 
@@ -36,8 +43,8 @@ format: setup ## format all code
 	ruff format
 
 bench: setup ## speed of worlds and learner on this machine, beside their peers; fills docs/performance.md
-	PIP_QUIET=1 maturin develop --release --quiet --locked --extras dev,peers || \
-	{ echo "Without peers: they cannot be installed here."; PIP_QUIET=1 maturin develop --release --quiet --locked --extras dev; }
+	maturin develop --release --quiet --locked --extras dev,peers || \
+	{ echo "Without peers: they cannot be installed here."; maturin develop --release --quiet --locked --extras dev; }
 	cargo bench --quiet
 	python benches/compare_envs.py
 	python benches/env_cost.py
@@ -46,17 +53,24 @@ bench: setup ## speed of worlds and learner on this machine, beside their peers;
 
 setup: $(VENV)/.built ## environment and compiled module
 
-$(VENV)/.installed: pyproject.toml
+$(VENV)/.installed: pyproject.toml $(CONSTRAINTS)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "innerattn needs Python 3.11 or later; set PYTHON=... to choose one")'
 	@echo "Setting up $(VENV): a few minutes, most of it the download of PyTorch."
 	$(PYTHON) -m venv $(VENV)
-	pip install --quiet --disable-pip-version-check 'maturin>=1.10,<2'
+	pip install 'maturin>=1.10,<2'
 	@touch $@
 
 $(VENV)/.built: $(VENV)/.installed $(RUST)
 	@echo "Compiling the worlds."
-	PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --release --quiet --locked --extras dev
+	maturin develop --release --quiet --locked --extras dev
 	@touch $@
+
+lock: $(VENV)/.installed ## renew constraints.txt: the newest versions that pyproject.toml allows
+	PIP_CONSTRAINT= pip install --dry-run --ignore-installed --report $(VENV)/report.json '.[dev,peers]'
+	@python -c 'import json; found = json.load(open("$(VENV)/report.json"))["install"]; \
+	names = {one["metadata"]["name"].lower(): one["metadata"]["version"].partition("+")[0] for one in found}; \
+	names.pop("innerattn"); \
+	open("constraints.txt", "w").writelines(f"{name}=={names[name]}\n" for name in sorted(names))'
 
 docs: setup ## draw the pictures of the documentation
 	python docs/pictures.py

@@ -1,15 +1,17 @@
-"""Puts what `innerattn reproduce` made into the documentation: text, pictures, records of runs.
+"""Puts what `innerattn reproduce` made into the documentation: text, figures, tables, records.
 
 `python benches/reproduction.py STUDY` fills the places of STUDY's newest report: of budget `short`
 in `docs/reproduction.md`, of budget `paper` in `docs/paper_protocol.md`, and of the crossed design
-in `docs/crossed.md`. A page opens with the table of claims; the rest stands below. Its runs go to
-an archive in `docs/records`. It makes no figure.
+in `docs/crossed.md`. A page opens with what the report opens with; the rest stands below. Figures
+go to `docs/images`, the tables that a report links to a folder of the page in `docs/tables`, and
+its runs to an archive in `docs/records`. It makes no number and no figure.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import re
 import shutil
 import sys
@@ -19,21 +21,21 @@ from typing import Any
 from page import CROSSED, PAPER_PROTOCOL, REPRODUCTION, publish
 
 from innerattn.errors import InnerattnError
-from innerattn.experiments.archive import write_archive
+from innerattn.experiments.archive import FILE, read_archive, write_archive
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import read_run
 
 PLACES = {
-    ("report.md", "short"): (REPRODUCTION, "reproduction"),
-    ("report.md", "paper"): (PAPER_PROTOCOL, "paper-protocol"),
-    ("crossed.md", "short"): (CROSSED, "reproduction"),
+    ("report.md", "short"): (REPRODUCTION, "reproduction-"),
+    ("report.md", "paper"): (PAPER_PROTOCOL, "paper-protocol-"),
+    ("crossed.md", "short"): (CROSSED, ""),
 }
-"""Where a report goes by its budget, and how the names of its pictures begin."""
+"""Where a report goes by its budget, and how the names of its figures begin."""
 DOCS = REPRODUCTION.parent
 
 
 def main() -> None:
-    """Copy the pictures, the report, a level of headings deeper, and the records."""
+    """Copy the report, its figures and tables, and the records."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("study", type=Path, help="folder of the study")
     study = parser.parse_args().study
@@ -48,34 +50,55 @@ def main() -> None:
             f"{study}: last made {account['target']} of budget {account['budget']!r}, for which no "
             "page has a place, or was interrupted; make all or crossed"
         )
-    page, pictures = place
+    page, figures = place
     try:
         _archive(account["runs"], study, DOCS / "records" / f"{page.stem}.parquet")
     except InnerattnError as error:
         sys.exit(str(error))
-    claims, full = _with_pictures(study / name, pictures).split("\n### ", 1)
-    publish("claims", claims.strip(), page)
-    publish("report", f"### {full}", page)
+    publish_report(study / name, page, figures)
 
 
-def _with_pictures(report: Path, prefix: str) -> str:
-    """A report as part of a page; its pictures are copied to where the page shows them."""
-    text = report.read_text()
-    for name in re.findall(r"\]\(([^)]+)\.png\)", text):
-        target = DOCS / "images" / f"{prefix}-{name}"
-        for kind in (".png", ".pdf"):
-            shutil.copyfile(report.with_name(f"{name}{kind}"), target.with_suffix(kind))
-        text = text.replace(f"({name}.png)", f"(images/{target.name}.png)")
-    return re.sub("^#", "##", text, flags=re.MULTILINE).strip()
+def publish_report(report: Path, page: Path, figures: str) -> None:
+    """Put a report into its page, and copy what it links."""
+    summary, details = sections(report.read_text(), page, figures)
+    for name in re.findall(r"\]\(([^)/]+)\)", report.read_text()):
+        target = DOCS / links(f"({name})", page, figures).strip("()")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        suffixes = (".png", ".pdf") if target.suffix == ".png" else (target.suffix,)
+        for suffix in suffixes:
+            source = (report.parent / name).with_suffix(suffix)
+            shutil.copyfile(source, target.with_suffix(suffix))
+    publish("summary", summary, page)
+    publish("details", details, page)
+
+
+def sections(report: str, page: Path, figures: str) -> tuple[str, str]:
+    """What a page opens with and what stands below, without the report's own title."""
+    opening, details = links(report, page, figures).split("\n## ", 1)
+    return opening.split("\n", 1)[1].strip(), f"## {details.strip()}"
+
+
+def links(text: str, page: Path, figures: str) -> str:
+    """A text whose links go to where a page keeps figures and tables."""
+    text = re.sub(r"\(([\w-]+\.png)\)", rf"(images/{figures}\1)", text)
+    return re.sub(r"\(([\w-]+\.(?:md|csv))\)", rf"(tables/{page.stem}/\1)", text)
 
 
 def _archive(runs: list[dict[str, Any]], study: Path, path: Path) -> None:
     """Write the runs that a report is made of into one file."""
+    archive = study / FILE
+    archived = read_archive(archive) if os.path.lexists(archive) else []
+    by_name = {run.folder.name: run for run in archived}
     finished = []
     for run in runs:
-        if run["state"] == "finished":
-            case = Case(run["situation"], run["method"], run["seed"], run["variant"])
-            finished.append(read_run(case, study / run["folder"], steps=False))
+        if run["state"] != "finished":
+            continue
+        folder = study / run["folder"]
+        case = Case(run["situation"], run["method"], run["seed"], run["variant"])
+        if os.path.lexists(folder):
+            finished.append(read_run(case, folder, steps=False))
+        else:
+            finished.append(by_name[folder.name])
     write_archive(finished, path)
 
 

@@ -4,11 +4,12 @@
 use std::iter::zip;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use innerattn_pool::Pool;
+
 use crate::error::{Error, Result};
 use crate::fault::{Levels, NUM_KINDS, SPECS};
 use crate::geometry::Vec2;
 use crate::physics::Workspace;
-use crate::pool::Pool;
 use crate::reward::NUM_COMPONENTS;
 use crate::robot::{Commands, NUM_ACTIONS};
 use crate::rules::Rules;

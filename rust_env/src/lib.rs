@@ -34,6 +34,4 @@ pub mod world;
 
 pub mod snapshot;
 
-pub mod pool;
-
 pub mod batch;

@@ -104,11 +104,11 @@ def test_a_run_without_attention_shows_none(
 
 def test_wrong_values(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "empty").mkdir()
-    shutil.copytree(run_dir, tmp_path / "small", ignore=shutil.ignore_patterns("checkpoints"))
+    shutil.copytree(run_dir, tmp_path / "without", ignore=shutil.ignore_patterns("checkpoints"))
     cases = [
         (["nobody"], "nobody: neither a run's folder nor one of random, greedy, hungarian"),
         ([str(tmp_path / "empty")], f"{tmp_path / 'empty' / 'run.json'}: missing"),
-        ([str(tmp_path / "small")], f"{tmp_path / 'small'}: was kept without its weights"),
+        ([str(tmp_path / "without")], f"{tmp_path / 'without'}: holds no checkpoint yet"),
         (["random", "--json", str(tmp_path)], f"{tmp_path}: is a folder; must be a file"),
         (["random", "--episodes", "0"], "evaluate.episodes = 0: must be greater"),
         (["random", "--episode-steps", "0"], "scenario.episode_steps = 0: must be"),

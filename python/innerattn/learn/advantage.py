@@ -79,6 +79,10 @@ class ReturnScale:
         self.mean += apart * added / (self.count + added)
         self.count += added
 
+    def tensors(self) -> dict[str, Tensor]:
+        """Live tensors by name, to be saved."""
+        return {"count": self.count, "mean": self.mean, "squares": self.squares}
+
     def std(self, floor: float) -> Tensor:
         """(R,) float64, the standard deviation, at least ``floor``."""
         return (self.squares / self.count.clamp_min(1.0)).sqrt().clamp_min(floor)

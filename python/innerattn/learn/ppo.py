@@ -267,9 +267,4 @@ class PPO(ActorCritic):
         return q.squeeze(1)
 
     def _running(self) -> dict[str, Tensor]:
-        scale = self.scale
-        return {
-            "scale.count": scale.count,
-            "scale.mean": scale.mean,
-            "scale.squares": scale.squares,
-        }
+        return {f"scale.{name}": tensor for name, tensor in self.scale.tensors().items()}

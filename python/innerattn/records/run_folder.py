@@ -38,9 +38,13 @@ class RunInfo:
     updates: int
     seconds: float
     compiled: bool = False
-    products: str = "default"
+    matmul_backend: str = "default"
     warm_start: str = "none"
     weights_sha256: str | None = None
+
+
+_FORMER_KEYS = {"products": "matmul_backend"}
+"""Keys of a ``run.json`` by the names that they had in older ones."""
 
 
 def run_info(document: Any) -> RunInfo:
@@ -50,8 +54,9 @@ def run_info(document: Any) -> RunInfo:
         ValueError: it is not the record of a run, or of another version.
     """
     try:
-        info = RunInfo(**document)
-    except TypeError as error:
+        renamed = {_FORMER_KEYS.get(key, key): value for key, value in document.items()}
+        info = RunInfo(**renamed)
+    except (TypeError, AttributeError) as error:
         raise ValueError("not the record of a run") from error
     if info.schema_version != SCHEMA_VERSION:
         raise ValueError(f"schema version {info.schema_version}, only {SCHEMA_VERSION} is known")

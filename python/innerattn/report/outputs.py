@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from innerattn.experiments.paper.findings import PARTS
 from innerattn.experiments.run import FinishedRun
 from innerattn.report.crossed.write import FILES as CROSSED_FILES
 from innerattn.report.crossed.write import write_crossed
-from innerattn.report.paper.write import PARTS, write_report
+from innerattn.report.paper.write import FILES as PAPER_FILES
+from innerattn.report.paper.write import REPORT, write_report
 
-_MADE = {
-    "table2": ("table2.csv", "table2.json", "table2.md"),
-    "fig4": ("fig4.csv", "fig4.json", "fig4.pdf", "fig4.png"),
-    "fig5": tuple(f"fig5{part}.{x}" for part in ("", "_evidence") for x in ("json", "pdf", "png")),
-    "crossed": CROSSED_FILES,
-}
-"""The files of each target but the report."""
+FILES = {**PAPER_FILES, "crossed": CROSSED_FILES}
+"""The files of each target, besides `REPORT` of all but the crossed design."""
 
 
 def make_outputs(
@@ -39,8 +36,8 @@ def make_outputs(
         OSError: a file cannot be written or removed.
     """
     parts = PARTS if target == "all" else (target,)
-    report = [] if target == "crossed" else [out / "report.md"]
-    files = report + [out / name for part in parts for name in _MADE[part]]
+    report = () if target == "crossed" else REPORT
+    files = [out / name for name in (*report, *(name for part in parts for name in FILES[part]))]
     if not runs:
         for path in files:
             path.unlink(missing_ok=True)

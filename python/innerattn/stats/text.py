@@ -25,6 +25,11 @@ def format_number(value: float, decimals: int = 2) -> str:
     return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
+def format_signed(value: float, decimals: int = 2) -> str:
+    """A number with its sign, and never as minus zero."""
+    return f"{round(value, decimals) + 0.0:+.{decimals}f}"
+
+
 def format_p(value: float | None) -> str:
     """A p-value."""
     if value is None:

@@ -46,7 +46,7 @@ class RunFolder:
         config: RunConfig,
         threads: int,
         compiled: bool = False,
-        products: str = "default",
+        matmul_backend: str = "default",
     ) -> RunFolder:
         """Make the folder at ``path``; it appears with its files or not at all.
 
@@ -61,7 +61,7 @@ class RunFolder:
             commit=_commit(),
             threads=threads,
             compiled=compiled,
-            products=products,
+            matmul_backend=matmul_backend,
             device=config.train.device,
             state="running",
             env_steps=0,

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from innerattn.experiments.paper.claims import (
+    EVEN_WITH,
+    MORE_EVEN,
+    UNEVEN_WITHOUT,
     Holds,
     entropy_claims,
     handoff_is_own,
@@ -52,7 +55,7 @@ def claims_of(**shares: list[tuple[float, ...]]) -> dict[tuple[str, str], Holds]
         rows += [made_row(method, f"task_{index}", task) for index, task in enumerate(tasks, 1)]
         beside.append(made_competence(method, np.abs(np.array(tasks) - 0.5).mean(0).tolist()))
     found = sharing_claims(Table2(tuple(rows), tuple(beside)))
-    return {(claim.claim.split()[0], claim.method): claim.holds for claim in found}
+    return {(claim.claim, claim.method): claim.holds for claim in found}
 
 
 def test_a_task_is_judged_by_its_runs_and_not_by_their_mean_alone() -> None:
@@ -75,15 +78,15 @@ def test_claims_about_sharing() -> None:
         td_inner=[EVEN, EVEN], td_uniform=[UNEVEN, UNEVEN], ppo_inner=[EVEN, UNEVEN], mappo=[EVEN]
     )
     assert found == {
-        ("even", "td-inner"): "yes",
-        ("more", "td-inner, td-uniform"): "yes",
-        ("uneven", "td-uniform"): "yes",
-        ("even", "ppo-inner"): "no",
+        (EVEN_WITH, "td-inner"): "yes",
+        (MORE_EVEN, "td-inner"): "yes",
+        (UNEVEN_WITHOUT, "td-uniform"): "yes",
+        (EVEN_WITH, "ppo-inner"): "no",
     }
     found = claims_of(td_inner=[EVEN, EVEN], td_uniform=[EVEN, UNEVEN])
-    assert found["uneven", "td-uniform"] == "no"
+    assert found[UNEVEN_WITHOUT, "td-uniform"] == "no"
     found = claims_of(td_inner=[EVEN, EVEN], td_uniform=[(0.52, 0.5, 0.48), (0.5, 0.49, 0.51)])
-    assert found["more", "td-inner, td-uniform"] == "no"
+    assert found[MORE_EVEN, "td-inner"] == "no"
     found = claims_of(td_inner=[(0.5,), (0.5,)], td_uniform=[(0.8,), (0.8,)])
     assert set(found.values()) == {"undecided"}
 

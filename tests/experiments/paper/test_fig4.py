@@ -31,7 +31,7 @@ def test_means_and_bands_against_plain_loops(
     runs: list[FinishedRun], courses: list[EntropyCourse]
 ) -> None:
     course, tables = courses[0], [logged(run) for run in runs[:3]]
-    mean, by_robot, by_head = course.mean(), course.by_robot(), course.by_head()
+    mean, by_robot, by_head = course.mean(), course.by_robot(), course.end_by_head()
     for t in range(len(course.env_steps)):
         lines = [table[t]["attention_entropy"] for table in tables]
         assert [table[t]["env_steps"] for table in tables] == [course.env_steps[t]] * 3
@@ -43,8 +43,9 @@ def test_means_and_bands_against_plain_loops(
         for r, robot in enumerate(("food_0", "food_1", "navigation_0", "medical_0")):
             own = np.array([line[robot] for line in lines])
             assert by_robot.mean[t, r] == pytest.approx(own.mean())
-            assert by_head[t, r] == pytest.approx(own.mean(0))
-    assert course.begin.mean == pytest.approx(mean.mean[0])  # a tenth of 12 lines is one
+            if t == len(course.env_steps) - 1:  # a tenth of 12 lines is one
+                assert by_head[:, r] == pytest.approx(own[[1, 2, 0]])  # seeds in order
+    assert course.begin.mean == pytest.approx(mean.mean[0])
     assert course.end.mean == pytest.approx(mean.mean[-1])
     assert course.change.mean == pytest.approx(mean.mean[-1] - mean.mean[0])
 
@@ -57,30 +58,42 @@ def test_only_attention_that_chooses_is_drawn(courses: list[EntropyCourse]) -> N
         ("ppo-inner", (0,), True),
     ]
     lines = fig4_lines(courses)
-    assert [line.label for line in lines] == ["td-inner (3 runs, 95 %)", "ppo-inner (1 run)"]
+    assert [line.runs for line in lines] == ["3 runs, band: 95 %", "1 run"]
 
 
-def test_the_figure_has_a_column_for_each_situation(courses: list[EntropyCourse]) -> None:
-    figure = draw_entropy(fig4_lines(courses), PRINTED_NATS)
-    shown = [panel for panel in figure.axes if panel.axison]
-    assert [panel.get_title() for panel in figure.axes if not panel.axison] == ["", ""]
-    upper = shown[:2]
-    assert [panel.get_title() for panel in shown[2:]] == [
-        "td-inner by robot; thin: its heads",
-        "ppo-inner by robot; thin: its heads",
+def test_the_figure_has_a_panel_for_each_situation_and_method(
+    courses: list[EntropyCourse],
+) -> None:
+    lines = fig4_lines(courses)
+    figure = draw_entropy(lines, PRINTED_NATS)
+    drawn = [panel for panel in figure.axes if panel.axison]
+    assert [panel.get_title() for panel in drawn] == [
+        "mixed, td-inner\n3 runs, band: 95 %",
+        "single, ppo-inner\n1 run",
     ]
-    assert [panel.get_title() for panel in upper] == ["mixed", "single"]
-    assert figure.axes[0].get_ylabel() == "entropy of attention [nats]"
-    assert {panel.get_xlabel() for panel in shown} == {"training [1,000 env-steps]"}
-    for panel in shown:
-        levels = [line.get_ydata()[0] for line in panel.lines if len(line.get_ydata()) == 2]
-        assert levels == pytest.approx([math.log(3), PRINTED_NATS])
-        (right,) = panel.child_axes
-        assert right.get_ylabel() in ("", "exp(entropy) [teammates]")
-    assert [len(panel.collections) for panel in shown] == [1, 0, 4, 0]  # a single run has no band
+    assert {panel.get_xlabel() for panel in drawn} == {"training [1,000 env-steps]"}
+    assert [len(panel.collections) for panel in drawn] == [1, 0]  # a single run has no band
+    for panel, line in zip(drawn, lines, strict=True):
+        by_length: dict[int, list[np.ndarray]] = {}
+        for one in panel.lines:
+            by_length.setdefault(len(one.get_xdata()), []).append(np.asarray(one.get_ydata()))
+        courses_drawn = by_length[len(line.env_steps)]
+        assert np.array_equal(courses_drawn[-1], line.mean[0])
+        assert np.array_equal(courses_drawn[:-1], line.by_robot.T)
+        runs, robots, heads = line.heads.shape
+        strips = [one for one in panel.lines if one.get_marker() == "o"]
+        assert [len(one.get_ydata()) for one in strips] == [runs * heads] * robots
+        last = line.env_steps[-1] / 1000.0
+        assert all(min(one.get_xdata()) > last for one in strips)  # heads lie upon no course
+        levels = [ends[0] for ends in by_length[2] if ends[0] == ends[1]]
+        assert levels[-2:] == pytest.approx([math.log(3), PRINTED_NATS])
+        assert max(panel.get_xticks()) <= 1.001 * last
+        low, high = panel.get_ylim()
+        assert low < min(line.heads.min(), line.by_robot.min())
+        assert high > math.log(3)
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.texts] == [
-        *("food_0", "food_1", "navigation_0", "medical_0")
+        *("food_0", "food_1", "navigation_0", "medical_0", "mean over robots")
     ]
 
 

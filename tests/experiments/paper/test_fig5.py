@@ -127,7 +127,7 @@ def test_a_run_without_handoffs_does_not_count(inner: list[FinishedRun]) -> None
     assert found.own_part == of_two.own_part
     (line,), (expected,) = evidence_lines([found]), evidence_lines([of_two])
     assert line.runs == expected.runs
-    assert line.runs.startswith("2 runs (least to largest)")
+    assert line.runs.startswith("2 runs, band: least to largest")
     assert (line.robot == expected.robot).all()
     assert {claim.runs for claim in handoff_claims([found])} == {2}
 
@@ -180,7 +180,7 @@ def test_the_scene_is_drawn_as_panels_a_b_and_c(inner: list[FinishedRun]) -> Non
 
 def test_all_handoffs_are_drawn_with_their_control(found: Evidence) -> None:
     (line,) = lines = evidence_lines([found])
-    assert line.runs == f"3 runs (95 %), {sum(found.handoffs)} handoffs"
+    assert line.runs == f"3 runs, band: 95 %, {sum(found.handoffs)} handoffs"
     figure = draw_aligned(lines)
     (panel,) = figure.axes
     assert panel.get_xlabel() == "steps since the first rescue [0.1 s]"

@@ -7,19 +7,19 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from markdown_rows import rows_of
 
 from innerattn.config import read_toml
 from innerattn.errors import RunError
+from innerattn.experiments.paper.claims import CLAIMS
 from innerattn.experiments.run import FinishedRun, read_run, refuse_unlike
 from innerattn.experiments.smoke import smoke_note
-from innerattn.report.paper.write import write_report
+from innerattn.report.paper.write import FILES, REPORT, write_report
+from innerattn.stats.text import NONE, format_estimate
 from innerattn.train.weights import digest_of
 
 FIGURES = ("fig4", "fig5", "fig5_evidence")
-FILES = {
-    *(f"{name}.{kind}" for name in FIGURES for kind in ("json", "pdf", "png")),
-    *("table2.json", "table2.md", "table2.csv", "fig4.csv", "report.md"),
-}
+ALL = {*REPORT, *(name for of_part in FILES.values() for name in of_part)}
 
 
 @pytest.fixture(scope="module")
@@ -32,9 +32,9 @@ def folder(runs: list[FinishedRun], tmp_path_factory: pytest.TempPathFactory) ->
 def test_all_files_are_written_and_the_same_twice(
     runs: list[FinishedRun], folder: Path, tmp_path: Path
 ) -> None:
-    assert {path.name for path in folder.iterdir()} == FILES
+    assert {path.name for path in folder.iterdir()} == ALL
     write_report(runs, tmp_path, "quick")
-    for name in FILES:
+    for name in ALL:
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes(), name
     title = json.loads((folder / "fig5.json").read_text())["title"]
     assert title.startswith("mixed, td-inner, seed 0")  # the first of those that are preferred
@@ -43,21 +43,63 @@ def test_all_files_are_written_and_the_same_twice(
         assert json.loads(path.read_text())["schema_version"] == version
 
 
-def test_the_report_opens_with_claims_and_ends_with_the_runs(
-    runs: list[FinishedRun], folder: Path
-) -> None:
+def test_the_report_opens_with_one_row_for_each_claim(folder: Path) -> None:
     text = (folder / "report.md").read_text()
-    assert text.index("| claim |") < text.index("## Table II") < text.index("## Fig. 4")
-    mixed, others = text.split("## The same in the other situations")
-    assert "| even sharing with inner attention | mixed | td-inner |" in mixed
-    assert "| even sharing with inner attention | single | ppo-inner | – |" in others  # not printed
+    opening = text.split("\n## ")[0]
+    rows = rows_of(opening)
+    assert rows[0][:3] == ["claim", "paper", "measured, mixed"]
+    assert [row[0] for row in rows[1:]] == list(CLAIMS)
+    assert rows[0][3:] == ["holds in mixed?", "holds in single?"]
+    assert "6 runs, budget `quick`, seeds 0 to 2." in opening
+    assert len(text.split()) < 2_500
+
+
+def test_all_else_is_linked(runs: list[FinishedRun], folder: Path) -> None:
+    text = (folder / "report.md").read_text()
+    linked = {name for name in ALL if f"({name})" in text}
+    drawn = {f"{name}.png" for name in FIGURES}
+    assert linked == drawn | {
+        "claims.md",
+        "table2.md",
+        "table2.csv",
+        "fig5_evidence.md",
+        "runs.csv",
+    }
+    lines = {row["folder"]: row for row in _table(folder / "runs.csv")}
     for run in runs:
-        assert f"`{run.folder}`" in text
-        assert f"`{read_toml(run.folder / 'config.toml').digest()}`" in text
-        assert f"`{digest_of(run.folder / 'checkpoints/0/weights.safetensors')}`" in text
-    for name in FIGURES:
-        assert f"({name}.png)" in text
-    assert (folder / "table2.md").read_text().split("\n\n", 1)[1] in text  # but for the note
+        row = lines[str(run.folder)]
+        assert (row["method"], row["seed"]) == (run.method, str(run.seed))
+        assert row["config_sha256"] == read_toml(run.folder / "config.toml").digest()
+        weights = run.folder / "checkpoints/0/weights.safetensors"
+        assert row["weights_sha256"] == digest_of(weights)
+
+
+def test_every_claim_is_there_in_full(runs: list[FinishedRun], tmp_path: Path) -> None:
+    findings = write_report(runs, tmp_path, "short")
+    rows = rows_of((tmp_path / "claims.md").read_text())[1:]
+    mixed, single = rows.index(["**mixed**", *[""] * 5]), rows.index(["**single**", *[""] * 5])
+    assert mixed < single
+    for claim in findings.claims:
+        row = [claim.claim, claim.method, claim.printed, claim.measured, str(claim.runs)]
+        place = rows.index([*row, f"**{claim.holds}**"])
+        assert (place > single) == (claim.situation == "single")
+        assert claim.situation == "mixed" or claim.printed == NONE
+    assert len(rows) == len(findings.claims) + 2
+
+
+def test_every_run_has_its_handoffs(runs: list[FinishedRun], tmp_path: Path) -> None:
+    findings = write_report(runs, tmp_path, "short")
+    assert findings.evidence is not None
+    rows = rows_of((tmp_path / "fig5_evidence.md").read_text())[1:]
+    part = findings.evidence[0]
+    own = [row for row in rows if row[:2] == [part.situation, part.method]]
+    assert [row[2] for row in own] == [*map(str, part.seeds)]
+    for row, used, left in zip(own, part.handoffs, part.left_out, strict=True):
+        assert row[3] == f"{used} of {used + left}"
+    (mean,) = [row for row in rows if row[2] == "mean [95 %]"]
+    assert mean[0] == f"**{part.situation}**"
+    assert mean[5] == format_estimate(part.robot["to_be"].change)
+    assert mean[8] == format_estimate(part.ceiling)
 
 
 def test_every_file_of_a_smoke_run_says_so(
@@ -65,7 +107,7 @@ def test_every_file_of_a_smoke_run_says_so(
 ) -> None:
     write_report(runs, tmp_path, "short")
     note = smoke_note("quick") or ""
-    for name in FILES:
+    for name in ALL:
         smoke, other = (of / name for of in (folder, tmp_path))
         if smoke.suffix in (".pdf", ".png"):
             assert smoke.read_bytes() != other.read_bytes()
@@ -75,6 +117,10 @@ def test_every_file_of_a_smoke_run_says_so(
     assert {row[-1] for row in _rows(folder / "table2.csv")[1:]} == {note}
     for name in ("table2.csv", "fig4.csv"):
         assert [row[:-1] for row in _rows(folder / name)] == _rows(tmp_path / name)
+
+
+def _table(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(path.read_text().splitlines()))
 
 
 def _rows(path: Path) -> list[list[str]]:
@@ -87,29 +133,24 @@ def test_runs_within_the_study_are_named_from_there(
     run = runs[0]
     inside = tmp_path / "runs" / "one"
     shutil.copytree(run.folder, inside)
-    findings = write_report([replace(run, folder=inside)], tmp_path, "short", ("table2",))
-    assert findings.folder == tmp_path
-    text = (tmp_path / "report.md").read_text()
-    assert "| `runs/one` |" in text
-    assert str(tmp_path) not in text
+    write_report([replace(run, folder=inside)], tmp_path, "short", ("table2",))
+    assert [row["folder"] for row in _table(tmp_path / "runs.csv")] == ["runs/one"]
+    assert str(tmp_path) not in (tmp_path / "runs.csv").read_text()
 
 
 def test_parts_can_be_asked_for_alone(runs: list[FinishedRun], tmp_path: Path) -> None:
     findings = write_report(runs[3:5], tmp_path, "short", ("table2", "fig4"))
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {
-        "report.md",
-        "fig4.json",
-        "fig4.csv",
-        *(f"table2.{x}" for x in ("json", "md", "csv")),
-    }
+    assert names == {*REPORT, *FILES["table2"], "fig4.json", "fig4.csv"}
     text = (tmp_path / "report.md").read_text()
     assert "smoke run" not in text
     assert "Fig. 5:" not in text
     write_report(runs[3:5], tmp_path, "short", ("fig4",))  # attention that is even
-    assert "There is no mixed run" not in (tmp_path / "report.md").read_text()
+    nothing = "What was asked for decides no claim."
+    assert all(nothing in (tmp_path / name).read_text() for name in ("report.md", "claims.md"))
+    assert "No run has attention that chooses." in (tmp_path / "report.md").read_text()
     write_report(runs[5:], tmp_path, "short", ("fig4",))
-    assert "There is no mixed run" in (tmp_path / "report.md").read_text()
+    assert "| claim | paper | measured, single |" in (tmp_path / "report.md").read_text()
     assert findings.evidence is None
     with pytest.raises(ValueError, match=r"parts = \['fig6'\]: known are table2, fig4, fig5"):
         write_report(runs, tmp_path, "short", ("fig6",))
@@ -118,11 +159,11 @@ def test_parts_can_be_asked_for_alone(runs: list[FinishedRun], tmp_path: Path) -
 def test_a_figure_that_is_not_drawn_leaves_none_of_other_runs(
     runs: list[FinishedRun], folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("innerattn.report.paper.write.choose_scene", lambda _: None)
+    monkeypatch.setattr("innerattn.experiments.paper.findings.choose_scene", lambda _: None)
     shutil.copytree(folder, tmp_path / "study")
     write_report(runs[3:5], tmp_path / "study", "short")  # attention that is even
     gone = {f"{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")} | {"fig5.json"}
-    assert {path.name for path in (tmp_path / "study").iterdir()} == FILES - gone
+    assert {path.name for path in (tmp_path / "study").iterdir()} == ALL - gone
 
 
 def test_it_is_said_where_all_seeds_were_measured_in_the_same_worlds(
@@ -144,11 +185,10 @@ def test_it_is_said_where_all_seeds_were_measured_in_the_same_worlds(
 
 def test_both_attentions_are_compared_where_both_are_there(folder: Path) -> None:
     text = (folder / "report.md").read_text()
-    compared = text.split("## Learnt attention beside uniform weights")[1].split("## Is evenness")[
-        0
-    ]
-    assert compared.count("| mixed | td | score | 0, 1 |") == 1
-    assert "| single |" not in compared  # has learnt attention only
+    compared = text.split("## Learnt attention beside uniform")[1].split("## ")[0]
+    rows = [row[:4] for row in rows_of(compared)]
+    assert ["mixed", "TD", "score", "2"] in rows
+    assert all(row[0] != "single" for row in rows)  # has learnt attention only
 
 
 def test_runs_with_and_without_a_warm_start_are_not_one_method(

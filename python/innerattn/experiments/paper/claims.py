@@ -16,9 +16,19 @@ from innerattn.experiments.paper.fig5 import Evidence
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION
 from innerattn.measures.sharing.evenness import MARGIN
 from innerattn.stats import Estimate
-from innerattn.stats.text import NONE, format_estimate
+from innerattn.stats.text import NONE, format_estimate, format_number, format_signed
 
 Holds = Literal["yes", "no", "undecided"]
+
+EVEN_WITH = "inner attention shares work evenly"
+UNEVEN_WITHOUT = "uniform attention shares work unevenly"
+MORE_EVEN = "inner attention is more even than uniform"
+ENDS_BELOW = "entropy ends below that of uniform attention"
+FALLS = "entropy falls in training"
+MOVES = "attention moves to the next partner"
+MOVES_MORE = "attention moves more than the bystander's"
+CLAIMS = (EVEN_WITH, UNEVEN_WITHOUT, MORE_EVEN, ENDS_BELOW, FALLS, MOVES, MOVES_MORE)
+"""All claims in the order of tables."""
 
 LEAST_PAIRS = 3
 """Two methods are compared over so many seeds that have a run of each, or not at all."""
@@ -33,36 +43,35 @@ EVEN_ENTROPY = 1.0 - ENTROPY_MARGIN
 """Attention whose entropy is a larger share of ln(N - 1) than this counts as even."""
 
 RULES = f"""\
-A claim is undecided for a method with less than two runs. Intervals are Student's 95 % over runs,
-also where they reach beyond what is possible (a share above 1, an imbalance below 0). Every claim
-is judged by itself at 5 %; nothing is adjusted for their number.
-
-- *A task is shared* evenly where the runs' mean share is (its 90 % interval lies within {MARGIN[0]}
-  to {MARGIN[1]}) and no run is uneven by itself; unevenly where the mean share is (its 95 %
-  interval lies outside) or more than half of the runs are uneven by themselves; else, and where a
-  run has no rescue of the task, it is undecided. Sharing is judged over all episodes.
-- **Even with inner attention**: yes where all tasks are shared evenly, no where one is shared
-  unevenly. **Uneven without**: yes where all tasks are shared unevenly, no where one is evenly.
-- **More even with than without**: by the share's distance from 0.5, averaged over tasks, with minus
-  without. Runs of one seed begin alike and are measured in the same worlds, so each seed gives one
-  difference; {LEAST_PAIRS} at least. Yes where the interval lies below 0; no where it lies above 0,
-  or where two one-sided tests show the difference to be within ±{0.5 - MARGIN[0]:.1f}; smaller
-  differences are not ruled out by that. Where the distance without is itself below that, such a no
-  refutes a gain as large as the paper's, and nothing else.
-- **Entropy ends below that of even attention**: by the mean over robots, heads and the last tenth
-  of training, as a share of ln(N − 1). Yes where its interval lies below {EVEN_ENTROPY:g}, no where
-  it lies above.
-- **Entropy falls in training**: by the last minus the first tenth of the logged times. Yes where
-  its interval lies below 0 and its mean is a fall by {ENTROPY_MARGIN:g} ln(N − 1) or more; no where
-  the interval lies above such a fall. What happens before the first logged time is not in it.
-- **Attention moves to the next partner**: by the mean weight on the partner-to-be after the first
-  rescue minus that before. Yes where its interval lies above 0 and its mean is {LEAST_MOVE} or
-  more; no where its interval lies below {LEAST_MOVE}.
-- **…and does so for the robot that hands over**: by that change minus the change of the other food
-  robot, over the handoffs during which the other one rescues nobody. Yes where its interval lies
-  above 0 and its mean is at least half the change; no where the interval of that part minus half
-  the change lies below 0, so that most of the change is shared by the robot that takes no part;
-  only asked where attention moves.
+- **Runs.** A method with fewer than two runs decides nothing. Intervals are Student's 95 % over
+  runs, also where they reach impossible values, such as a share above 1. Each claim is tested by
+  itself at 5 %; nothing is adjusted for their number.
+- **A task is shared evenly** if the 90 % interval of the runs' mean share is within {MARGIN[0]} to
+  {MARGIN[1]} and no single run is uneven. It is shared **unevenly** if the 95 % interval of the
+  mean share is outside, or if more than half of the runs are uneven by themselves. Otherwise, and
+  if a run has no rescue of the task, it is undecided. All episodes of the standard length count.
+- **Inner attention shares work evenly**: yes if all tasks are shared evenly, no if one is shared
+  unevenly. **Uniform attention shares work unevenly**: yes if all tasks are shared unevenly, no if
+  one is shared evenly.
+- **Inner attention is more even than uniform**: the imbalance of inner minus uniform decides, seed
+  by seed, with at least {LEAST_PAIRS} seeds. Yes if its interval is below 0. No if it is above 0,
+  or if two one-sided tests put it within ±{0.5 - MARGIN[0]:.1f}. Such a no does not rule out
+  smaller gains. Where uniform attention is itself nearer to even than that, it refutes a gain as
+  large as the paper's and nothing else.
+- **Entropy ends below that of uniform attention**: the mean over robots, heads and the last tenth
+  of training decides, as a share of ln(N − 1). Yes if its interval is below {EVEN_ENTROPY:g}, no if
+  it is above.
+- **Entropy falls in training**: the last tenth of the logged times minus the first tenth decides.
+  Yes if its interval is below 0 and its mean falls by {ENTROPY_MARGIN:g} ln(N − 1) or more. No if
+  the interval is above such a fall. What happens before the first logged time does not count.
+- **Attention moves to the next partner**: the mean weight on the next partner after the first
+  rescue, minus that before, decides. Yes if its interval is above 0 and its mean is {LEAST_MOVE} or
+  more. No if the interval is below {LEAST_MOVE}.
+- **Attention moves more than the bystander's**: that change minus the change of the bystander
+  decides, the other food robot, over handoffs during which it rescues nobody. Yes if the interval
+  is above 0 and the mean is at least half the change. No if the interval of this difference minus
+  half the change is below 0: then the bystander shows most of the change, too. Asked only where
+  attention moves.
 """
 """How `Claim.holds` is found, in Markdown."""
 
@@ -75,8 +84,10 @@ class Claim:
         claim: in a few words.
         situation: of the worlds.
         method: of training.
-        printed: what the paper prints.
+        printed: what the paper prints; `NONE` in other situations than `PRINTED_SITUATION`.
+        printed_brief: the same in a word or two.
         measured: what the runs show.
+        brief: the same in one or two numbers.
         runs: how many.
         holds: by `RULES`.
     """
@@ -85,7 +96,9 @@ class Claim:
     situation: str
     method: str
     printed: str
+    printed_brief: str
     measured: str
+    brief: str
     runs: int
     holds: Holds
 
@@ -101,16 +114,18 @@ def entropy_claims(courses: Sequence[EntropyCourse]) -> list[Claim]:
         claims += [
             _claim(
                 course,
-                "entropy ends below that of even attention",
-                f"about {PRINTED_NATS} of {math.log(3):.2f} nats",
+                ENDS_BELOW,
+                (f"about {PRINTED_NATS} of {math.log(3):.2f} nats", f"{PRINTED_NATS} nats"),
                 f"{format_estimate(end)} of {even:.2f} nats",
+                f"{format_number(end.mean)} nats",
                 _decided(end, EVEN_ENTROPY * even),
             ),
             _claim(
                 course,
-                "entropy falls in training",
-                f"falls continually to about {PRINTED_NATS} nats",
+                FALLS,
+                (f"falls to about {PRINTED_NATS} nats", "falls"),
                 f"from {begin.mean:.2f} to {end.mean:.2f} nats: {format_estimate(change)}",
+                f"{format_signed(change.mean)} nats",
                 _falls(change, least_fall),
             ),
         ]
@@ -127,18 +142,20 @@ def handoff_claims(found: Sequence[Evidence]) -> list[Claim]:
         claims += [
             _claim(
                 part,
-                "attention moves to the next partner",
-                "rises on the next, falls on the one before",
-                f"on the next {format_estimate(change)}, "
-                f"on the one before {format_estimate(before)} ({sum(part.handoffs):,} handoffs)",
+                MOVES,
+                ("rises on the next partner, falls on the last", "rises"),
+                f"next partner {format_estimate(change)}, last partner {format_estimate(before)} "
+                f"({sum(part.handoffs):,} handoffs)",
+                format_signed(change.mean) if change else NONE,
                 moves,
             ),
             _claim(
                 part,
-                "…and does so for the robot that hands over",
-                "taken for granted",
-                f"{format_estimate(own)} more than the robot that takes no part "
-                f"({format_estimate(control)}), of at most {format_estimate(part.ceiling)}",
+                MOVES_MORE,
+                ("taken for granted", NONE),
+                f"{format_estimate(own)} more than the bystander ({format_estimate(control)}), "
+                f"of at most {format_estimate(part.ceiling)}",
+                format_signed(own.mean) if own else NONE,
                 handoff_is_own(part) if moves == "yes" else "undecided",
             ),
         ]
@@ -165,15 +182,23 @@ def handoff_is_own(found: Evidence) -> Holds:
 
 
 def _claim(
-    found: EntropyCourse | Evidence, claim: str, printed: str, measured: str, holds: Holds
+    found: EntropyCourse | Evidence,
+    claim: str,
+    printed: tuple[str, str],
+    measured: str,
+    brief: str,
+    holds: Holds,
 ) -> Claim:
     """A claim about a situation and method; the paper's words stand beside one situation only."""
+    known = found.situation == PRINTED_SITUATION
     return Claim(
         claim=claim,
         situation=found.situation,
         method=found.method,
-        printed=printed if found.situation == PRINTED_SITUATION else NONE,
+        printed=printed[0] if known else NONE,
+        printed_brief=printed[1] if known else NONE,
         measured=measured,
+        brief=brief,
         runs=found.end.runs if isinstance(found, EntropyCourse) else found.runs,
         holds=holds,
     )

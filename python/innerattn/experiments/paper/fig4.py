@@ -73,9 +73,12 @@ class EntropyCourse:
         """Over heads, (T, R)."""
         return seed_curve(self.nats.mean(3))
 
-    def by_head(self) -> Array:
-        """Mean over runs, (T, R, H)."""
-        return np.asarray(self.nats.mean(0))
+    def end_by_head(self) -> Array:
+        """Of every run, robot and head by itself, mean over the last tenth of the times, (N, R, H).
+
+        Heads have no order that is the same in two runs, so that a mean over runs says nothing.
+        """
+        return np.asarray(self.nats[:, -_part(len(self.env_steps)) :].mean(1))
 
     def to_json(self) -> dict[str, Any]:
         """As a JSON object."""
@@ -122,7 +125,7 @@ def _course(group: Sequence[FinishedRun]) -> EntropyCourse | None:
         raise RunError(f"{group[0].folder} and others: were never logged at the same env_steps")
     robots = tuple(tables[0][times[0]])
     nats = np.array([[list(table[t].values()) for t in times] for table in tables], np.float64)
-    part = max(1, len(times) // _PART)
+    part = _part(len(times))
     overall = nats.mean((2, 3))
     begin, end = overall[:, :part].mean(1), overall[:, -part:].mean(1)
     figures = [seed_estimate(values.tolist()) for values in (begin, end, end - begin)]
@@ -138,6 +141,11 @@ def _course(group: Sequence[FinishedRun]) -> EntropyCourse | None:
         end=last,
         change=change,
     )
+
+
+def _part(times: int) -> int:
+    """How many times the beginning and the end are."""
+    return max(1, times // _PART)
 
 
 def _entropies(run: FinishedRun) -> dict[int, dict[str, list[float]]]:

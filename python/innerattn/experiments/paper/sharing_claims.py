@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from innerattn.experiments.paper.claims import Claim, Holds
+from innerattn.experiments.paper.claims import (
+    EVEN_WITH,
+    MORE_EVEN,
+    UNEVEN_WITHOUT,
+    Claim,
+    Holds,
+)
 from innerattn.experiments.paper.pairs import Pair, pairs
 from innerattn.experiments.paper.printed import TEXT, PrintedRow
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import Verdict
 from innerattn.stats import Estimate
-from innerattn.stats.text import NONE, format_estimate
+from innerattn.stats.text import NONE, format_estimate, format_number, format_signed
 
 
 def sharing_claims(table: Table2) -> list[Claim]:
@@ -32,11 +38,16 @@ def sharing_claims(table: Table2) -> list[Claim]:
         wanted, other = ("even", "uneven") if inner else ("uneven", "even")
         claims.append(
             Claim(
-                claim="even sharing with inner attention" if inner else "uneven sharing without",
+                claim=EVEN_WITH if inner else UNEVEN_WITHOUT,
                 situation=situation,
                 method=method,
                 printed="; ".join(filter(None, map(_printed_share, own))) or NONE,
+                printed_brief=", ".join(
+                    format_number(row.printed.row.shares[0]) for row in own if row.printed
+                )
+                or NONE,
                 measured="; ".join(_measured_share(row) for row in own),
+                brief=", ".join(_share(row.scored) for row in own),
                 runs=len(own[0].seeds),
                 holds=_all_or_one(verdicts, wanted, other),
             )
@@ -62,9 +73,7 @@ def judged(row: Row) -> Verdict:
 def share_shown(sharing: Sharing) -> str:
     """The share of the first robot in all runs; without an interval where it has none."""
     whole = sharing.all
-    if whole.share is not None or not sum(whole.rescues):
-        return format_estimate(whole.share)
-    return f"{whole.rescues[0] / sum(whole.rescues):.2f}"
+    return format_estimate(whole.share) if whole.share else _share(sharing)
 
 
 def verdicts_shown(sharing: Sharing) -> str:
@@ -81,43 +90,55 @@ def _all_or_one(verdicts: Sequence[Verdict], wanted: str, other: str) -> Holds:
 def _printed_share(row: Row) -> str:
     if row.printed is None:
         return ""
-    first, second = row.printed.row.shares
     stated = TEXT.get((row.method, row.task))
-    text = f" (text: {stated[0]:.2f} / {stated[1]:.2f})" if stated else ""
-    return f"{row.task}: {first:.2f} / {second:.2f}{text}"
+    text = f" (in its text {stated[0]:.2f})" if stated else ""
+    return f"{row.task} {row.printed.row.shares[0]:.2f}{text}"
 
 
 def _measured_share(row: Row) -> str:
-    return f"{row.task}: {share_shown(row.scored)}, runs {verdicts_shown(row.scored)}"
+    return f"{row.task} {share_shown(row.scored)}, runs {verdicts_shown(row.scored)}"
+
+
+def _share(sharing: Sharing) -> str:
+    """The share of the first robot in all runs, without an interval."""
+    whole, rescues = sharing.all, sum(sharing.all.rescues)
+    if whole.share:
+        return format_number(whole.share.mean)
+    return format_number(whole.rescues[0] / rescues) if rescues else NONE
 
 
 def _contrast(pair: Pair, inner: Sequence[Row], uniform: Sequence[Row]) -> Claim:
     holds: Holds = "undecided"
-    measured = f"distance from 0.5: {_mean(pair.inner)} with, {_mean(pair.uniform)} without"
+    measured, brief = f"imbalance {_mean(pair.inner)}, uniform {_mean(pair.uniform)}", NONE
     if pair.contrast is not None:
-        measured += f"; difference {format_estimate(pair.contrast.difference)}"
-        if pair.contrast.difference.high < 0.0:
+        difference = pair.contrast.difference
+        measured += f"; difference {format_estimate(difference)}"
+        brief = format_signed(difference.mean)
+        if difference.high < 0.0:
             holds = "yes"
-        elif pair.contrast.difference.low > 0.0 or pair.contrast.equivalent:
+        elif difference.low > 0.0 or pair.contrast.equivalent:
             holds = "no"
-    printed = "; ".join(
-        f"{row.task}: {_distance(row.printed.row)} with, {_distance(other.printed.row)} without"
+    printed = [
+        (row.task, _distance(row.printed.row), _distance(other.printed.row))
         for row, other in zip(inner, uniform, strict=True)
         if row.printed and other.printed
-    )
+    ]
+    gain = sum(with_ - without for _, with_, without in printed) / max(len(printed), 1)
     return Claim(
-        claim="more even with inner attention than without",
+        claim=MORE_EVEN,
         situation=pair.situation,
-        method=f"{inner[0].method}, {uniform[0].method}",
-        printed=printed or NONE,
+        method=inner[0].method,
+        printed="; ".join(f"{task} {a:.2f}, uniform {b:.2f}" for task, a, b in printed) or NONE,
+        printed_brief=format_signed(gain) if printed else NONE,
         measured=measured,
+        brief=brief,
         runs=len(pair.seeds),
         holds=holds,
     )
 
 
-def _distance(printed: PrintedRow) -> str:
-    return f"{abs(printed.shares[0] - 0.5):.2f}"
+def _distance(printed: PrintedRow) -> float:
+    return abs(printed.shares[0] - 0.5)
 
 
 def _mean(value: Estimate | None) -> str:

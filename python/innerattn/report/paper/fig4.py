@@ -1,9 +1,7 @@
-"""Fig. 4 as a CSV file and as the lines of a plot."""
+"""Fig. 4: the entropy of attention during training as a table, as CSV, and as what is drawn."""
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 
@@ -11,16 +9,43 @@ import numpy as np
 
 from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.report.plots.entropy import EntropyLines
+from innerattn.report.table import Table, columns, csv_text, plain_table
 from innerattn.stats.seeds import BAND_NAMES, SeedCurve
+from innerattn.stats.text import NONE, format_estimate
+
+
+def entropy_table(courses: Sequence[EntropyCourse]) -> Table:
+    """How selective attention begins and ends; attention that never chooses is left out."""
+    heads = columns(
+        ["situation", "method"],
+        [
+            *("first tenth [nats]", "last tenth [nats]", "change [nats]"),
+            *("last tenth / ln(N − 1)", "teammates in effect"),
+        ],
+    )
+    rows = []
+    for course in courses:
+        if course.chooses:
+            end, even = course.end.mean, course.even_nats
+            cells = [
+                format_estimate(course.begin),
+                format_estimate(course.end),
+                format_estimate(course.change),
+            ]
+            cells += [f"{end / even:.2f}" if even else NONE, f"{np.exp(end):.2f}"]
+            rows.append([course.situation, course.method, *cells])
+    return plain_table(heads, rows)
+
+
+def logged(courses: Sequence[EntropyCourse]) -> str:
+    """From when to when the entropy was logged."""
+    ends = {(int(course.env_steps[0]), int(course.env_steps[-1])) for course in courses}
+    return " or ".join(f"{first:,} to {last:,}" for first, last in sorted(ends))
 
 
 def fig4_csv(courses: Sequence[EntropyCourse]) -> str:
     """One line per situation, method, time and robot, and one for all robots."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        ["situation", "method", "env_steps", "robot", "runs", "mean_nats", "low", "high", "band"]
-    )
+    lines = []
     for course in courses:
         mean, by_robot = course.mean(), course.by_robot()
         for t, env_steps in enumerate(course.env_steps.tolist()):
@@ -28,10 +53,11 @@ def fig4_csv(courses: Sequence[EntropyCourse]) -> str:
             rows += [(robot, by_robot, (t, r)) for r, robot in enumerate(course.robots)]
             for robot, found, at in rows:
                 ends = [float(found.mean[at]), float(found.low[at]), float(found.high[at])]
-                shown = ["" if math.isnan(end) else end for end in ends]
+                known = [None if math.isnan(end) else end for end in ends]
                 own = [course.situation, course.method, env_steps, robot, int(found.runs[at])]
-                writer.writerow([*own, *shown, found.kind])
-    return text.getvalue()
+                lines.append([*own, *known, found.kind])
+    heads = ["situation", "method", "env_steps", "robot", "runs", "mean_nats", "low", "high"]
+    return csv_text([*heads, "band"], lines)
 
 
 def fig4_lines(courses: Sequence[EntropyCourse]) -> list[EntropyLines]:
@@ -40,18 +66,18 @@ def fig4_lines(courses: Sequence[EntropyCourse]) -> list[EntropyLines]:
     for course in courses:
         if not course.chooses:
             continue
-        mean, by_robot, count = course.mean(), course.by_robot(), len(course.seeds)
-        runs = "1 run" if count == 1 else f"{count} runs, {BAND_NAMES[mean.kind]}"
+        mean, count = course.mean(), len(course.seeds)
+        runs = "1 run" if count == 1 else f"{count} runs, band: {BAND_NAMES[mean.kind]}"
         lines.append(
             EntropyLines(
                 situation=course.situation,
                 method=course.method,
-                label=f"{course.method} ({runs})",
+                runs=runs,
                 env_steps=course.env_steps,
                 mean=np.stack([mean.mean, mean.low, mean.high]),
                 robots=course.robots,
-                by_robot=np.stack([by_robot.mean, by_robot.low, by_robot.high]),
-                by_head=course.by_head(),
+                by_robot=course.by_robot().mean,
+                heads=course.end_by_head(),
                 even_nats=course.even_nats,
             )
         )

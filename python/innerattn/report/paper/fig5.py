@@ -1,4 +1,4 @@
-"""The evidence of Fig. 5 as the lines of a plot."""
+"""Fig. 5's evidence, attention around all handoffs: as tables, and as what is drawn."""
 
 from __future__ import annotations
 
@@ -8,7 +8,70 @@ import numpy as np
 
 from innerattn.experiments.paper.fig5 import ROLES, Evidence
 from innerattn.report.plots.aligned import AlignedLines
+from innerattn.report.table import Row, Table, columns, plain_table
 from innerattn.stats.seeds import BAND_NAMES
+from innerattn.stats.text import NONE, format_estimate, format_p, format_signed
+
+_CHANGES = (
+    "change on the next partner",
+    "bystander's",
+    "difference",
+    "ceiling",
+    "difference − half the change",
+    "change on the last partner",
+    "bystander's",
+)
+
+
+def evidence_summary(found: Sequence[Evidence]) -> Table:
+    """Means over the runs of each situation and method."""
+    heads = columns(["situation", "method"], ["handoffs of all", *_CHANGES])
+    return plain_table(heads, [_means(part) for part in found])
+
+
+def evidence_table(found: Sequence[Evidence]) -> Table:
+    """Every run, and the means."""
+    heads = columns(
+        ["situation", "method"],
+        ["seed", "handoffs of all", "episodes", *_CHANGES, "p", "bystander's p"],
+    )
+    rows: list[Row] = []
+    for part in found:
+        rows += [_run(part, index) for index in range(len(part.seeds))]
+        if len(part.seeds) > 1:
+            situation, method, handoffs, *changes = _means(part)
+            cells = (situation, method, "mean [95 %]", handoffs, str(sum(part.episodes)))
+            rows.append(Row((*cells, *changes, NONE, NONE), strong=True))
+    return plain_table(heads, rows)
+
+
+def _means(part: Evidence) -> list[str]:
+    to_be, control = part.robot["to_be"], part.control["to_be"]
+    before, before_control = part.robot["before"], part.control["before"]
+    used = sum(part.handoffs)
+    return [
+        *(part.situation, part.method, f"{used:,} of {used + sum(part.left_out):,}"),
+        *map(format_estimate, (to_be.change, control.change, part.own_part, part.ceiling)),
+        *map(format_estimate, (part.own_part_beyond_half, before.change, before_control.change)),
+    ]
+
+
+def _run(part: Evidence, index: int) -> Row:
+    to_be, control = part.robot["to_be"], part.control["to_be"]
+    before, before_control = part.robot["before"], part.control["before"]
+    changes = [to_be.change_by_run, control.change_by_run, part.own_part_by_run]
+    used = part.handoffs[index]
+    last = [before.change_by_run, before_control.change_by_run]
+    return Row(
+        (
+            *(part.situation, part.method, str(part.seeds[index])),
+            *(f"{used} of {used + part.left_out[index]}", str(part.episodes[index])),
+            *(_signed(values[index]) for values in changes),
+            *(NONE, NONE),
+            *(_signed(values[index]) for values in last),
+            *(format_p(part.p_by_run[index]), format_p(part.control_p_by_run[index])),
+        )
+    )
 
 
 def evidence_lines(found: Sequence[Evidence]) -> list[AlignedLines]:
@@ -16,7 +79,7 @@ def evidence_lines(found: Sequence[Evidence]) -> list[AlignedLines]:
     lines = []
     for part in found:
         kind = part.robot["to_be"].weight.kind
-        runs = "1 run" if part.runs == 1 else f"{part.runs} runs ({BAND_NAMES[kind]})"
+        runs = "1 run" if part.runs == 1 else f"{part.runs} runs, band: {BAND_NAMES[kind]}"
         robot, control = (
             np.stack([np.stack([w.mean, w.low, w.high]) for w in (of[r].weight for r in ROLES)])
             for of in (part.robot, part.control)
@@ -34,3 +97,7 @@ def evidence_lines(found: Sequence[Evidence]) -> list[AlignedLines]:
             )
         )
     return lines
+
+
+def _signed(value: float | None) -> str:
+    return NONE if value is None else format_signed(value)

@@ -1,6 +1,7 @@
-"""Fig. 4: the entropy of attention during training, with the band over runs; it measures nothing.
+"""Fig. 4: the entropy of attention during training; it measures nothing.
 
-Above, each method's mean over robots and heads, below the robots and heads of every method.
+A panel has one band, of the mean over robots and heads, one line for each robot, and at its right
+edge a dot for each head at the end of training.
 """
 
 from __future__ import annotations
@@ -12,15 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from innerattn.report.plots.drawing import (
-    BLUE,
-    COLUMN_WIDTH_IN,
-    GREEN,
-    PAGE_WIDTH_IN,
-    PURPLE,
-    ROBOT_COLOURS,
-    VERMILION,
-)
+from innerattn.report.plots.drawing import BLACK, COLUMN_WIDTH_IN, PAGE_WIDTH_IN, ROBOT_COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -29,7 +22,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_METHODS = ((BLUE, "-"), (VERMILION, "--"), (GREEN, "-."), (PURPLE, ":"))
+_GREY = "#C8C8C8"
+_HEADS = 0.24  # width of the strip of heads, in lengths of the training
 
 
 @dataclass(frozen=True)
@@ -39,28 +33,28 @@ class EntropyLines:
     Attributes:
         situation: of the worlds.
         method: of training.
-        label: for the legend, with the number of runs and what the band is.
+        runs: how many there are, and what the band is.
         env_steps: (T,) [env-steps].
         mean: (3, T) mean over robots and heads, low and high end of the band; NaN for no band.
         robots: R names.
-        by_robot: (3, T, R) mean over heads, low and high end of the band; NaN for no band.
-        by_head: (T, R, H) mean over runs.
+        by_robot: (T, R) mean over heads.
+        heads: (N, R, H) of each run's own heads, at the end.
         even_nats: ln(R - 1).
     """
 
     situation: str
     method: str
-    label: str
+    runs: str
     env_steps: NDArray[np.int64]
     mean: Array
     robots: tuple[str, ...]
     by_robot: Array
-    by_head: Array
+    heads: Array
     even_nats: float
 
 
 def draw_entropy(lines: Sequence[EntropyLines], printed_nats: float) -> Figure:
-    """A column for each situation, a row for all methods and one for each.
+    """A row for each method and a column for each situation.
 
     Args:
         lines: at least one.
@@ -71,80 +65,99 @@ def draw_entropy(lines: Sequence[EntropyLines], printed_nats: float) -> Figure:
     situations = list(dict.fromkeys(line.situation for line in lines))
     methods = list(dict.fromkeys(line.method for line in lines))
     width = PAGE_WIDTH_IN if len(situations) > 1 else COLUMN_WIDTH_IN
-    figure = Figure(figsize=(width, 0.3 + 2.4 * (1 + len(methods))), layout="constrained")
-    panels = figure.subplots(1 + len(methods), len(situations), sharey=True, squeeze=False)
-    robots: dict[str, Artist] = {}
-    for column, situation in enumerate(situations):
-        own = {line.method: line for line in lines if line.situation == situation}
-        upper, *lower = panels[:, column]
-        for method, panel in zip(methods, lower, strict=True):
-            if method not in own:
+    figure = Figure(figsize=(width, 0.5 + 2.3 * len(methods)), layout="constrained")
+    panels = figure.subplots(len(methods), len(situations), sharey=True, squeeze=False)
+    handles: dict[str, Artist] = {}
+    for row, method in enumerate(methods):
+        for column, situation in enumerate(situations):
+            panel = panels[row, column]
+            own = [x for x in lines if (x.method, x.situation) == (method, situation)]
+            if not own:
                 panel.set_axis_off()
                 continue
-            _method(upper, own[method], *_METHODS[methods.index(method) % len(_METHODS)])
-            robots |= _robots(panel, own[method])
-            panel.set_title(f"{method} by robot; thin: its heads", fontsize=7)
-        upper.set_title(situation, fontsize=9)
-        upper.legend(fontsize=6, loc="lower right", frameon=False)
-        even = next(iter(own.values())).even_nats
-        for panel in (panel for panel in (upper, *lower) if panel.axison):
-            panel.set_xlabel("training [1,000 env-steps]", fontsize=8)
-            _marks(panel, even, printed_nats)
+            handles |= _course(panel, own[0])
+            _heads(panel, own[0])
+            _marks(panel, own[0].even_nats, printed_nats)
             _teammates(panel, labelled=column == len(situations) - 1)
-    for panel in panels[:, 0]:
-        panel.set_ylabel("entropy of attention [nats]", fontsize=8)
+            panel.set_title(f"{situation}, {method}\n{own[0].runs}", fontsize=7)
+            panel.set_xlabel("training [1,000 env-steps]", fontsize=7)
+        panels[row, 0].set_ylabel("entropy of attention [nats]", fontsize=8)
     figure.legend(
-        robots.values(),
-        robots.keys(),
+        handles.values(),
+        handles.keys(),
         fontsize=7,
-        ncols=round(width / 1.7),
+        ncols=len(handles) if len(situations) > 1 else 2,
         loc="outside lower center",
         frameon=False,
     )
-    least = min(float(np.nanmin([line.mean.min(), line.by_head.min()])) for line in lines)
-    panels[0, 0].set_ylim(max(0.0, least - 0.1), 1.06 * max(line.even_nats for line in lines))
+    drawn = [x for line in lines for x in (line.mean[0], line.by_robot, line.heads)]
+    least = min(float(x.min()) for x in drawn if x.size)
+    panels[0, 0].set_ylim(max(0.0, least - 0.05), 1.06 * max(line.even_nats for line in lines))
     return figure
 
 
-def _method(panel: Axes, line: EntropyLines, colour: str, style: str) -> None:
+def _course(panel: Axes, line: EntropyLines) -> dict[str, Artist]:
+    """Draw the courses; what a legend shows."""
+    handles: dict[str, Artist] = {}
     steps = line.env_steps / 1000.0
     mean, low, high = line.mean
-    panel.plot(steps, mean, style, color=colour, linewidth=1.4, label=line.label)
     if np.isfinite(low).any():
-        panel.fill_between(steps, low, high, color=colour, alpha=0.2, linewidth=0.0)
-
-
-def _robots(panel: Axes, line: EntropyLines) -> dict[str, Artist]:
-    """Draw them; their lines by name, for the legend."""
-    drawn: dict[str, Artist] = {}
-    steps = line.env_steps / 1000.0
+        panel.fill_between(steps, low, high, color=_GREY, linewidth=0.0)
     for r, robot in enumerate(line.robots):
         colour = ROBOT_COLOURS[r % len(ROBOT_COLOURS)]
-        panel.plot(steps, line.by_head[:, r], color=colour, linewidth=0.5, alpha=0.45)
-        mean, low, high = line.by_robot[:, :, r]
-        (drawn[robot],) = panel.plot(steps, mean, color=colour, linewidth=1.5)
-        if np.isfinite(low).any():
-            panel.fill_between(steps, low, high, color=colour, alpha=0.15, linewidth=0.0)
-    return drawn
+        (handles[robot],) = panel.plot(steps, line.by_robot[:, r], color=colour, linewidth=0.8)
+    (handles["mean over robots"],) = panel.plot(steps, mean, color=BLACK, linewidth=1.3)
+    return handles
+
+
+def _heads(panel: Axes, line: EntropyLines) -> None:
+    """A strip beside the courses: the heads of each robot in a column of their own."""
+    from matplotlib.ticker import MaxNLocator
+
+    last = float(line.env_steps[-1]) / 1000.0
+    strip = _HEADS * last
+    places = last + strip * (np.arange(len(line.robots)) + 1.0) / (len(line.robots) + 0.5)
+    for r, place in enumerate(places):
+        values = line.heads[:, r].ravel()
+        colour = ROBOT_COLOURS[r % len(ROBOT_COLOURS)]
+        panel.plot(
+            np.full(len(values), place),
+            values,
+            "o",
+            color=colour,
+            markersize=2.2,
+            markeredgewidth=0.0,
+            alpha=0.6,
+        )
+    panel.axvline(last + 0.03 * strip, color=_GREY, linewidth=0.7)
+    panel.annotate(
+        "heads",
+        (last + 0.55 * strip, 0.02),
+        xycoords=("data", "axes fraction"),
+        fontsize=6,
+        ha="center",
+    )
+    ticks = MaxNLocator(nbins=4, steps=[1, 2, 5, 10]).tick_values(0.0, last)
+    panel.set_xticks([tick for tick in ticks if 0.0 <= tick <= 1.001 * last])
+    panel.set_xlim(-0.03 * last, last + 1.08 * strip)
 
 
 def _marks(panel: Axes, even_nats: float, printed_nats: float) -> None:
     """Lines for even attention and for the paper's value, named at the left."""
-    panel.axhline(even_nats, color="black", linewidth=0.9)
-    panel.axhline(printed_nats, color="black", linewidth=0.9, linestyle=":")
     panel.tick_params(labelsize=7, length=2)
-    for nats, name, side in (
-        (even_nats, f"uniform: {even_nats:.2f}", "bottom"),
-        (printed_nats, f"paper: {printed_nats:.2f}", "top"),
+    for nats, name, style, up in (
+        (even_nats, f"uniform {even_nats:.2f}", "-", 1),
+        (printed_nats, f"paper {printed_nats:.2f}", ":", -1),
     ):
+        panel.axhline(nats, color=BLACK, linewidth=0.8, linestyle=style)
         panel.annotate(
             name,
             (0.02, nats),
             xycoords=("axes fraction", "data"),
-            xytext=(0, 1 if side == "bottom" else -1),
+            xytext=(0, up),
             textcoords="offset points",
             fontsize=6,
-            va=side,
+            va="bottom" if up > 0 else "top",
         )
 
 

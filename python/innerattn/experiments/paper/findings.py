@@ -1,0 +1,125 @@
+"""All that the paper's table, figures and claims need from finished runs, found once."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from innerattn.experiments.paper.claims import CLAIMS, Claim, entropy_claims, handoff_claims
+from innerattn.experiments.paper.fig4 import EntropyCourse, fig4
+from innerattn.experiments.paper.fig5 import Evidence, evidence
+from innerattn.experiments.paper.imbalance_score import (
+    ImbalanceScoreCorrelation,
+    imbalance_score_correlations,
+)
+from innerattn.experiments.paper.pairs import Pair, Together, pairs, together
+from innerattn.experiments.paper.scene import HandoffScene, choose_scene
+from innerattn.experiments.paper.sharing_claims import sharing_claims
+from innerattn.experiments.paper.table2 import PRINTED_SITUATION, Table2, table2
+from innerattn.experiments.run import (
+    FinishedRun,
+    by_method,
+    refuse_unlike,
+    refuse_without_steps,
+)
+
+PARTS = ("table2", "fig4", "fig5")
+"""What can be asked for."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What stands beside Table II: is attention, or evenness, any good?
+
+    Attributes:
+        pairs: learnt and uniform attention, seed by seed.
+        together: the same over all situations.
+        merit: how imbalance goes with the score.
+    """
+
+    pairs: tuple[Pair, ...]
+    together: tuple[Together, ...]
+    merit: tuple[ImbalanceScoreCorrelation, ...]
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What runs show; a part that was not asked for is None.
+
+    Attributes:
+        runs: all runs, by situation and method, then seed.
+        claims: all claims that can be asked of the parts, in the order of `CLAIMS`.
+        table: Table II.
+        comparison: what stands beside it; there where the table is.
+        courses: Fig. 4.
+        scene: the handoff that is shown as Fig. 5; None, too, where there is none to show.
+        evidence: Fig. 5 over all handoffs.
+    """
+
+    runs: tuple[FinishedRun, ...]
+    claims: tuple[Claim, ...]
+    table: Table2 | None
+    comparison: Comparison | None
+    courses: tuple[EntropyCourse, ...] | None
+    scene: HandoffScene | None
+    evidence: tuple[Evidence, ...] | None
+
+    @property
+    def share_worlds(self) -> bool:
+        """Whether runs of different seeds were measured in the same worlds."""
+        worlds = {run.config.evaluate.seed for run in self.runs}
+        return len(worlds) < len({run.seed for run in self.runs})
+
+
+def find(runs: Sequence[FinishedRun], parts: Collection[str] = PARTS) -> Findings:
+    """What runs show.
+
+    Args:
+        runs: finished runs; they are read only. Archived runs are enough for the table.
+        parts: which of `PARTS`.
+
+    Raises:
+        RunError: runs are missing or cannot be compared, or a part needs what was not recorded.
+        ValueError: a part is unknown.
+    """
+    if unknown := sorted(set(parts) - set(PARTS)):
+        raise ValueError(f"parts = {unknown}: known are {', '.join(PARTS)}")
+    groups = list(by_method(runs).values())
+    ordered = tuple(run for group in groups for run in group)
+    refuse_unlike(ordered)
+    if "fig5" in parts:
+        refuse_without_steps(ordered)
+    table = table2(groups) if "table2" in parts else None
+    courses = tuple(fig4(ordered)) if "fig4" in parts else None
+    found = tuple(filter(None, map(evidence, groups))) if "fig5" in parts else None
+    claims = [
+        *(sharing_claims(table) if table else []),
+        *entropy_claims(courses or ()),
+        *handoff_claims(found or ()),
+    ]
+    return Findings(
+        runs=ordered,
+        claims=tuple(sorted(claims, key=lambda claim: CLAIMS.index(claim.claim))),
+        table=table,
+        comparison=_compared(table) if table else None,
+        courses=courses,
+        scene=_scene(groups) if "fig5" in parts else None,
+        evidence=found,
+    )
+
+
+def _compared(table: Table2) -> Comparison:
+    beside = table.competence
+    merit = imbalance_score_correlations(beside)
+    return Comparison(tuple(pairs(beside)), tuple(together(beside)), tuple(merit))
+
+
+def _scene(groups: Sequence[Sequence[FinishedRun]]) -> HandoffScene | None:
+    """A handoff of TD with inner attention in the mixed situation, or of what comes nearest."""
+
+    def distance(group: Sequence[FinishedRun]) -> tuple[bool, bool]:
+        run = group[0]
+        return run.situation != PRINTED_SITUATION, run.method != "td-inner"
+
+    scenes = (choose_scene(group) for group in sorted(groups, key=distance))
+    return next((scene for scene in scenes if scene is not None), None)
