@@ -89,9 +89,9 @@ class _Folder:
 
     def write(self, findings: Findings, left_out: Sequence[str]) -> None:
         """Write the report and the files of the parts that there are."""
-        if findings.table is not None:
+        if findings.table is not None and findings.comparison is not None:
             self._json("table2.json", findings.table.to_json())
-            self._markdown("table2.md", table2_markdown(findings.table))
+            self._markdown("table2.md", table2_markdown(findings.table, findings.comparison))
             self._csv("table2.csv", table2_csv(findings.table))
         if findings.courses is not None:
             self._json("fig4.json", fig4_json(findings.courses))
