@@ -42,14 +42,14 @@ format: setup ## format all code
 	ruff check --fix
 	ruff format
 
-bench: setup ## speed of worlds and learner on this machine, beside their peers; fills docs/performance.md
+bench: setup ## speed of worlds and learner on this machine, beside their peers; fills docs/performance.md; MAAC=PATH adds MAAC's public code
 	maturin develop --release --quiet --locked --extras dev,peers || \
 	{ echo "Without peers: they cannot be installed here."; maturin develop --release --quiet --locked --extras dev; }
-	cargo bench --quiet
+	cargo bench --quiet -p innerattn-benches
 	python benches/compare_envs.py
 	python benches/env_cost.py
 	python benches/fault_cost.py
-	python benches/compare_learner.py
+	python benches/compare_learner.py $(if $(MAAC),--maac "$(MAAC)")
 
 setup: $(VENV)/.built ## environment and compiled module
 

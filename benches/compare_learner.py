@@ -1,105 +1,122 @@
-"""The off-policy learner beside the plain loop over robots and heads, and what the machine allows.
+"""An update of the off-policy learner beside MAAC's public code, and what the machine allows.
 
-The plain form is the tests' reference: like MAAC's public code it has modules of its own for every
-robot and head. `python benches/compare_learner.py` writes its tables into `docs/performance.md`.
+`python benches/compare_learner.py --maac PATH` writes its tables into `docs/performance.md`. PATH
+is a checkout of the public code, which nothing here downloads. The stand-in is the tests' plain
+reference, a loop over robots and heads that we wrote to check results. It is not the public code;
+without `--maac` it is all that our updates are compared with.
 """
 
+from __future__ import annotations
+
+import argparse
 import json
+import os
 import statistics
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import torch
+from maac_checkout import COMMIT, GET_IT, describe_checkout
 from page import machine, publish, table
-from torch import Tensor
-from torch.utils.flop_counter import FlopCounterMode
 
-from innerattn.config import NetworkConfig, TDConfig
-from innerattn.learn import TD, Team, Transitions
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "learn"))
-from reference import PlainTD
-
-TEAM = Team(num_robots=4, obs_width=44, num_actions=5)
 CASES = [(batch, threads) for batch in (256, 1024) for threads in (1, 2)]
-REPEATS = 25
-NUM_ENVS = 64
-REPLAY = 200_000
+ROUNDS = 3
 PROTOCOL_UPDATES = 25_000
 MEASURED_UPDATES = 400
-ROUNDS = 3
+PEERS = ("public code", "stand-in")
+OURS = ("eager", "compiled")
+BESIDE = ("draw, public code", "draw, ours", "act")
+NOT_GIVEN = "MAAC's public code was not given (`--maac`): our updates are beside the stand-in only."
+
+Case = tuple[int, int]
+"""Batch size and threads."""
+Round = dict[str, float]
+"""Milliseconds by name, of one process."""
 
 
-def random_transitions(count: int) -> Transitions:
-    shape = (count, TEAM.num_robots)
-    return Transitions(
-        torch.randn(*shape, TEAM.obs_width),
-        torch.randint(TEAM.num_actions, shape),
-        torch.randn(shape),
-        torch.randn(*shape, TEAM.obs_width),
-        torch.zeros(count, dtype=torch.bool),
+def options(words: Sequence[str] | None = None) -> argparse.Namespace:
+    """The command line: `maac` (a path or None) and `state`, which says what commit is there."""
+    parser = argparse.ArgumentParser(
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="Times one update by MAAC's public code and by ours, and fills "
+        "docs/performance.md.",
+        epilog=f"The public code, at the commit that the comparison is made for:\n\n{GET_IT}",
     )
-
-
-def draw(log_prob: list[Tensor]) -> Tensor:
-    return torch.cat([torch.multinomial(x.detach().exp(), 1) for x in log_prob], dim=1)
-
-
-def learner_with_replay(batch: int) -> TD:
-    numbers = TDConfig(batch_size=batch, replay_capacity=REPLAY)
-    learner = TD(TEAM, NetworkConfig(), numbers, seed=0, device=torch.device("cpu"))
-    for _ in range(10):
-        learner.replay.add(random_transitions(REPLAY // 10))
-    return learner
-
-
-def median_ms(*actions: Callable[[], object]) -> list[float]:
-    """Medians over calls in turn, so that a busy machine burdens all alike."""
-    times: list[list[float]] = [[] for _ in actions]
-    for repeat in range(-2, REPEATS):  # the first two warm up
-        for action, taken in zip(actions, times, strict=True):
-            start = time.perf_counter()
-            action()
-            if repeat >= 0:
-                taken.append(1e3 * (time.perf_counter() - start))
-    return [statistics.median(taken) for taken in times]
-
-
-def products(batch: int) -> Callable[[], Tensor]:
-    """The product that an update has most of: layers of width 128 of four robots."""
-    weights, inputs = torch.randn(4, 128, 128), torch.randn(4, 128, batch)
-    return lambda: torch.bmm(weights, inputs)
-
-
-def update_row(batch: int, threads: int) -> list[str]:
-    torch.set_num_threads(threads)
-    eager, compiled = learner_with_replay(batch), learner_with_replay(batch)
-    compiled.compile()
-    plain = PlainTD(eager.state(), NetworkConfig(), TDConfig(batch_size=batch))
-    mean, std = eager.replay.reward_mean.float(), eager.replay.reward_std.float()
-    obs = random_transitions(NUM_ENVS).obs
-    with FlopCounterMode(display=False) as counter:
-        eager.update(eager.replay.sample(batch))
-    gflop = counter.get_total_flops() / 1e9
-    compiled.update(compiled.replay.sample(batch))  # compiles
-    plain_ms, eager_ms, compiled_ms, product_ms, sample_ms, act_ms = median_ms(
-        lambda: plain.update(eager.replay.sample(batch), mean, std, draw),
-        lambda: eager.update(eager.replay.sample(batch)),
-        lambda: compiled.update(compiled.replay.sample(batch)),
-        products(batch),
-        lambda: eager.replay.sample(batch),
-        lambda: eager.act(obs),
+    parser.add_argument(
+        "--maac", type=Path, metavar="PATH", help=f"checkout of the public code at {COMMIT}"
     )
-    rate = 2 * 4 * 128 * 128 * batch / 1e9 / product_ms  # GFLOP a millisecond
-    return [
-        *(str(batch), str(threads), f"{plain_ms:.1f}"),
-        *(f"{ms:.1f} ({plain_ms / ms:.2f}x)" for ms in (eager_ms, compiled_ms)),
-        *(f"{gflop / rate:.1f}", f"{sample_ms:.2f}", f"{act_ms:.2f}"),
-    ]
+    parser.add_argument(
+        "--any-maac-commit",
+        action="store_true",
+        help="accept a checkout at another commit, or with changed files",
+    )
+    given = parser.parse_args(words)
+    if given.any_maac_commit and not given.maac:
+        parser.error("--any-maac-commit needs --maac PATH")
+    given.state = NOT_GIVEN
+    if given.maac:
+        given.maac = given.maac.expanduser().resolve()
+        try:
+            commit = describe_checkout(given.maac, given.any_maac_commit)
+        except ValueError as error:
+            parser.error(str(error))
+        given.state = f"MAAC's public code: {commit}."
+    return given
+
+
+def one_round(case: Case, checkout: Path | None) -> Round:
+    """Updates of one batch size, in turn, in a process of their own that has so many threads.
+
+    Raises:
+        SystemExit: The process failed; its messages are shown.
+    """
+    batch, threads = case
+    command = [sys.executable, str(Path(__file__).with_name("learner_update.py"))]
+    command += [str(batch), str(threads), *([str(checkout)] if checkout else [])]
+    counts = {"OMP_NUM_THREADS": str(threads), "MKL_NUM_THREADS": str(threads)}
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | counts)
+    if done.returncode:
+        sys.exit(f"batch {batch}, {threads} threads: the measurement failed\n{done.stderr}")
+    found: Round = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def update_tables(rounds: dict[Case, list[Round]]) -> str:
+    """Tables of times, of ratios, and of what stands beside an update.
+
+    Args:
+        rounds: Of each case its rounds; all have the same names.
+    """
+    names = next(iter(rounds.values()))[0]
+    peers = [name for name in PEERS if name in names]
+
+    def ms(case: Case, name: str, digits: int) -> str:
+        return f"{statistics.median(found[name] for found in rounds[case]):.{digits}f}"
+
+    def ratio(case: Case, peer: str, own: str) -> str:
+        each = [found[peer] / found[own] for found in rounds[case]]
+        return f"{statistics.median(each):.2f} ({min(each):.2f} to {max(each):.2f})"
+
+    def by_case(head: Sequence[str], cells: Callable[[Case], Sequence[str]]) -> str:
+        rows = [[str(batch), str(threads), *cells((batch, threads))] for batch, threads in rounds]
+        return table(["batch", "threads", *head], rows)
+
+    updates = [*peers, *OURS, "products"]
+    beside = [name for name in BESIDE if name in names]
+    pairs = [(peer, own) for peer in peers for own in OURS]
+    return "\n\n".join(
+        [
+            by_case([f"{x}, ms" for x in updates], lambda case: [ms(case, x, 1) for x in updates]),
+            f"Times as fast, median (lowest to highest) of {ROUNDS} rounds:",
+            by_case(
+                [f"{own} vs {peer}" for peer, own in pairs],
+                lambda case: [ratio(case, peer, own) for peer, own in pairs],
+            ),
+            by_case([f"{x}, ms" for x in beside], lambda case: [ms(case, x, 2) for x in beside]),
+        ]
+    )
 
 
 def pace_and_start_s(compiled: str, threads: int) -> tuple[float, float]:
@@ -117,7 +134,7 @@ def pace_and_start_s(compiled: str, threads: int) -> tuple[float, float]:
     return pace, last["seconds"] - pace * last["updates"]
 
 
-def protocol_rows() -> list[list[str]]:
+def protocol_table() -> str:
     """25,000 episodes and updates, eager and compiled, from the pace of runs in turn."""
     cases = ("off", "on")
     found: dict[str, list[tuple[float, float]]] = {case: [] for case in cases}
@@ -129,18 +146,20 @@ def protocol_rows() -> list[list[str]]:
         pace, start = (statistics.median(values) for values in zip(*found[case], strict=True))
         minutes = (start + pace * PROTOCOL_UPDATES) / 60.0
         rows.append([case, f"{1e3 * pace:.1f}", f"{start:.0f}", f"{minutes:.1f}"])
-    return rows
+    head = ["--compile", "update and its steps, ms", "start, s", "25,000 updates, min"]
+    return table(head, rows)
 
 
 def main() -> None:
     """Measure and publish the tables."""
-    torch.manual_seed(0)
-    head = ["batch", "threads", "plain, ms", "eager, ms", "compiled, ms", "products, ms"]
-    head += ["draw, ms", "act, ms"]
-    updates = table(head, [update_row(*case) for case in CASES])
-    head = ["--compile", "update and its steps, ms", "start, s", "25,000 updates, min"]
-    protocol = table(head, protocol_rows())
-    publish("compare_learner", f"{machine('numpy', 'torch')}.\n\n{updates}\n\n{protocol}")
+    given = options()
+    print(given.state, flush=True)
+    rounds: dict[Case, list[Round]] = {case: [] for case in CASES}
+    for _ in range(ROUNDS):
+        for case in CASES:
+            rounds[case].append(one_round(case, given.maac))
+    parts = [f"{machine('numpy', 'torch')}. {given.state}", update_tables(rounds), protocol_table()]
+    publish("compare_learner", "\n\n".join(parts))
 
 
 if __name__ == "__main__":

@@ -1,22 +1,14 @@
 //! Observations written per second, by size of the team, in pure Rust on one thread.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use innerattn_env::batch::{Autoreset, Batch, Options};
-use innerattn_env::rules::Rules;
+use innerattn_benches::batch;
 use innerattn_env::scenario::{Robot, Scenario};
 
 fn observe(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("observe");
     for robots in [4, 16, 64] {
         let scenario = Scenario { robots: team(robots), spawn_clearance_m: 0.05, ..Scenario::default() };
-        let options = Options {
-            num_envs: 256,
-            seed: 0,
-            num_threads: Some(1),
-            first_env: 0,
-            autoreset: Autoreset::SameStep,
-        };
-        let batch = Batch::new(Rules::new(scenario).expect("a valid scenario"), options).expect("a batch");
+        let batch = batch(scenario, 256, 1);
         let mut obs = vec![0.0; 256 * robots * batch.rules().layout.width()];
         group.throughput(Throughput::Elements(256));
         group.bench_function(BenchmarkId::new("robots", robots), |bencher| {

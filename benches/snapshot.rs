@@ -1,22 +1,13 @@
 //! Snapshots taken and restored, by size of the batch, in pure Rust.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use innerattn_env::batch::{Autoreset, Batch, Options};
-use innerattn_env::rules::Rules;
+use innerattn_benches::batch;
 use innerattn_env::scenario::Scenario;
 
 fn snapshot(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("snapshot");
     for envs in [1, 32, 1024, 4096] {
-        let options = Options {
-            num_envs: envs,
-            seed: 0,
-            num_threads: Some(1),
-            first_env: 0,
-            autoreset: Autoreset::SameStep,
-        };
-        let mut batch =
-            Batch::new(Rules::new(Scenario::default()).expect("a valid scenario"), options).expect("a batch");
+        let mut batch = batch(Scenario::default(), envs, 1);
         let image = batch.snapshot();
         group.throughput(Throughput::Elements(envs as u64));
         group.bench_function(BenchmarkId::new("take", envs), |bencher| bencher.iter(|| batch.snapshot()));

@@ -1,11 +1,11 @@
 //! Env-steps per second of a batch in pure Rust: both engines, random actions, 25-step episodes.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use innerattn_env::batch::{Autoreset, Batch, Options, StepBuffers};
+use innerattn_benches::batch;
+use innerattn_env::batch::StepBuffers;
 use innerattn_env::reward::NUM_COMPONENTS;
 use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
-use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Engine, Scenario};
 
 const ROUNDS: usize = 64;
@@ -23,15 +23,7 @@ fn step(criterion: &mut Criterion) {
                 continue; // it has none
             }
             let scenario = Scenario { engine, substeps, ..Scenario::default() };
-            let options = Options {
-                num_envs: envs,
-                seed: 0,
-                num_threads: Some(threads),
-                first_env: 0,
-                autoreset: Autoreset::SameStep,
-            };
-            let mut batch =
-                Batch::new(Rules::new(scenario).expect("a valid scenario"), options).expect("a batch");
+            let mut batch = batch(scenario, envs, threads);
             let (robots, width) = (batch.rules().team.len(), batch.rules().layout.width());
             let actions = random_actions(envs, robots);
             let mut obs = vec![0.0; envs * robots * width];

@@ -3,11 +3,15 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::fault::NUM_KINDS;
 use crate::rules::Rules;
 use crate::world::World;
 
 const MAGIC: &[u8; 8] = b"innerATT";
 const VERSION: u32 = 2;
+/// Kinds of faults in an image of this version.
+const KINDS: usize = 9;
+const _: () = assert!(NUM_KINDS == KINDS, "images hold a value for each kind: raise VERSION, then KINDS");
 const CHECKSUM_BYTES: usize = 4;
 
 #[derive(Serialize, Deserialize)]

@@ -162,13 +162,13 @@ class Stepper:
         drive: Array,
         rescues: list[tuple[int, ...]],
         terminated: Bools,
-    ) -> Array:
-        """Rewards by component without the contact's, (E, R, 4)."""
+    ) -> dict[str, Array]:
+        """Rewards by component but for the contact's, each (E, R)."""
         scenario = self.scenario
-        reward = np.zeros((*before.positions.shape[:2], 4))
+        rescue = np.zeros(before.positions.shape[:2])
         for env, _slot, *helpers in rescues:
             robots = helpers if scenario.rescue_credit == "helpers" else slice(None)
-            reward[env, robots, 0] += scenario.rescue_reward
+            rescue[env, robots] += scenario.rescue_reward
         start = self.total_distance(before, before.positions)
         dense = np.zeros_like(start)
         if scenario.shaping == "progress":
@@ -176,9 +176,11 @@ class Stepper:
         elif scenario.shaping == "potential":
             end = np.where(terminated, 0.0, self.total_distance(after, after.positions))
             dense = start - scenario.shaping_discount * end
-        reward[..., 1] = (scenario.shaping_weight * dense)[:, None]
-        reward[..., 3] = -scenario.action_cost * (drive**2).sum(-1) * before.available
-        return reward
+        return {
+            "rescue": rescue,
+            "progress": np.broadcast_to((scenario.shaping_weight * dense)[:, None], rescue.shape),
+            "action": -scenario.action_cost * (drive**2).sum(-1) * before.available,
+        }
 
     def observations(self, state: State) -> tuple[Array, Bools]:
         """Rows of all robots, (E, R, D); where rounding might order victims otherwise, (E, R)."""

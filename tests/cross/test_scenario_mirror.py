@@ -1,6 +1,7 @@
 """The two descriptions of a scenario, pydantic's and the compiled one, name the same things."""
 
 import json
+from pathlib import Path
 from typing import Literal, get_args, get_origin
 
 import pytest
@@ -111,6 +112,12 @@ def test_a_faults_value_is_in_its_range(row: tuple[str, str, float, float, float
     for value in (low - 0.01, high + 0.01):
         with pytest.raises(ValueError, match=rf"faults\[0\]\.value \({kind}\) = .*: must be"):
             compiled({"faults": [FAULT | {"kind": kind, "value": value}]})
+
+
+def test_the_reference_names_every_fault_and_every_reward() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "scenario.md").read_text("utf-8")
+    names = [row[0] for row in (*_core.FAULT_KINDS, *_core.REWARD_COMPONENTS)]
+    assert [name for name in names if f"`{name}`" not in text] == []
 
 
 def test_shapes_agree() -> None:

@@ -150,12 +150,14 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         assert (result.terminated == terminated).all()
         assert (result.truncated == (steps + 1 >= scenario.episode_steps)).all()
 
-        wanted = plain.reward_components(before, after, drive, found, terminated)
         parts = env.reward_components()
-        touched = parts[..., 2] != 0
-        assert np.isin(parts[..., 2], [0.0, np.float32(-scenario.contact_cost)]).all()
+        contact = parts[..., env.reward_component_names.index("contact")]
+        touched = contact != 0
+        assert np.isin(contact, [0.0, np.float32(-scenario.contact_cost)]).all()
         assert not touched[free].any()
-        wanted[..., 2] = parts[..., 2]
+        rewards = plain.reward_components(before, after, drive, found, terminated)
+        rewards["contact"] = contact
+        wanted = np.stack([rewards[name] for name in env.reward_component_names], axis=-1)
         # Sums of float32 distances are as exact as the sums are large.
         size = 1.0 + plain.total_distance(before, before.positions).max()
         assert_close(parts, wanted, "reward components", scale=size)

@@ -24,8 +24,8 @@ class DispatchQuality:
 
     A robot may be busy with another victim then, so even the best dispatch does not always send
     the one that would be there sooner; compare with a scripted policy in the same worlds. Robots
-    are taken to be healthy: of worlds with faults the figures say little. Figures
-    are None without choices, and ``regret_s`` where all choices come from one episode.
+    are taken to be healthy: with faults the values say little. They are None without choices, and
+    ``regret_s`` is where all choices come from one episode.
 
     Attributes:
         choices: rescues' needs that several robots could have filled.

@@ -56,7 +56,7 @@ class Summary:
     """The results of one evaluation.
 
     Attributes:
-        policy: the run or the scripted policy that was asked for.
+        policy: name of the run or of the scripted policy.
         method: the method of training, or the scripted policy.
         situation: of the worlds.
         seed: of the worlds.
@@ -118,7 +118,7 @@ def summarise(
     """The summary of one policy's evaluation.
 
     Args:
-        policy: what it was asked for as.
+        policy: name of the run or of the scripted policy.
         recorded: the episodes that cooperation and attention are taken from.
         standard: by policy name, records of the standard length; holds ``recorded.policy`` and the
             scripted policies, all over the same worlds.

@@ -1,4 +1,4 @@
-"""Figures over runs of which there may be few: a mean, and an interval where it can be had."""
+"""Means over runs, of which there may be few, with an interval where there are enough."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from innerattn.stats.student import student_interval, t_quantile
 Array = NDArray[np.float64]
 
 BandKind = Literal["student", "range", "none"]
-"""student: 95 % interval of the mean by Student's t over runs, from three runs on; range: least and
-largest of two runs, whose interval would say nothing; none: a single run."""
+"""student: 95 % interval of the mean by Student's t, for three runs or more; range: smallest and
+largest of two runs, whose t interval would be too wide to tell anything; none: a single run."""
 
 BAND_NAMES: dict[BandKind, str] = {
     "student": "95 %",
@@ -29,13 +29,13 @@ BAND_NAMES: dict[BandKind, str] = {
 
 @dataclass(frozen=True)
 class SeedCurve:
-    """A mean course over runs and what it lies between, by `BandKind`.
+    """A mean curve over runs and its band.
 
     Attributes:
         kind: what low and high are, where all runs have a value.
         mean: (...) float64 of the runs that have a value; NaN where none has.
-        low: (...) float64; NaN where there is none.
-        high: (...) float64.
+        low: (...) float64 low end of the band; NaN where there is none.
+        high: (...) float64 high end.
         runs: (...) int64 how many have a value.
     """
 
@@ -46,24 +46,28 @@ class SeedCurve:
     runs: NDArray[np.int64]
 
     def to_json(self) -> dict[str, Any]:
-        """As a JSON object; what is not there is null."""
-        shown = {name: numbers(getattr(self, name)) for name in ("mean", "low", "high")}
-        return {"band": self.kind, **shown, "runs": self.runs.tolist()}
+        """As a JSON object; missing values are null."""
+        curves = {name: numbers(getattr(self, name)) for name in ("mean", "low", "high")}
+        return {"band": self.kind, **curves, "runs": self.runs.tolist()}
 
 
 def seed_estimate(values: Sequence[float | None]) -> Estimate | None:
-    """The mean over runs; None where no run has the figure."""
-    found = [value for value in values if value is not None and math.isfinite(value)]
-    if not found:
-        return None
-    if len(found) == 1:
-        return Estimate(found[0], runs=1)
-    interval = student_interval(found)
-    return replace(interval, runs=len(found))
+    """The mean over runs and Student's 95 % interval, unbounded for a single run.
+
+    Args:
+        values: by run; None or not finite where a run has none.
+
+    Returns:
+        None where no run has a value.
+    """
+    known = [value for value in values if value is not None and math.isfinite(value)]
+    if len(known) < 2:
+        return Estimate(known[0], runs=1) if known else None
+    return replace(student_interval(known), runs=len(known))
 
 
 def seed_curve(values: Array) -> SeedCurve:
-    """The course of a figure over runs.
+    """The mean curve over runs.
 
     Args:
         values: (N, ...) by run; NaN where a run has no value.
@@ -84,6 +88,6 @@ def seed_curve(values: Array) -> SeedCurve:
 
 def numbers(values: Array) -> Any:
     """Nested lists of numbers for JSON, None for NaN."""
-    shown = values.astype(object)
-    shown[~np.isfinite(values)] = None
-    return shown.tolist()
+    nested = values.astype(object)
+    nested[~np.isfinite(values)] = None
+    return nested.tolist()

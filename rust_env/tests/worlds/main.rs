@@ -7,6 +7,7 @@ mod contacts;
 mod containment;
 mod determinism;
 mod engines;
+mod extending;
 mod faults;
 mod snapshot;
 mod speed;

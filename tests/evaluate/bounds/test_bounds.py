@@ -178,7 +178,7 @@ def test_a_run(
     assert found.seed == run_config(method).evaluate.seed
     document = found.to_json()
     assert json.loads(json.dumps(document, allow_nan=False)) == json.loads(json.dumps(document))
-    assert document["schema_version"] == 1
+    assert document["schema_version"] == 2
     assert document["violations"] == 0
     assert len(document["levels"]) == len(found.levels)
 

@@ -9,7 +9,7 @@ from fresh_run import config_of_team, make_run, run_config
 
 from innerattn.config import Scenario
 from innerattn.errors import RunError
-from innerattn.evaluate.faults.attention import fault_attention_of_run, twins_of
+from innerattn.evaluate.faults.attention import fault_attention_of_run, paired_rollouts
 from innerattn.evaluate.faults.severity import fault_of
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
@@ -82,8 +82,8 @@ def test_worlds_are_the_same_to_the_bit_until_the_onset(
 def test_figures_are_of_the_worlds_that_are_played(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", run_config("td-inner"))
     found = small(run, kinds=("blackout",), seed=5)
-    twins = twins_of(played(run, "blackout", 2), played(run, None, 2), 2, 4)
-    received = twins.received()
+    rollouts = paired_rollouts(played(run, "blackout", 2), played(run, None, 2), 2, 4)
+    received = rollouts.received()
     shift = found.kinds[0].robots[2]
     assert shift.effect.mean.mean == pytest.approx(received.effects()[:, 0].mean())
     assert shift.before.mean.mean == pytest.approx(received.faulty[:, :4, 0].mean())
@@ -93,10 +93,10 @@ def test_episodes_that_end_before_the_onset_do_not_count(tmp_path: Path) -> None
     run = make_run(tmp_path / "run", run_config("td-inner"))
     faulty, healthy = played(run, "blackout", 1), played(run, None, 1)
     faulty.lengths[:], healthy.lengths[:] = [4, 5, 8, 8, 2, 7], [4, 8, 6, 8, 2, 7]
-    twins = twins_of(faulty, healthy, 1, 4)
-    assert twins.happened.sum(1).tolist() == [5, 6, 8, 7]
-    np.testing.assert_array_equal(twins.faulty, faulty.steps["attention"][[1, 2, 3, 5]])
-    np.testing.assert_array_equal(twins.healthy, healthy.steps["attention"][[1, 2, 3, 5]])
+    rollouts = paired_rollouts(faulty, healthy, 1, 4)
+    assert rollouts.happened.sum(1).tolist() == [5, 6, 8, 7]
+    np.testing.assert_array_equal(rollouts.faulty, faulty.steps["attention"][[1, 2, 3, 5]])
+    np.testing.assert_array_equal(rollouts.healthy, healthy.steps["attention"][[1, 2, 3, 5]])
 
 
 def test_seeds_where_actions_are_drawn(tmp_path: Path) -> None:

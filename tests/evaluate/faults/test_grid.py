@@ -1,4 +1,4 @@
-"""The grid of faults: what is played, and what of it is kept."""
+"""The grid of faults: what is played, and what of it is retained."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from innerattn.config import Scenario
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.evaluate.faults.document import robustness_document, worst_robot
-from innerattn.evaluate.faults.grid import Grid, kept, play, play_all, rescues_by_step
+from innerattn.evaluate.faults.grid import Grid, play, play_all, rescues_by_step, retention_of
 from innerattn.evaluate.play import run_episodes
 from innerattn.policies import scripted_policy
 
@@ -59,7 +59,7 @@ def test_drawn_actions_are_the_same_until_the_fault_begins() -> None:
     )
 
 
-def test_no_severity_keeps_everything_and_the_worst_loses_the_only_medic() -> None:
+def test_severity_0_retains_everything_and_the_worst_loses_the_only_medic() -> None:
     grid = Grid(WORLDS, FAULT_KINDS, severities=(0.0, 1.0), episodes=8, seed=1)
     nothing = play_all([("greedy", scripted_policy("greedy", WORLDS))], grid)["greedy"]
     np.testing.assert_array_equal(nothing.cells.value[:, 0], 1.0)
@@ -73,22 +73,56 @@ def test_no_severity_keeps_everything_and_the_worst_loses_the_only_medic() -> No
     assert worst_robot(grid, lost, 0)[1].mean == 0.0
 
 
-def test_what_is_kept_is_the_ratio_since_the_onset() -> None:
+def test_retention_is_the_ratio_since_the_onset() -> None:
     played = play(scripted_policy("hungarian", WORLDS), SMALL)
-    found = kept(played, SMALL)
+    found = retention_of(played, SMALL)
     clean, faulty = played.clean, played.faulty
     assert found.cells.value[0, 1, 2, 0] == pytest.approx(faulty[0, 1, 2, 0].sum() / clean.sum())
     late = faulty[0, 1, 2, 1, :, 10:].sum() / clean[:, 10:].sum()
     assert found.cells.value[0, 1, 2, 1] == pytest.approx(late)
-    assert found.early.value[0, 1, 2] == pytest.approx(
+    assert found.early.retention.value[0, 1, 2] == pytest.approx(
         faulty[0, 1, 2, 1, :, 10:15].sum() / clean[:, 10:15].sum()
     )
-    assert found.late.value[0, 1, 2] == pytest.approx(
+    assert found.late.retention.value[0, 1, 2] == pytest.approx(
         faulty[0, 1, 2, 1, :, 15:].sum() / clean[:, 15:].sum()
     )
     half, worst = found.cells.value[0, :, 1, 0]
     assert found.areas.value[0, 1, 0] == pytest.approx(0.25 * (1 + half) + 0.25 * (half + worst))
     assert found.clean.value == pytest.approx(clean.sum() / 12)
+
+
+def test_rescues_are_counted_beside_retention() -> None:
+    played = play(scripted_policy("hungarian", WORLDS), SMALL)
+    found, clean, faulty = retention_of(played, SMALL), played.clean, played.faulty
+    windows = ((found.start, 0, 0, 20), (found.middle, 1, 10, 20))
+    windows += ((found.early, 1, 10, 15), (found.late, 1, 15, 20))
+    for window, onset, first, last in windows:
+        assert window.clean.value == pytest.approx(clean[:, first:last].sum() / 12)
+        for k, s, r in np.ndindex(2, 2, 4):
+            expected = faulty[k, s, r, onset, :, first:last].sum() / 12
+            assert window.rescues.value[k, s, r] == pytest.approx(expected)
+            assert window.retention.value[k, s, r] == pytest.approx(expected / window.clean.value)
+    for k in range(2):
+        of_robots = []
+        for r in range(4):
+            half, worst = (faulty[k, s, r, 0].sum() / 12 for s in (0, 1))
+            area = 0.25 * (clean.sum() / 12 + half) + 0.25 * (half + worst)
+            of_robots.append(area)
+        assert found.rescues_by_kind.value[k] == pytest.approx(np.mean(of_robots))
+    interval = found.rescues_by_kind[0].estimate()
+    assert interval.low < interval.mean < interval.high
+
+
+@pytest.mark.parametrize(("situation", "ceiling"), [("double", (0.4, 0.8)), ("mixed", (0.0, 0.2))])
+def test_recovery_has_room_in_double_and_none_in_mixed(
+    situation: str, ceiling: tuple[float, float]
+) -> None:
+    """Without its only medic no team goes on in mixed: the next wave never appears."""
+    worlds = Scenario.preset(situation).replace(episode_steps=100)
+    grid = Grid(worlds, ("unavailable",), severities=(1.0,), episodes=20, seed=1)
+    oracle = play_all([("oracle", scripted_policy("oracle", worlds))], grid)["oracle"]
+    medic = [robot.name for robot in worlds.robots].index("medical_0")
+    assert ceiling[0] <= oracle.late.retention.value[0, 0, medic] <= ceiling[1]
 
 
 def test_the_document_holds_every_cell_and_is_the_same_twice() -> None:
@@ -106,4 +140,18 @@ def test_the_document_holds_every_cell_and_is_the_same_twice() -> None:
     assert len(found["policies"][0]["cells"]) == 2 * 2 * 4 * 2
     assert found["differences"][0]["by_kind"]["blackout"]["mean"] == 0.0
     assert found["onset_steps"] == {"start": 0, "middle": 10}
+    for policy in found["policies"]:
+        rescues = policy["rescues_per_episode"]["mean"]
+        assert policy["rescues_with_fault"].keys() == {"unavailable", "blackout", "all"}
+        assert 0.0 < policy["rescues_with_fault"]["all"]["mean"] <= rescues
+        for cell in policy["cells"]:
+            if cell["onset"] == "start":
+                ratio = cell["rescues"]["mean"] / rescues
+                assert cell["retention"]["mean"] == pytest.approx(ratio)
+        without = policy["after_onset_without_fault"]
+        for kind in policy["after_onset"].values():
+            assert kind["late_rescues"]["mean"] <= without["late_rescues"]["mean"] * 1.2
+            for part in ("early", "late"):
+                ratio = kind[f"{part}_rescues"]["mean"] / without[f"{part}_rescues"]["mean"]
+                assert kind[part]["mean"] == pytest.approx(ratio)
     assert calls[-1] == (2 * 12 * 33, 2 * 12 * 33)

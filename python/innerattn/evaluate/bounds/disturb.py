@@ -39,8 +39,8 @@ ASCENT_STEPS = 8
 _ROWS_AT_ONCE = 4096
 
 
-class Found(NamedTuple):
-    """What the changes moved, in one row each; only entries that a change aims at count.
+class Measurements(NamedTuple):
+    """How far the changes moved what, one row each; only entries that a change aims at count.
 
     Random changes of e_j aim at rows i != j of the logits; those of o_j aim at row j, too.
 
@@ -63,7 +63,7 @@ def disturb(
     changed: Changed,
     direction: Direction,
     drawn: Tensor,
-) -> Found:
+) -> Measurements:
     """Change the input of each robot in turn.
 
     Args:
@@ -85,7 +85,7 @@ def disturb(
         rows = slice(start, start + at_once)
         part = states.some(rows)
         parts.append(_disturb(critic, actor, part, changed, direction, drawn[:, :, rows]))
-    return Found(
+    return Measurements(
         {name: torch.cat([part.sides[name] for part in parts], 1) for name in parts[0].sides},
         {name: torch.cat([part.moved[name] for part in parts]) for name in parts[0].moved},
     )
@@ -98,7 +98,7 @@ def _disturb(
     changed: Changed,
     direction: Direction,
     drawn: Tensor,
-) -> Found:
+) -> Measurements:
     logits = None
     if isinstance(critic, Critic) and isinstance(critic.attention, InnerAttention):
         logits = _Logits(critic, states)
@@ -125,7 +125,7 @@ def _disturb(
         keep("own_flips", response.own_flips, itself)
         keep("actor_flips", actor_flips(actor, states.obs, change), itself)
     sides = {} if logits is None else logits.sides(changed, direction, change, response)
-    return Found({name: _picked_sides(both, aimed) for name, both in sides.items()}, moved)
+    return Measurements({name: _picked_sides(both, aimed) for name, both in sides.items()}, moved)
 
 
 class _Logits:

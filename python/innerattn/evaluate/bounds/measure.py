@@ -101,10 +101,11 @@ def measure_bounds(
     for changed, direction in _CHANGES[attention]:
         for radius in RADII:
             drawn = radius * norms[changed].view(-1, 1, 1, 1) * units[changed]
-            found = disturb(critic, actor, states, changed, direction, drawn)
-            levels.append(level_of(changed, direction, radius, found))
+            measured = disturb(critic, actor, states, changed, direction, drawn)
+            levels.append(level_of(changed, direction, radius, measured))
             if progress is not None:
                 progress(len(levels), total)
+    values = critic(*states).q.flatten(1)
     return Bounds(
         attention=attention,
         seed=seed,
@@ -114,7 +115,7 @@ def measure_bounds(
         key_norms=_floats(heads.get("key")),
         embedding_norms=_floats(norms.get("embedding")),
         observation_norms=_floats(norms["observation"]),
-        value_deviation=float(critic(*states).q.flatten(1).var(1, correction=0).mean().sqrt()),
+        value_standard_deviation=float(values.var(1, correction=0).mean().sqrt()),
         levels=tuple(levels),
     )
 

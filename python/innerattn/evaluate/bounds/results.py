@@ -1,4 +1,4 @@
-"""From disturbances to the figures that are reported; it disturbs nothing."""
+"""From measurements to the results that are reported; it disturbs nothing."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from innerattn.evaluate.bounds.disturb import ASCENT_STEPS, Changed, Direction, Found
+from innerattn.evaluate.bounds.disturb import ASCENT_STEPS, Changed, Direction, Measurements
 from innerattn.evaluate.bounds.inequalities import TOLERANCE, violated
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 Attention = Literal["inner", "uniform", "none"]
 
 
 @dataclass(frozen=True)
 class Check:
-    """How one inequality, measured <= bound, did.
+    """How one inequality, measured <= bound, fared.
 
     Attributes:
         checks: how many times it was checked.
@@ -95,8 +95,8 @@ class Bounds:
         key_norms: ||w_k|| by head; likewise.
         embedding_norms: root mean square of ||e_j|| by robot; empty where there is no attention.
         observation_norms: root mean square of ||o_j|| by robot.
-        value_deviation: standard deviation of Q_i over states and own actions, the root mean square
-            over robots; what changes of Q compare with.
+        value_standard_deviation: of Q_i over states and own actions, the root mean square over
+            robots; the scale of changes of Q.
         levels: by what is changed, radius and direction.
     """
 
@@ -108,7 +108,7 @@ class Bounds:
     key_norms: tuple[float, ...]
     embedding_norms: tuple[float, ...]
     observation_norms: tuple[float, ...]
-    value_deviation: float
+    value_standard_deviation: float
     levels: tuple[Level, ...]
 
     @property
@@ -127,9 +127,11 @@ class Bounds:
         }
 
 
-def level_of(changed: Changed, direction: Direction, radius: float, found: Found) -> Level:
-    """The figures of one level from what its changes moved."""
-    moved = {name: values.numpy() for name, values in found.moved.items()}
+def level_of(
+    changed: Changed, direction: Direction, radius: float, measured: Measurements
+) -> Level:
+    """The results of one level."""
+    moved = {name: values.numpy() for name, values in measured.moved.items()}
 
     def values(prefix: str) -> ValueChange | None:
         if f"{prefix}values" not in moved:
@@ -143,7 +145,7 @@ def level_of(changed: Changed, direction: Direction, radius: float, found: Found
         changed=changed,
         direction=direction,
         radius=radius,
-        checks={name: _check(*sides) for name, sides in found.sides.items()},
+        checks={name: _check(*sides) for name, sides in measured.sides.items()},
         largest_weight_change=None if weights is None else float(np.abs(weights).max()),
         teammates=values(""),
         own=values("own_"),

@@ -1,7 +1,7 @@
-"""Where a trained critic's attention goes when a robot fails: plays the worlds of the question.
+"""Where a trained critic's attention goes when a robot fails: plays what has to be compared.
 
-The same worlds are played without a fault and with each fault of each robot; what the figures mean
-is in `shift` and docs/robustness.md.
+The same worlds are played without a fault and with each fault of each robot. For the results see
+`innerattn.measures.faults.shift_results` and docs/robustness.md.
 """
 
 from __future__ import annotations
@@ -48,14 +48,14 @@ def fault_attention_of_run(
     seed: int | None = None,
     progress: ProgressCall | None = None,
 ) -> FaultAttention:
-    """Let each robot fail in each way at half-time, and see where attention goes.
+    """Let each robot fail in each way in the middle of the episode, and see where attention goes.
 
     Args:
         run: the run folder; nothing is written into it.
         kinds: of faults.
         episodes: worlds that each fault is played in, E >= 1; areas take time in E squared.
         steps: length of an episode, T >= 2; none: twice that of training.
-        seed: of the worlds, the bootstrap and the lots; none: as the configuration says.
+        seed: of the worlds, the bootstrap and the shuffled labels; none: as the configuration says.
         progress: called after each play.
 
     Raises:
@@ -104,19 +104,19 @@ def fault_attention_of_run(
         if not counted:
             raise RunError(f"{run}: no episode goes on until step {onset}, when the faults begin")
         draws = resampled_counts(counted, seed)
-        found: list[KindShift] = []
+        shifts_of_kinds: list[KindShift] = []
         pools: list[Pooled] = []
         for kind in kinds:
             received, shifts = [], []
             for index, robot in enumerate(robots):
                 fault = fault_of(worlds, index, kind, 1.0, onset)
-                twins = twins_of(play(fault), healthy, index, onset)
-                received.append(twins.received())
-                shifts.append(shift_of(robot.name, fault.value, twins, draws, seed))
+                rollouts = paired_rollouts(play(fault), healthy, index, onset)
+                received.append(rollouts.received())
+                shifts.append(shift_of(robot.name, fault.value, rollouts, draws, seed))
             pools.append(pooled_robots(received))
             effect = by_head(pools[-1].effects, draws)
             auc = areas_by_head(pools[-1].comparison, draws)
-            found.append(KindShift(kind, effect, auc, tuple(shifts)))
+            shifts_of_kinds.append(KindShift(kind, effect, auc, tuple(shifts)))
     overall = pooled_kinds(pools)
     return FaultAttention(
         attention=config.network.attention,
@@ -129,11 +129,11 @@ def fault_attention_of_run(
         even_share=1.0 / (len(robots) - 1),
         effect=by_head(overall.effects, draws),
         auc=areas_by_head(overall.comparison, draws),
-        kinds=tuple(found),
+        kinds=tuple(shifts_of_kinds),
     )
 
 
-def twins_of(faulty: Record, healthy: Record, robot: int, onset: int) -> PairedRollouts:
+def paired_rollouts(faulty: Record, healthy: Record, robot: int, onset: int) -> PairedRollouts:
     """The attention of two records of the same worlds, in the episodes that reach the onset.
 
     Args:

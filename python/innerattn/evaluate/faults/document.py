@@ -1,4 +1,4 @@
-"""The figures of robustness as one document; it runs nothing and prints nothing."""
+"""Retention of policies under faults as one document; it runs nothing and prints nothing."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ from innerattn.stats.bootstrap import Resampled
 SCHEMA_VERSION = 1
 
 
-def robustness_document(grid: Grid, found: Mapping[str, Retention], runs: Mapping[str, str]) -> Any:
+def robustness_document(
+    grid: Grid, policies: Mapping[str, Retention], runs: Mapping[str, str]
+) -> dict[str, Any]:
     """What `robustness --json` holds about retention.
 
     Args:
         grid: the faults.
-        found: what each policy keeps, by name; the first is the one that others are compared with.
+        policies: retention by policy; the others are compared with the first one.
         runs: training method by name, of those policies that are trained.
     """
-    first = next(iter(found))
+    first = next(iter(policies))
     return {
         "schema_version": SCHEMA_VERSION,
         "situation": grid.scenario.situation,
@@ -33,24 +35,24 @@ def robustness_document(grid: Grid, found: Mapping[str, Retention], runs: Mappin
         "onset_steps": {"start": 0, "middle": grid.middle},
         "severities": list(grid.severities),
         "policies": [
-            {"policy": name, "method": runs.get(name, name), **_policy(grid, kept)}
-            for name, kept in found.items()
+            {"policy": name, "method": runs.get(name, name), **_policy(grid, one)}
+            for name, one in policies.items()
         ],
         "differences": [
             {
                 "policy": first,
                 "minus": name,
-                "by_kind": _by_kind(grid, found[first].by_kind() - kept.by_kind()),
+                "by_kind": _by_kind(grid, policies[first].by_kind() - one.by_kind()),
             }
-            for name, kept in found.items()
+            for name, one in policies.items()
             if name != first
         ],
     }
 
 
-def worst_robot(grid: Grid, kept: Retention, kind: int, onset: int = 0) -> tuple[str, Estimate]:
-    """The robot whose fault of a kind, at the last severity, costs most; and what is kept then."""
-    row = kept.cells[kind, -1, :, onset]
+def worst_robot(grid: Grid, retained: Retention, kind: int, onset: int = 0) -> tuple[str, Estimate]:
+    """The robot whose fault of a kind, at the last severity, costs most; and the retention then."""
+    row = retained.cells[kind, -1, :, onset]
     robot = int(row.value.argmin())
     return grid.scenario.robots[robot].name, row[robot].estimate()
 
@@ -61,30 +63,40 @@ def number(estimate: Estimate) -> dict[str, float | int | None] | None:
     return estimate.to_json() if defined else None
 
 
-def _policy(grid: Grid, kept: Retention) -> dict[str, Any]:
+def _policy(grid: Grid, retained: Retention) -> dict[str, Any]:
+    early, late = retained.early, retained.late
+    change = (late.retention - early.retention).mean((1, 2))
+    since_onset = (retained.start, retained.middle)
     return {
-        "rescues_per_episode": number(kept.clean.estimate()),
-        "by_kind": _by_kind(grid, kept.by_kind()),
+        "rescues_per_episode": number(retained.clean.estimate()),
+        "rescues_with_fault": _by_kind(grid, retained.rescues_by_kind),
+        "by_kind": _by_kind(grid, retained.by_kind()),
         "worst": [
             {"kind": kind, "onset": onset, "robot": worst[0], "retention": number(worst[1])}
             for k, kind in enumerate(grid.kinds)
             for o, onset in enumerate(ONSETS)
-            for worst in [worst_robot(grid, kept, k, o)]
+            for worst in [worst_robot(grid, retained, k, o)]
         ],
         "after_onset": {
             kind: {
-                "early": number(kept.early.mean((1, 2))[k].estimate()),
-                "late": number(kept.late.mean((1, 2))[k].estimate()),
-                "late_minus_early": number((kept.late - kept.early).mean((1, 2))[k].estimate()),
+                "early": number(early.retention.mean((1, 2))[k].estimate()),
+                "late": number(late.retention.mean((1, 2))[k].estimate()),
+                "late_minus_early": number(change[k].estimate()),
+                "early_rescues": number(early.rescues.mean((1, 2))[k].estimate()),
+                "late_rescues": number(late.rescues.mean((1, 2))[k].estimate()),
             }
             for k, kind in enumerate(grid.kinds)
+        },
+        "after_onset_without_fault": {
+            "early_rescues": number(early.clean.estimate()),
+            "late_rescues": number(late.clean.estimate()),
         },
         "areas": [
             {"kind": kind, "robot": robot.name, "onset": onset, "area": number(area)}
             for k, kind in enumerate(grid.kinds)
             for r, robot in enumerate(grid.scenario.robots)
             for o, onset in enumerate(ONSETS)
-            for area in [kept.areas[k, r, o].estimate()]
+            for area in [retained.areas[k, r, o].estimate()]
         ],
         "cells": [
             {
@@ -93,7 +105,8 @@ def _policy(grid: Grid, kept: Retention) -> dict[str, Any]:
                 "value": fault_of(grid.scenario, r, kind, severity).value,
                 "robot": robot.name,
                 "onset": onset,
-                "retention": number(kept.cells[k, s, r, o].estimate()),
+                "rescues": number(since_onset[o].rescues[k, s, r].estimate()),
+                "retention": number(retained.cells[k, s, r, o].estimate()),
             }
             for k, kind in enumerate(grid.kinds)
             for s, severity in enumerate(grid.severities)

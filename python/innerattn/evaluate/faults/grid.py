@@ -1,8 +1,8 @@
-"""What policies still achieve when a robot fails: every kind of fault, severity, robot and onset.
+"""Rescues of policies when a robot fails: every kind of fault, severity, robot and onset.
 
 The worlds are the same for all policies and faults, and the same as without a fault, so that every
 comparison is paired; a policy that draws its actions begins with the same draws each time. Trained
-actors are frozen: nobody learns from a fault.
+actors are frozen: no policy learns from a fault.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from innerattn.config import Scenario
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.evaluate.faults.severity import fault_of
 from innerattn.evaluate.play import run_episodes
-from innerattn.measures.faults.retention import area, retention
+from innerattn.measures.faults.retention import area, mean_rescues, retention
 from innerattn.policies import Policy
 from innerattn.records.record import Record
 from innerattn.stats.bootstrap import Resampled, resampled_counts
@@ -71,8 +71,8 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Played:
-    """Rescues of one policy.
+class RescueCounts:
+    """Rescues of one policy, step by step.
 
     Attributes:
         clean: (E, T) int64 rescues by world and control step, without a fault.
@@ -89,7 +89,7 @@ def play(
     *,
     num_threads: int | None = None,
     progress: Callable[[int], None] | None = None,
-) -> Played:
+) -> RescueCounts:
     """Run a policy without and with every fault of the grid.
 
     Args:
@@ -113,7 +113,7 @@ def play(
                 for o, onset in enumerate(ONSETS):
                     worlds = grid.worlds(kind, severity, robot, onset)
                     faulty[k, s, robot, o] = rescues(worlds)
-    return Played(clean, faulty)
+    return RescueCounts(clean, faulty)
 
 
 def rescues_by_step(record: Record) -> NDArray[np.int64]:
@@ -125,49 +125,82 @@ def rescues_by_step(record: Record) -> NDArray[np.int64]:
 
 
 @dataclass(frozen=True)
-class Retention:
-    """How much of its rescues a policy keeps.
+class Window:
+    """Rescues and retention in the same steps of every episode, with faults of one onset.
 
     Attributes:
-        clean: rescues per episode without a fault.
-        cells: (K, S, R, O) retention since the fault's onset.
-        areas: (K, R, O) mean retention over severities from 0 to the last.
-        early: (K, S, R) retention in the first half of what follows an onset in the middle.
-        late: (K, S, R) retention in the second half of it.
+        clean: () rescues per episode without a fault.
+        rescues: (K, S, R) rescues per episode with each fault.
+        retention: (K, S, R) their ratio.
     """
 
     clean: Resampled
+    rescues: Resampled
+    retention: Resampled
+
+
+@dataclass(frozen=True)
+class Retention:
+    """What a policy achieves under faults, and the share of its rescues that it retains.
+
+    Attributes:
+        start: the whole episode, with faults from the start.
+        middle: from the middle of the episode on, with faults from there.
+        early: the first half of ``middle``.
+        late: the second half of ``middle``.
+        cells: (K, S, R, O) retention since the fault's onset: of ``start`` and of ``middle``.
+        areas: (K, R, O) mean retention over severities from 0 to the last.
+        rescues_by_kind: (K,) rescues per episode with a fault from the start, a mean over
+            severities from 0 to the last and robots.
+    """
+
+    start: Window
+    middle: Window
+    early: Window
+    late: Window
     cells: Resampled
     areas: Resampled
-    early: Resampled
-    late: Resampled
+    rescues_by_kind: Resampled
+
+    @property
+    def clean(self) -> Resampled:
+        """Rescues per episode without a fault."""
+        return self.start.clean
 
     def by_kind(self) -> Resampled:
         """Mean of the areas over robots and onsets, (K,)."""
         return self.areas.mean((1, 2))
 
 
-def kept(played: Played, grid: Grid) -> Retention:
+def retention_of(counts: RescueCounts, grid: Grid) -> Retention:
     """The retention of one policy; all policies of a grid share the resamples."""
     weights = resampled_counts(grid.episodes, grid.seed, RESAMPLES)
-    steps = played.clean.shape[1]
+    severities = np.asarray(grid.severities)
+    steps = counts.clean.shape[1]
     half = grid.middle + (steps - grid.middle) // 2
 
-    def since(first: int, last: int, onset: slice | int) -> Resampled:
-        faulty = played.faulty[:, :, :, onset, :, first:last].sum(-1)
-        return retention(faulty, played.clean[:, first:last].sum(-1), weights)
+    def window(first: int, last: int, onset: int) -> Window:
+        clean = counts.clean[:, first:last].sum(-1)
+        faulty = counts.faulty[:, :, :, onset, :, first:last].sum(-1)
+        return Window(
+            mean_rescues(clean, weights),
+            mean_rescues(faulty, weights),
+            retention(faulty, clean, weights),
+        )
 
-    parts = [since(0, steps, 0), since(grid.middle, steps, 1)]
+    start, middle = window(0, steps, 0), window(grid.middle, steps, 1)
+    parts = (start.retention, middle.retention)
     cells = Resampled(
         np.stack([part.value for part in parts], 3), np.stack([part.resampled for part in parts], 3)
     )
-    totals = played.clean.sum(1)
     return Retention(
-        clean=Resampled(np.asarray(totals.mean()), weights @ totals / grid.episodes),
+        start=start,
+        middle=middle,
+        early=window(grid.middle, half, 1),
+        late=window(half, steps, 1),
         cells=cells,
-        areas=area(cells, np.asarray(grid.severities), axis=1),
-        early=since(grid.middle, half, 1),
-        late=since(half, steps, 1),
+        areas=area(cells, severities, axis=1),
+        rescues_by_kind=area(start.rescues, severities, axis=1, intact=start.clean).mean(1),
     )
 
 
@@ -187,7 +220,7 @@ def play_all(
         progress: called each time some episodes are done.
 
     Returns:
-        What each keeps, by name.
+        What each retains, by name.
     """
     total = len(policies) * grid.episodes * (1 + math.prod(grid.shape))
     done = 0
@@ -198,8 +231,8 @@ def play_all(
         if progress is not None:
             progress(done, total)
 
-    found = {}
+    retained = {}
     for name, policy in policies:
-        played = play(policy, grid, num_threads=num_threads, progress=count)
-        found[name] = kept(played, grid)
-    return found
+        counts = play(policy, grid, num_threads=num_threads, progress=count)
+        retained[name] = retention_of(counts, grid)
+    return retained

@@ -1,4 +1,4 @@
-"""What a study of faults found, in the few numbers that its tables show."""
+"""Retention and attention under faults, in the few numbers that tables show."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ class KindOverview:
 
     Attributes:
         kind: of the fault.
+        rescues: per episode with a fault from the start, mean over severities and robots.
         retention: mean over severities, robots and onsets.
         by_severity: of a fault from the start, mean over robots; NaN where there is none.
         worst_robot: the robot whose worst fault costs most.
@@ -26,6 +27,7 @@ class KindOverview:
     """
 
     kind: str
+    rescues: Estimate
     retention: Estimate
     by_severity: tuple[float, ...]
     worst_robot: str
@@ -41,27 +43,31 @@ class Overview:
 
     Attributes:
         rescues: per episode, without a fault.
+        rescues_with_fault: per episode with a fault from the start, mean over the kinds.
         kinds: by kind of fault.
         retention: mean over the kinds.
     """
 
     rescues: Estimate
+    rescues_with_fault: Estimate
     kinds: tuple[KindOverview, ...]
     retention: Estimate
 
 
-def overview(grid: Grid, found: Retention) -> Overview:
+def overview(grid: Grid, retained: Retention) -> Overview:
     """The numbers of one policy."""
-    areas = found.by_kind()
-    early, late = found.early.mean((1, 2)), found.late.mean((1, 2))
+    areas = retained.by_kind()
+    rescues = retained.rescues_by_kind
+    early, late = (part.retention.mean((1, 2)) for part in (retained.early, retained.late))
     kinds = []
     for k, kind in enumerate(grid.kinds):
-        robot, worst = worst_robot(grid, found, k)
+        robot, worst = worst_robot(grid, retained, k)
         kinds.append(
             KindOverview(
                 kind=kind,
+                rescues=rescues[k].estimate(),
                 retention=areas[k].estimate(),
-                by_severity=tuple(found.cells.value[k, :, :, 0].mean(1).tolist()),
+                by_severity=tuple(retained.cells.value[k, :, :, 0].mean(1).tolist()),
                 worst_robot=robot,
                 worst=worst,
                 early=early[k].estimate(),
@@ -69,10 +75,15 @@ def overview(grid: Grid, found: Retention) -> Overview:
                 change=(late[k] - early[k]).estimate(),
             )
         )
-    return Overview(found.clean.estimate(), tuple(kinds), areas.mean(0).estimate())
+    return Overview(
+        rescues=retained.clean.estimate(),
+        rescues_with_fault=rescues.mean(0).estimate(),
+        kinds=tuple(kinds),
+        retention=areas.mean(0).estimate(),
+    )
 
 
-def weight_without_fault(found: KindShift) -> float:
+def weight_without_fault(shift_of_kind: KindShift) -> float:
     """Mean weight on a robot at the steps of its fault, in the same worlds without the fault."""
-    weights = [shift.after.mean.mean - shift.effect.mean.mean for shift in found.robots]
+    weights = [shift.after.mean.mean - shift.effect.mean.mean for shift in shift_of_kind.robots]
     return sum(weights) / len(weights)

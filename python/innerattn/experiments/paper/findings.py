@@ -101,14 +101,15 @@ def find(runs: Sequence[FinishedRun], parts: Collection[str] = PARTS) -> Finding
         runs=ordered,
         claims=tuple(sorted(claims, key=lambda claim: CLAIMS.index(claim.claim))),
         table=table,
-        comparison=_compared(table) if table else None,
+        comparison=compare(table) if table else None,
         courses=courses,
         scene=_scene(groups) if "fig5" in parts else None,
         evidence=found,
     )
 
 
-def _compared(table: Table2) -> Comparison:
+def compare(table: Table2) -> Comparison:
+    """What stands beside Table II."""
     beside = table.competence
     merit = imbalance_score_correlations(beside)
     return Comparison(tuple(pairs(beside)), tuple(together(beside)), tuple(merit))

@@ -17,10 +17,9 @@ from innerattn.measures.sharing.handoff import handoffs
 SCHEMA_VERSION = 1
 
 SCENE_RULE = (
-    "the run of lowest seed; of the first food robot's handoffs from the first task to the "
-    "second with another partner, in the episodes recorded step by step, the one whose shorter "
-    "stage (before and after the first rescue) is longest, then the one that is longest in all, "
-    "then the first"
+    "of the run of lowest seed and the first food robot's handoffs from the first task to the "
+    "second, the one whose shorter stage (before or after the first rescue) is longest, then the "
+    "longest in all, then the first"
 )
 """How the handoff that is shown is chosen; it looks at no attention weight."""
 

@@ -23,10 +23,10 @@ def shuffled_labels(
 
     In every episode each robot is as likely to be labelled as any other, and the mean change of the
     weight that it gets from its teammates is taken. The row of the robot that really fails is left
-    out, since many faults spoil its own observations. All teammates are asked about the same robot:
-    they tend to turn to the same one, and independent labels would underestimate chance. The weight
-    on the failing robot is a mean over one robot more than that on others, so that it varies less;
-    the test is conservative, with three robots very much so.
+    out, since many faults spoil its own observations. The label is the same for all teammates: they
+    tend to turn to the same robot, and independent labels would underestimate chance. The weight on
+    the failing robot is a mean over one robot more than that on others, so that it varies less: the
+    test is conservative, with three robots very much so.
 
     Args:
         change: (E, R, R) change of the weight of robot i (row) on robot k, R >= 3.

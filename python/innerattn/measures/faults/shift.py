@@ -1,6 +1,6 @@
-"""Where attention goes when a robot fails: figures from recorded weights. It plays nothing.
+"""Where attention goes when a robot fails, from recorded weights. It plays nothing.
 
-Every figure is of the weight that the failing robot gets from its teammates, around the onset of
+Everything is about the weight that the failing robot gets from its teammates, around the onset of
 its fault and in the same worlds without the fault.
 """
 
@@ -55,7 +55,7 @@ class PairedRollouts(NamedTuple):
         )
 
     def changed_rows(self) -> NDArray[np.float64]:
-        """(E, R, R) float64 what the fault did to each weight, over heads and steps after it."""
+        """(E, R, R) float64 effect on each weight, a mean over heads and steps since the onset."""
         steps = slice(self.onset, self.onset + self.width)
         happened = self.happened[:, steps]
         moved = self.faulty[:, steps].astype(np.float64) - self.healthy[:, steps]
@@ -89,7 +89,7 @@ class Received(NamedTuple):
 
 
 class Pooled(NamedTuple):
-    """What several faults did, in the same worlds.
+    """The effects of several faults, in the same worlds.
 
     Attributes:
         effects: (E, 1 + H) float64, averaged over the faults.
@@ -101,28 +101,28 @@ class Pooled(NamedTuple):
 
 
 def shift_of(
-    robot: str, value: float, twins: PairedRollouts, draws: NDArray[np.float64], seed: int
+    robot: str, value: float, rollouts: PairedRollouts, draws: NDArray[np.float64], seed: int
 ) -> Shift:
-    """What one robot's fault did.
+    """The effect of one robot's fault.
 
     Args:
         robot: its name.
         value: of the fault.
-        twins: weights with the fault and without, of R >= 3 robots.
+        rollouts: weights with the fault and without, of R >= 3 robots.
         draws: (S, E) how often each episode is in each resample.
-        seed: of the labels that are dealt by lot.
+        seed: of the shuffled labels.
 
     Raises:
         ValueError: there are fewer than three robots.
     """
-    received = twins.received()
-    middle = twins.width
+    received = rollouts.received()
+    middle = rollouts.width
     before = np.nanmean(received.faulty[:, :middle], 1)
     after = np.nanmean(received.faulty[:, middle:], 1)
-    shown = min(CURVE_STEPS, middle)
-    near = slice(middle - shown, middle + shown)
+    steps = min(CURVE_STEPS, middle)
+    near = slice(middle - steps, middle + steps)
     moved = received.faulty - received.healthy
-    shuffled, p_value = shuffled_labels(twins.changed_rows(), twins.robot, seed)
+    shuffled, p_value = shuffled_labels(rollouts.changed_rows(), rollouts.robot, seed)
     return Shift(
         robot=robot,
         value=value,

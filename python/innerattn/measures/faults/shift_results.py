@@ -1,4 +1,4 @@
-"""What is reported about attention when a robot fails; it computes nothing."""
+"""The results about attention when a robot fails, as data; it computes nothing."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CURVE_STEPS = 8
 
 @dataclass(frozen=True)
 class ByHead:
-    """A figure of the weights averaged over heads, and of each head's own."""
+    """An estimate for the weights averaged over heads, and for each head's own."""
 
     mean: Estimate
     heads: tuple[Estimate, ...]
@@ -24,7 +24,7 @@ class ByHead:
 
 @dataclass(frozen=True)
 class Shift:
-    """What one robot's fault did to the weight on it, alpha_ij averaged over its teammates i.
+    """The effect of one robot's fault on the weight on it, alpha_ij averaged over its teammates i.
 
     Intervals are bootstraps over episodes.
 
@@ -35,12 +35,12 @@ class Shift:
         after: over as many steps from the onset on.
         change: ``after`` minus ``before``; other things than the fault change with time, too.
         effect: mean weight after the onset minus that at the same steps of the same worlds without
-            the fault; what the fault did.
+            the fault; the effect of the fault.
         curve: mean weight by step, as many before the onset as from it on; None where no episode
             goes on.
         effect_curve: likewise, minus that without the fault; 0 before the onset.
-        shuffled: ``effect`` on robots that are called failing by lot, in the middle 95 % of lots.
-        p_value: how often such a lot is as far from 0 as ``effect``.
+        shuffled: ``effect`` on robots that are labelled failing at random, and its middle 95 %.
+        p_value: two-sided, of the permutation test that shuffles these labels.
         auc: how well the weight tells that the robot is faulty; see `KindShift`.
     """
 
@@ -59,7 +59,7 @@ class Shift:
 
 @dataclass(frozen=True)
 class KindShift:
-    """What one kind of fault did to the weight on the robot that has it.
+    """The effect of one kind of fault on the weight on the robot that has it.
 
     Attributes:
         kind: of the fault.
@@ -83,12 +83,12 @@ class FaultAttention:
     Attributes:
         attention: "inner" or "uniform"; uniform weights do not move, so all effects are 0 (unless
             unavailable robots are masked).
-        seed: of the worlds, the bootstrap and the lots.
+        seed: of the worlds, the bootstrap and the shuffled labels.
         episodes: worlds played.
-        counted: those that go on until the onset; figures are over them.
+        counted: those that go on until the onset; all results are over them.
         episode_steps: their length T [control steps].
         onset_step: at which the faults begin.
-        shuffles: how often labels were dealt by lot.
+        shuffles: how often labels were shuffled.
         even_share: 1 / (R - 1), the weight of every teammate where attention is even.
         effect: over all kinds and robots; see `KindShift`.
         auc: likewise, over the pairs of all kinds.

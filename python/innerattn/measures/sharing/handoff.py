@@ -1,6 +1,6 @@
 """Handoffs (Fig. 5): a robot completes one task with one partner, the next with another.
 
-They are found in rescue events; `handoff_attention` measures attention around them.
+They are read off rescue events; `handoff_attention` measures attention around them.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def rescues_nobody(
     With ``robot`` replaced by another one, these are the handoffs at which the other does nothing.
 
     Args:
-        record: the one that the handoffs were found in.
+        record: the one that the handoffs are of.
         handoffs: (N,) `HANDOFF`.
         reach: see `window`.
     """

@@ -102,9 +102,7 @@ def handoff_attention(
     names, episode = np.unique(handoffs["episode"], return_inverse=True)
     changes = _mean(weights, counted & (offsets > 0)) - _mean(weights, counted & (offsets <= 0))
     roles = partners - (partners > handoffs["robot"])
-    to_be, before = (
-        Attended(*_courses(weights, counted, changes, role, episode)) for role in roles
-    )
+    to_be, before = (Attended(*_curves(weights, counted, changes, role, episode)) for role in roles)
     on_next, on_last = (
         np.take_along_axis(changes, role[:, None, None], -1)[..., 0] for role in roles
     )
@@ -154,7 +152,7 @@ def _mean(weights: Array, chosen: NDArray[np.bool_]) -> Array:
     return np.asarray(total / chosen.sum(1)[:, None, None])
 
 
-def _courses(
+def _curves(
     weights: Array,
     counted: NDArray[np.bool_],
     changes: Array,

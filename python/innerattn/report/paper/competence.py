@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from innerattn.experiments.paper.competence import Competence, competence_units
 from innerattn.experiments.paper.imbalance_score import ImbalanceScoreCorrelation
-from innerattn.experiments.paper.pairs import Pair, Together
+from innerattn.experiments.paper.pairs import MARGINS, Pair, Together
 from innerattn.measures.registry import MEASURES
 from innerattn.policies import SCRIPTED
 from innerattn.report.table import Column, Row, Table, columns, plain_table
@@ -69,6 +69,21 @@ def pairs_table(pairs: Sequence[Pair]) -> Table:
         ]
         rows.append(cells)
     return plain_table(heads, rows)
+
+
+def pairs_summary(pairs: Sequence[Pair]) -> Table:
+    """The differences alone, a row for each situation and algorithm."""
+    heads = [*columns(["situation", "algorithm"])]
+    for name, margin in MARGINS.items():
+        heads.append(Column(f"{_words(name)}: inner − uniform [95 %]"))
+        heads.append(Column(f"alike within {margin:g}?", right=False))
+    rows: dict[tuple[str, str], list[str]] = {}
+    for pair in pairs:
+        cells = rows.setdefault((pair.situation, pair.algorithm), [])
+        found = pair.found
+        cells.append(format_estimate(found.difference if found else None, 3))
+        cells.append(NONE if found is None else "yes" if found.equivalent else "not shown")
+    return plain_table(heads, [[s, a.upper(), *cells] for (s, a), cells in rows.items()])
 
 
 def together_table(found: Sequence[Together]) -> Table:

@@ -16,23 +16,18 @@ from innerattn.stats.text import NONE, format_estimate
 
 def entropy_table(courses: Sequence[EntropyCourse]) -> Table:
     """How selective attention begins and ends; attention that never chooses is left out."""
-    heads = columns(
-        ["situation", "method"],
-        [
-            *("first tenth [nats]", "last tenth [nats]", "change [nats]"),
-            *("last tenth / ln(N − 1)", "teammates in effect"),
-        ],
-    )
+    numbers = ["first tenth [nats]", "last tenth [nats]", "change [nats]", "last tenth / ln(N − 1)"]
+    heads = columns(["situation", "method"], numbers)
     rows = []
     for course in courses:
         if course.chooses:
-            end, even = course.end.mean, course.even_nats
+            even = course.even_nats
             cells = [
                 format_estimate(course.begin),
                 format_estimate(course.end),
                 format_estimate(course.change),
             ]
-            cells += [f"{end / even:.2f}" if even else NONE, f"{np.exp(end):.2f}"]
+            cells += [f"{course.end.mean / even:.2f}" if even else NONE]
             rows.append([course.situation, course.method, *cells])
     return plain_table(heads, rows)
 

@@ -12,28 +12,21 @@ from innerattn.report.table import Row, Table, columns, plain_table
 from innerattn.stats.seeds import BAND_NAMES
 from innerattn.stats.text import NONE, format_estimate, format_p, format_signed
 
-_CHANGES = (
-    "change on the next partner",
-    "bystander's",
-    "difference",
-    "ceiling",
-    "difference − half the change",
-    "change on the last partner",
-    "bystander's",
-)
+_NEXT = ("change on the next partner", "bystander's", "difference", "ceiling")
+_MORE = ("difference − half the change", "change on the last partner", "bystander's")
 
 
 def evidence_summary(found: Sequence[Evidence]) -> Table:
     """Means over the runs of each situation and method."""
-    heads = columns(["situation", "method"], ["handoffs of all", *_CHANGES])
-    return plain_table(heads, [_means(part) for part in found])
+    heads = columns(["situation", "method"], ["handoffs of all", *_NEXT])
+    return plain_table(heads, [_means(part)[: len(heads)] for part in found])
 
 
 def evidence_table(found: Sequence[Evidence]) -> Table:
     """Every run, and the means."""
     heads = columns(
         ["situation", "method"],
-        ["seed", "handoffs of all", "episodes", *_CHANGES, "p", "bystander's p"],
+        ["seed", "handoffs of all", "episodes", *_NEXT, *_MORE, "p", "bystander's p"],
     )
     rows: list[Row] = []
     for part in found:

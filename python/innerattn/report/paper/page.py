@@ -9,7 +9,7 @@ from innerattn.experiments.paper.findings import Comparison, Findings
 from innerattn.experiments.paper.scene import SCENE_RULE
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION, Table2
 from innerattn.report.paper.claims import claims_summary, claims_table
-from innerattn.report.paper.competence import merit_table, pairs_table, together_table
+from innerattn.report.paper.competence import merit_table, pairs_summary
 from innerattn.report.paper.fig4 import entropy_table, logged
 from innerattn.report.paper.fig5 import evidence_summary
 from innerattn.report.paper.table2 import sharing_summary
@@ -17,7 +17,7 @@ from innerattn.report.table import markdown
 from innerattn.stats.text import format_seeds
 
 _FILES = {
-    "table2": "[table2.md](table2.md) has sharing, every run and competence in all situations, "
+    "table2": "[table2.md](table2.md) has all situations, every run and competence, "
     "[table2.csv](table2.csv) the same as values.",
     "evidence": "[fig5_evidence.md](fig5_evidence.md) has the handoffs of every run.",
     "runs": "[runs.csv](runs.csv) names every run with its digests.",
@@ -95,16 +95,9 @@ def _compared(found: Comparison) -> str:
     if found.pairs:
         text += (
             "## Learnt attention beside uniform attention\n\n"
-            f"{markdown(pairs_table(found.pairs))}\n"
-            "Each seed gives one difference; p is of the paired t-test. *Alike*: two one-sided "
-            "tests at 5 % put the difference within the margin.\n"
-        )
-    if found.together:
-        text += (
-            f"\n{markdown(together_table(found.together))}\n"
-            "Interquartile means of the score over situations, and the probability that a run "
-            "with learnt attention scores higher (Agarwal et al. 2021). The bootstrap takes runs "
-            "of one seed as independent, so intervals are too short where runs are few.\n"
+            f"{markdown(pairs_summary(found.pairs))}\n"
+            "Each seed gives one difference. *Alike*: two one-sided tests at 5 % put the "
+            "difference within the margin. Means and p-values are in [table2.md](table2.md).\n"
         )
     if found.merit:
         text += (
@@ -126,9 +119,8 @@ def _fig4(findings: Findings) -> str:
         f"{title}![Entropy of attention in training](fig4.png)\n\n"
         f"{markdown(entropy_table(courses))}\n"
         "Black: mean over robots and heads with its band over runs. Colours: robots. Dots at the "
-        "right: every head of every run, mean over the last tenth of training. Teammates in effect "
-        f"are exp(entropy). Logged at {logged(courses)} env-steps. Uniform attention stays at "
-        "ln(N − 1).\n"
+        "right: every head of every run, mean over the last tenth of training. Uniform attention "
+        f"stays at ln(N − 1). Logged at {logged(courses)} env-steps.\n"
     )
 
 
@@ -151,7 +143,8 @@ def _fig5(findings: Findings) -> str:
         return f"{text}\nThere is no handoff to show.\n"
     return (
         f"{text}\n![One handoff](fig5.png)\n\n"
-        f"One handoff as an illustration: {findings.scene.title}. A rule chose it: {SCENE_RULE}.\n"
+        f"One handoff as an illustration: {findings.scene.title}. A rule chose it that looks at no "
+        f"attention: {SCENE_RULE}.\n"
     )
 
 

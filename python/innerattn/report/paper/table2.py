@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from innerattn.experiments.paper.findings import Comparison
 from innerattn.experiments.paper.sharing_claims import share_shown, verdicts_shown
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import MARGIN, ChiSquared, Evenness, EvennessOfRuns
-from innerattn.report.paper.competence import competence_table, competence_terms
+from innerattn.report.paper.competence import (
+    competence_table,
+    competence_terms,
+    pairs_table,
+    together_table,
+)
 from innerattn.report.table import Column, Table, columns, markdown, plain_table
 from innerattn.stats.text import NONE, format_estimate, format_number, format_p
 
@@ -24,9 +30,23 @@ _TERMS = f"""\
 """
 
 
-def table2_markdown(table: Table2) -> str:
-    """The long tables: sharing, every run and competence, by situation."""
+def table2_markdown(table: Table2, comparison: Comparison) -> str:
+    """The long tables: both attentions, then sharing, every run and competence by situation."""
     parts = ["# Table II, and how well the same runs do\n", _TERMS, competence_terms()]
+    if comparison.pairs:
+        parts += [
+            "## Learnt attention beside uniform attention\n",
+            markdown(pairs_table(comparison.pairs)),
+            "Each seed gives one difference; p is of the paired t-test. *Alike*: two one-sided "
+            "tests at 5 % put the difference within the margin.\n",
+        ]
+    if comparison.together:
+        parts += [
+            markdown(together_table(comparison.together)),
+            "Interquartile means of the score over situations, and the probability that a run "
+            "with learnt attention scores higher (Agarwal et al. 2021). The bootstrap takes runs "
+            "of one seed as independent, so intervals are too short where runs are few.\n",
+        ]
     for situation in dict.fromkeys(row.situation for row in table.rows):
         rows = [row for row in table.rows if row.situation == situation]
         parts.append(f"## {situation}: sharing\n")

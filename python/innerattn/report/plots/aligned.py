@@ -1,4 +1,4 @@
-"""Fig. 5's evidence: attention around all handoffs, of who hands over and of who does not."""
+"""Fig. 5's evidence: attention around handoffs, of who hands over and of the bystander."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class AlignedLines:
         offsets: (W,) steps since the first rescue's.
         step_s: length of a step [s].
         even: weight of even attention.
-        robot: by partner (to be, before) (2, 3, W): mean, low and high; NaN for no band.
-        control: the same of the robot that takes no part.
+        robot: by partner (next, last) (2, 3, W): mean, low and high; NaN for no band.
+        control: the same of the bystander.
     """
 
     situation: str
@@ -73,10 +73,10 @@ def _aligned(panel: Axes, line: AlignedLines) -> dict[str, Any]:
     from matplotlib.ticker import MaxNLocator
 
     handles: dict[str, Any] = {}
-    partners = (("the partner to be", BLUE), ("the partner before", VERMILION))
+    partners = (("the next partner", BLUE), ("the last partner", VERMILION))
     who = (
         ("robot that hands over", "-", 0.25, line.robot),
-        ("robot that takes no part", "--", 0.1, line.control),
+        ("bystander", "--", 0.1, line.control),
     )
     for name, style, alpha, courses in who:
         for (partner, colour), (mean, low, high) in zip(partners, courses, strict=True):

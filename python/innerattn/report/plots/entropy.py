@@ -91,7 +91,7 @@ def draw_entropy(lines: Sequence[EntropyLines], printed_nats: float) -> Figure:
         frameon=False,
     )
     drawn = [x for line in lines for x in (line.mean[0], line.by_robot, line.heads)]
-    least = min(float(x.min()) for x in drawn if x.size)
+    least = min(printed_nats, *(float(x.min()) for x in drawn if x.size))
     panels[0, 0].set_ylim(max(0.0, least - 0.05), 1.06 * max(line.even_nats for line in lines))
     return figure
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _RETENTION = (
     "retention: rescues with a fault / rescues without it, in the same worlds, from its onset on; "
     "mean over robots, onsets, severities from 0 to 1; ± is half the 95 % interval",
+    "rescues: per episode; with a fault from its start, mean over kinds, severities, robots",
     "greedy and hungarian take all robots to be healthy, oracle knows of faults",
 )
 _BOUNDS = (
@@ -52,7 +53,7 @@ def print_robustness(
     print_table(console, _by_kind(grid, policies))
     first, own = next(iter(policies.items()))
     print_table(console, _by_severity(grid, first, own))
-    print_table(console, _after_onset(grid, first, own))
+    print_table(console, _after_onset(grid, first, own, policies.get("oracle")))
     for name, of_run in bounds.items():
         if any(level.checks for level in of_run.levels):
             print_table(console, _bounds(name, of_run))
@@ -75,11 +76,12 @@ def _by_kind(grid: Grid, policies: Mapping[str, Overview]) -> Table:
         for k, kind in enumerate(grid.kinds)
     )
     overall = Row(("all kinds", *(shown(one.retention) for one in each)), strong=True)
-    rescues = ["rescues", *(shown(one.rescues) for one in each)]
+    rescues = ["rescues, no fault", *(shown(one.rescues) for one in each)]
+    with_fault = ["rescues, fault", *(shown(one.rescues_with_fault) for one in each)]
     named = [f"{head}: {name}" for head, name in zip(heads, runs, strict=False)]
     return Table(
         columns(["retention"], heads),
-        (kinds, section([overall, rescues])),
+        (kinds, section([overall]), section([rescues, with_fault])),
         f"Retention when a robot fails: {grid.scenario.situation}, {grid.episodes:,} worlds of "
         f"{grid.scenario.episode_steps} steps",
         (*named, *_RETENTION),
@@ -100,14 +102,16 @@ def _by_severity(grid: Grid, name: str, found: Overview) -> Table:
     return plain_table(heads, rows, title)
 
 
-def _after_onset(grid: Grid, name: str, found: Overview) -> Table:
+def _after_onset(grid: Grid, name: str, found: Overview, oracle: Overview | None) -> Table:
+    """Whether a team recovers, beside the script that knows of the fault, where it was played."""
     steps = grid.scenario.episode_steps
     half = grid.middle + (steps - grid.middle) // 2
     heads = [f"steps {grid.middle} to {half}", f"steps {half} to {steps}", "difference"]
-    rows = [
-        [_words(kind.kind), *map(plus_minus, (kind.early, kind.late, kind.change))]
-        for kind in found.kinds
-    ]
+    heads += ["oracle's difference"] if oracle else []
+    rows = []
+    for k, kind in enumerate(found.kinds):
+        parts = [kind.early, kind.late, kind.change, *([oracle.kinds[k].change] if oracle else [])]
+        rows.append([_words(kind.kind), *map(plus_minus, parts)])
     title = f"{name}: soon after a fault from step {grid.middle}, and later"
     return plain_table(columns(["retention"], heads), rows, title)
 
@@ -156,7 +160,7 @@ def _attention(name: str, found: FaultAttention) -> Table:
     return Table(
         columns(["worst fault"], ["weight, no fault", "change by the fault", "AUC"]),
         (kinds, section([Row(overall, strong=True)])),
-        f"{name}: attention paid to a robot that fails at step {found.onset_step}",
+        f"{name}:\nattention paid to a robot that fails at step {found.onset_step}",
         (
             f"mean over teammates, heads and robots ({found.even_share:.2f} where attention is "
             "even), beside the same worlds without the fault",
