@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from innerattn.experiments.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
 from innerattn.experiments.crossed.arms import plan_crossed
+from innerattn.experiments.learning.variants import ENTITIES, WARM_START
+from innerattn.experiments.learning.variants import SITUATIONS as LEARNING_SITUATIONS
 from innerattn.experiments.plan import METHODS, SITUATIONS, PlannedRun, plan
 
 if TYPE_CHECKING:
@@ -130,6 +133,15 @@ def _crossed() -> Report:
     return Report(FILES, write_crossed)
 
 
+def _learning(name: str) -> Callable[[], Report]:
+    def load() -> Report:
+        from innerattn.report.learning.write import learning_files, write_learning
+
+        return Report(learning_files(name), partial(write_learning, name=name))
+
+    return load
+
+
 _INNER = tuple(method for method in METHODS if method.endswith("-inner"))
 _TD = tuple(method for method in METHODS if method.startswith("td-"))
 
@@ -137,32 +149,63 @@ TARGETS: dict[str, Target] = {
     target.name: target
     for target in (
         Target(
-            "table2",
-            "the paper's Table II, how two robots share the work",
-            plan,
-            _paper("table2"),
+            name="table2",
+            shows="the paper's Table II, how two robots share their work",
+            plan=plan,
+            report=_paper("table2"),
             draws=False,
         ),
         Target(
-            "fig4", "its Fig. 4, entropy of attention in training", plan, _paper("fig4"), whole=True
-        ),
-        Target(
-            "fig5",
-            "its Fig. 5, attention when a robot changes its partner",
-            plan,
-            _paper("fig5"),
-            _INNER,
+            name="fig4",
+            shows="its Fig. 4, the entropy of attention in training",
+            plan=plan,
+            report=_paper("fig4"),
             whole=True,
         ),
-        Target("all", "table2, fig4 and fig5", plan, _paper("table2", "fig4", "fig5"), whole=True),
         Target(
-            "crossed",
-            "which settings make robots share evenly",
-            plan_crossed,
-            _crossed,
-            _TD,
-            CROSSED_SITUATIONS,
+            name="fig5",
+            shows="its Fig. 5, attention at handoffs",
+            plan=plan,
+            report=_paper("fig5"),
+            methods=_INNER,
+            whole=True,
+        ),
+        Target(
+            name="all",
+            shows="table2, fig4 and fig5",
+            plan=plan,
+            report=_paper("table2", "fig4", "fig5"),
+            whole=True,
+        ),
+        Target(
+            name="crossed",
+            shows="which settings make sharing even",
+            plan=plan_crossed,
+            report=_crossed,
+            methods=_TD,
+            situations=CROSSED_SITUATIONS,
             study="crossed-",
+        ),
+        Target(
+            name="learning",
+            shows="what each method learns",
+            plan=plan,
+            report=_learning("learning"),
+            situations=LEARNING_SITUATIONS,
+        ),
+        Target(
+            name="learning-entities",
+            shows="the same with entity encoders",
+            plan=ENTITIES.plan,
+            report=_learning("learning_entities"),
+            situations=LEARNING_SITUATIONS,
+        ),
+        Target(
+            name="learning-warm-start",
+            shows="the same after imitating hungarian",
+            plan=WARM_START.plan,
+            report=_learning("learning_warm_start"),
+            situations=LEARNING_SITUATIONS,
         ),
     )
 }
