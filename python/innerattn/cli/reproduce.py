@@ -31,12 +31,12 @@ else:
     TargetName, Budget = Literal[tuple(TARGETS)], Literal[BUDGETS]
 
 _MOST_SEEDS = 1_000
-_WHAT = f"What to make. {'; '.join(f'{one.name}: {one.shows}' for one in TARGETS.values())}."
+_WHAT = "\n".join(("What to make.", *(f"- {one.name}: {one.shows}." for one in TARGETS.values())))
 
 
 @dataclass(kw_only=True)
 class Reproduce(Command):
-    """Train the runs that a table or figure of the paper needs, and make it of them.
+    """Train the runs that a result needs, and make its tables and figures.
 
     Runs that are there already are kept; the same command goes on with what is missing.
     """
@@ -53,7 +53,7 @@ class Reproduce(Command):
     situations: str = "all"
     """Situations, separated by commas; all: what the target needs."""
     report_only: tyro.conf.FlagCreatePairsOff[bool] = False
-    """Train nothing: report on the runs that are finished, and name the others."""
+    """Train and measure nothing: report on the runs that are finished, and name the others."""
 
     def run(self) -> int:
         """Plan, train, print, write.
@@ -162,7 +162,7 @@ class Reproduce(Command):
         """
         from innerattn.experiments.processes import places, run_side_by_side
 
-        jobs = target.jobs(found, out) if target.jobs else []
+        jobs = target.jobs(found, out) if target.jobs else ()
         if jobs and not self.report_only:
             with SeveralMeasurements() as progress:
                 run_side_by_side(

@@ -3,17 +3,33 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from innerattn.config.files import write_whole
+from innerattn.experiments.run import FinishedRun, named_from
 from innerattn.experiments.smoke import smoke_note
 from innerattn.report.plots.drawing import write_figure
 from innerattn.report.smoke import mark_figure, noted_csv, noted_markdown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def listed_runs(runs: Sequence[FinishedRun], out: Path) -> list[dict[str, Any]]:
+    """What names each run in a document, its folder from ``out``."""
+    return [
+        {
+            "situation": run.situation,
+            "trained": run.case.trained,
+            "seed": run.seed,
+            "folder": named_from(run.folder, out),
+            "config_sha256": run.config_sha256,
+            "weights_sha256": run.weights_sha256,
+        }
+        for run in runs
+    ]
 
 
 class ReportFolder:

@@ -17,6 +17,7 @@ from innerattn.experiments.crossed.arms import plan_crossed
 from innerattn.experiments.learning.variants import ENTITIES, WARM_START
 from innerattn.experiments.learning.variants import SITUATIONS as LEARNING_SITUATIONS
 from innerattn.experiments.plan import METHODS, SITUATIONS, PlannedRun, plan
+from innerattn.experiments.robustness.design import plan_robustness
 
 if TYPE_CHECKING:
     from innerattn.experiments.processes import Job
@@ -82,7 +83,7 @@ class Target:
     study: str = ""
     whole: bool = False
     draws: bool = True
-    jobs: Callable[[Sequence[RunStatus], Path], list[Job]] | None = None
+    jobs: Callable[[Sequence[RunStatus], Path], Sequence[Job]] | None = None
 
     def write(
         self, runs: Sequence[FinishedRun], out: Path, budget: str, left_out: Sequence[str]
@@ -142,6 +143,18 @@ def _learning(name: str) -> Callable[[], Report]:
     return load
 
 
+def _robustness() -> Report:
+    from innerattn.report.robustness.write import FILES, write_robustness
+
+    return Report(FILES, write_robustness)
+
+
+def _robustness_jobs(found: Sequence[RunStatus], out: Path) -> Sequence[Job]:
+    from innerattn.experiments.robustness.measurement import missing_measurements
+
+    return missing_measurements(found, out)
+
+
 _INNER = tuple(method for method in METHODS if method.endswith("-inner"))
 _TD = tuple(method for method in METHODS if method.startswith("td-"))
 
@@ -157,14 +170,14 @@ TARGETS: dict[str, Target] = {
         ),
         Target(
             name="fig4",
-            shows="its Fig. 4, the entropy of attention in training",
+            shows="the paper's Fig. 4, the entropy of attention in training",
             plan=plan,
             report=_paper("fig4"),
             whole=True,
         ),
         Target(
             name="fig5",
-            shows="its Fig. 5, attention at handoffs",
+            shows="the paper's Fig. 5, attention at handoffs",
             plan=plan,
             report=_paper("fig5"),
             methods=_INNER,
@@ -179,7 +192,7 @@ TARGETS: dict[str, Target] = {
         ),
         Target(
             name="crossed",
-            shows="which settings make sharing even",
+            shows="which settings make robots share their work evenly",
             plan=plan_crossed,
             report=_crossed,
             methods=_TD,
@@ -195,17 +208,26 @@ TARGETS: dict[str, Target] = {
         ),
         Target(
             name="learning-entities",
-            shows="the same with entity encoders",
+            shows="what each method learns with entity encoders",
             plan=ENTITIES.plan,
             report=_learning("learning_entities"),
             situations=LEARNING_SITUATIONS,
         ),
         Target(
             name="learning-warm-start",
-            shows="the same after imitating hungarian",
+            shows="what each method learns after it imitated hungarian",
             plan=WARM_START.plan,
             report=_learning("learning_warm_start"),
             situations=LEARNING_SITUATIONS,
+        ),
+        Target(
+            name="robustness",
+            shows="what faults cost a team, and where attention goes",
+            plan=plan_robustness,
+            report=_robustness,
+            situations=("mixed",),
+            draws=False,
+            jobs=_robustness_jobs,
         ),
     )
 }

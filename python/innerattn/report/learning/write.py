@@ -8,8 +8,8 @@ from typing import Any
 
 from innerattn.experiments.learning.curves import LearningCurve
 from innerattn.experiments.learning.study import Learning, read_learning
-from innerattn.experiments.run import FinishedRun, named_from
-from innerattn.report.folder import ReportFolder
+from innerattn.experiments.run import FinishedRun
+from innerattn.report.folder import ReportFolder, listed_runs
 from innerattn.report.learning.page import curve_lines, learning_page
 from innerattn.report.plots.curves import draw_curves
 from innerattn.report.plots.drawing import check_format
@@ -66,17 +66,7 @@ def _document(
         "margin": found.margin,
         "differences": as_json(found.differences),
         "curves": [_curve(curve) for curve in found.curves],
-        "runs": [
-            {
-                "situation": run.situation,
-                "trained": run.case.trained,
-                "seed": run.seed,
-                "folder": named_from(run.folder, out),
-                "config_sha256": run.config_sha256,
-                "weights_sha256": run.weights_sha256,
-            }
-            for run in runs
-        ],
+        "runs": listed_runs(runs, out),
     }
 
 
