@@ -80,7 +80,7 @@ def pairs_summary(pairs: Sequence[Pair]) -> Table:
     rows: dict[tuple[str, str], list[str]] = {}
     for pair in pairs:
         cells = rows.setdefault((pair.situation, pair.algorithm), [])
-        found = pair.found
+        found = pair.contrast
         cells.append(format_estimate(found.difference if found else None, 3))
         cells.append(NONE if found is None else "yes" if found.equivalent else "not shown")
     return plain_table(heads, [[s, a.upper(), *cells] for (s, a), cells in rows.items()])
