@@ -172,7 +172,7 @@ def _makes_even(outcomes: Outcomes, penalties: Sequence[float]) -> tuple[str, Ho
         low, high = _ends(means[3])
         holds = "yes" if high < 0.0 else "no" if low > 0.0 else "undecided"
     measured = (
-        f"inner {with_}, uniform {without}; difference {difference}, inner − uniform / 2 {left}"
+        f"inner {with_}, uniform {without}; difference {difference}; inner − uniform/2: {left}"
     )
     return measured if len(rows) else NONE, holds
 
