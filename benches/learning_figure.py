@@ -21,7 +21,7 @@ from innerattn.report.plots.drawing import (
     PURPLE,
     SKY,
 )
-from innerattn.stats.seeds import band
+from innerattn.stats.seeds import seed_curve
 
 PARTS = 40
 """Points of a curve: means over so many equal parts of a run."""
@@ -63,7 +63,7 @@ def _curve(panel: Axes, runs: Sequence[Path], method: str, colour: str, style: s
     courses = [_course(run) for run in runs]
     end = min(steps[-1] for steps, _ in courses)
     edges = np.linspace(0, end, PARTS + 1)
-    means = band(np.stack([_in_parts(steps, values, edges) for steps, values in courses]))
+    means = seed_curve(np.stack([_in_parts(steps, values, edges) for steps, values in courses]))
     middle = (edges[1:] + edges[:-1]) / 2000.0
     panel.plot(middle, means.mean, style, color=colour, linewidth=1.4, label=method)
     panel.fill_between(middle, means.low, means.high, color=colour, alpha=0.2, linewidth=0.0)

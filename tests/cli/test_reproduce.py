@@ -81,11 +81,11 @@ def test_finished_runs_are_used_and_the_missing_ones_trained(
         assert len(run["config_sha256"]) == len(run["weights_sha256"]) == 64
         assert (run["commit"], run["versions"]) == (info["commit"], info["versions"])
 
-    made = ["report.md", "table2.csv", "table2.json", "table2.md"]
+    made = ["report.md", "claims.md", "runs.csv", "table2.csv", "table2.json", "table2.md"]
     assert document["outputs"] == made
     texts = {name: (study / name).read_text() for name in made}
     assert all("a smoke run, no result" in text for text in texts.values())
-    assert "Not in any figure" not in texts["report.md"]
+    assert "Left out" not in texts["report.md"]
     assert not list(study.glob("fig*"))
 
     trained = times(study / "runs")
@@ -121,7 +121,7 @@ def test_another_configuration_is_named_and_neither_used_nor_changed(
     assert states(study) == ["other_configuration", "finished", "finished", "finished"]
     assert account(study)["runs"][0]["why"] == "td.polyak = 0.03, planned 0.02"
     assert (
-        f"**Not in any figure below:**\n\n- mixed td-inner seed 0: {why}"
+        f"**Left out of all results:**\n\n- mixed td-inner seed 0: {why}"
         in (study / "report.md").read_text()
     )
 
@@ -169,6 +169,7 @@ def test_the_crossed_design_has_runs_and_files_of_its_own(
     assert "td-uniform team 1 of 1" in rows
     document = account(tmp_path)
     files = [f"crossed.{kind}" for kind in ("csv", "json", "md", "pdf", "png")]
+    files += ["crossed_seeds.pdf", "crossed_seeds.png", "crossed_tables.md"]
     assert (document["target"], document["outputs"]) == ("crossed", files)
     assert [run["variant"] for run in document["runs"]] == ["helpers", "team"]
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {

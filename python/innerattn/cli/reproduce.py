@@ -1,4 +1,4 @@
-"""`innerattn reproduce`: train the runs that a table or figure needs, and make it of them."""
+"""`innerattn reproduce`: train the runs that a table or figure needs, then write it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _WHAT = "\n".join(("What to make.", *(f"- {one.name}: {one.shows}." for one in T
 
 @dataclass(kw_only=True)
 class Reproduce(Command):
-    """Train the runs that a result needs, and make its tables and figures.
+    """Train the runs that a result needs, then write it with a report.
 
     Runs that are there already are kept; the same command goes on with what is missing.
     """

@@ -1,4 +1,4 @@
-"""How outputs of a smoke run say so: its runs are too short for any figure to mean something.
+"""How outputs of a smoke run say so: its runs are too short for any number to mean something.
 
 Each function takes the name of the built-in budget, and changes nothing of any budget but quick.
 """

@@ -29,8 +29,9 @@ def crossed_page(situations: Sequence[Situation], budget: str, left_out: Sequenc
         TITLE,
         *(missing if left_out else []),
         "![Share of the first food robot, by seed](crossed_seeds.png)\n",
-        f"Each dot is one of the runs with parameters of their own: {count} runs in all, budget "
-        f"`{budget}`, seeds {format_seeds(seeds)}. {_correlations(situations)} {LAMBDA}\n",
+        f"{count} runs, budget `{budget}`, seeds {format_seeds(seeds)}. A dot is a run whose "
+        f"robots have parameters of their own; a bar spans the runs of a seed. "
+        f"{_correlations(situations)} {LAMBDA}\n",
         "## Claims\n",
         markdown(claims_table(situations)),
         "Intervals are 95 % over seeds. *Idle* counts seeds in which a food robot takes part in "
@@ -42,7 +43,8 @@ def crossed_page(situations: Sequence[Situation], budget: str, left_out: Sequenc
         "The correlation is ICC(3,1) of Shrout & Fleiss (1979), with its exact interval: the part "
         "of the variance of the first food robot's share that lies between seeds, after each "
         "arm's mean is taken away. The arms are those with parameters of their own: uniform "
-        "attention, and inner attention with each λ. Shares are of all rescues of a run.\n",
+        "attention, and inner attention with each λ. Shares are of all rescues of a run. Where "
+        "all shares are near 0.5, the correlation is of small differences.\n",
         "## All arms\n",
         "![All runs, by arm](crossed.png)\n",
         "A dot is a run; a bar is the mean over seeds with its 95 % interval. Imbalance is the "

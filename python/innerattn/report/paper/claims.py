@@ -13,7 +13,7 @@ from innerattn.stats.text import NONE
 def claims_summary(claims: Sequence[Claim]) -> Table:
     """A row for each claim: what the paper prints, what was measured there, what holds where.
 
-    Where a cell names no algorithm, it is of all.
+    A cell that names no algorithm is about all.
     """
     situations = _in_order(claims)
     first = situations[0]

@@ -64,8 +64,8 @@ def _opening(findings: Findings, budget: str) -> str:
         table = markdown(claims_summary(findings.claims))
     text = (
         f"{table}\n{len(findings.runs)} runs, budget `{budget}`, seeds {format_seeds(seeds)}. "
-        "Cells without TD or PPO are about both. Shares are those of the first food robot, by "
-        "task; changes are means over runs. The paper does not say which situation it shows; we "
+        "A cell that names no algorithm is about all. Shares are those of the first food robot, "
+        "by task; changes are means over runs. The paper does not say which situation it shows; we "
         f"assume {PRINTED_SITUATION}, since its text speaks of a variety of tasks. "
         "[claims.md](claims.md) has every claim in full.\n"
     )

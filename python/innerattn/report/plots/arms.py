@@ -1,4 +1,4 @@
-"""The runs of several arms beside each other, a dot each, with means; it measures nothing."""
+"""The runs of several arms, a dot each, with their means; it measures nothing."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ class ArmDots:
 
 @dataclass(frozen=True)
 class ArmPanel:
-    """One figure of the runs in one situation.
+    """One result of the runs in one situation.
 
     Attributes:
         situation: of the worlds.
         label: what is drawn, with its unit.
         arms: from top to bottom.
         marks: values at which a line is drawn.
-        limits: what values there can be; of an interval beyond them nothing is drawn. None: as wide
-            as needed.
+        limits: least and largest possible value; an interval is cut off there. None: as wide as
+            needed.
     """
 
     situation: str

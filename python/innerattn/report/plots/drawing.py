@@ -1,4 +1,4 @@
-"""What all figures share: colours, files that are the same every time, and what is refused."""
+"""What all figures share: colours, sizes, and files that are the same every time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
 """Okabe & Ito's palette, told apart with every common colour blindness."""
 
 ROBOT_COLOURS = (BLUE, SKY, ORANGE, GREEN, PURPLE, VERMILION, BLACK, YELLOW)
-"""By index in the team, round again beyond the last."""
+"""By index in the team; beyond the last they repeat."""
 
 COLUMN_WIDTH_IN, PAGE_WIDTH_IN = 3.4, 7.0
 """Widths of figures over one column of a page and over both [in]."""

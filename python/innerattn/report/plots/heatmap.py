@@ -1,4 +1,4 @@
-"""A heat map of what a policy keeps under faults: a panel for each robot and onset."""
+"""A heat map of retention under faults: a panel for each robot and onset."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def draw_heatmap(name: str, kept: Retention, grid: Grid) -> Figure:
 
     Args:
         name: what the policy is called.
-        kept: what it keeps.
+        kept: its retention.
         grid: the faults.
     """
     from matplotlib.figure import Figure
@@ -47,9 +47,9 @@ def draw_heatmap(name: str, kept: Retention, grid: Grid) -> Figure:
         when = "from the start" if onset == "start" else f"from step {grid.middle}"
         panels[o, 0].set_ylabel(when, fontsize=8)
     figure.supxlabel("severity of the fault of this robot", fontsize=8)
-    figure.suptitle(f"Share of rescues kept by {name}", fontsize=9)
+    figure.suptitle(f"Retention of {name}", fontsize=9)
     bar = figure.colorbar(image, ax=panels, shrink=0.6, extend="max")
-    bar.set_label("rescues with the fault / without", fontsize=7)
+    bar.set_label("rescues with the fault / without it", fontsize=7)
     bar.ax.tick_params(labelsize=7)
     return figure
 

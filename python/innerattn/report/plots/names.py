@@ -1,4 +1,4 @@
-"""Where names stand in a picture: beside what they name, clear of each other and of all else."""
+"""Places names in a figure beside what they name, clear of each other and of all else."""
 
 from __future__ import annotations
 
