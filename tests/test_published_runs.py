@@ -19,8 +19,8 @@ RECORDS = DOCS / "records"
 PAGES = ("reproduction", "paper_protocol", "crossed")
 NEEDS_STEPS = ("## Fig. 4: ", "## Fig. 5: ")
 
-sys.path.insert(0, str(ROOT / "benches"))
-from reproduction import PLACES, sections  # noqa: E402
+sys.path.insert(0, str(DOCS))
+from publish import PLACES, sections  # noqa: E402
 
 
 def page(name: str) -> str:
