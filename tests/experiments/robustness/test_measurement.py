@@ -88,6 +88,7 @@ def test_a_group_waits_for_all_its_runs(study: Path, planned: list[PlannedRun]) 
 def test_a_damaged_document_is_named(text: str, study: Path, planned: list[PlannedRun]) -> None:
     found = scan_runs(planned, study)
     (job,) = missing_measurements(found, study)
+    job.path.parent.mkdir()
     job.path.write_text(text)
     with pytest.raises(RunError, match=f"{job.path.name}: not a measurement under faults of this"):
         read_measurements(finished_runs(found), study)
