@@ -7,7 +7,13 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from innerattn.cli.progress import Evaluating, SeveralRuns, Training
+from innerattn.cli.progress import (
+    Evaluating,
+    MeasuringRobustness,
+    SeveralMeasurements,
+    SeveralRuns,
+    Training,
+)
 from innerattn.config import RunConfig
 from innerattn.experiments.side_by_side import Run
 from innerattn.train import Progress
@@ -86,6 +92,44 @@ def test_evaluation_counts_episodes() -> None:
         show(10, 2000)
         show(500, 2000)
     assert out.getvalue() == "evaluating  25% | 0:30 left | 500 of 2,000 episodes\n"
+
+
+def test_each_stage_of_robustness_and_each_run_has_a_pace_of_its_own() -> None:
+    out = io.StringIO()
+    now = [0.0]
+    with MeasuringRobustness(Console(file=out, width=120), clock=lambda: now[0]) as show:
+        now[0] = 30.0
+        show("evaluating", 1_000, 4_000)
+        now[0] = 100.0
+        show("evaluating", 4_000, 4_000)
+        for run in (0.0, 40.0):
+            now[0] = 120.0 + run
+            show("checking bounds", 1, 2)
+            now[0] = 140.0 + run
+            show("checking bounds", 2, 2)
+        now[0] = 190.0
+        show("watching attention", 1, 37)
+    assert out.getvalue().splitlines() == [
+        "evaluating  25% | 1:30 left | 1,000 of 4,000 episodes",
+        "evaluating 100% | 0:00 left | 4,000 of 4,000 episodes",
+        "checking bounds  50% | 0:20 left | 1 of 2 kinds and sizes of changes",
+        "checking bounds 100% | 0:00 left | 2 of 2 kinds and sizes of changes",
+        "checking bounds  50% | 0:20 left | 1 of 2 kinds and sizes of changes",
+        "checking bounds 100% | 0:00 left | 2 of 2 kinds and sizes of changes",
+        "watching attention   3% | 6:00 left | 1 of 37 plays of all worlds",
+    ]
+
+
+def test_measurements_are_called_so() -> None:
+    out = io.StringIO()
+    now = [0.0]
+    jobs = [Run(RunConfig(), Path(f"run-s{seed}")) for seed in range(2)]
+    with SeveralMeasurements(Console(file=out, width=120), clock=lambda: now[0]) as show:
+        jobs[0].state, jobs[0].share = "running", 0.5
+        now[0] = 10.0
+        show(jobs)
+    (line,) = out.getvalue().splitlines()
+    assert line == "measuring  25% | -:-- left | 0 of 2 measurements done, 1 running"
 
 
 def test_several_runs_share_one_display() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -31,10 +30,11 @@ def print_scores(console: Console, scores: Sequence[MethodScores]) -> None:
     if lengths is None:
         return
     heads = [head for one in lengths for head in (f"{one.episode_steps} steps", "score")]
-    parts = [
-        section([[one.method, f"{one.used} of {one.planned}", *_means(one)] for one in own], name)
-        for name, own in groupby(scores, key=lambda one: one.situation)
-    ]
+    rows: dict[str, list[list[str]]] = {}
+    for one in scores:
+        row = [one.method, f"{one.used} of {one.planned}", *_means(one)]
+        rows.setdefault(one.situation, []).append(row)
+    parts = [section(own, situation) for situation, own in rows.items()]
     title = "Rescues per episode, mean over runs"
     console.print()
     table = Table(columns(["method"], ["runs", *heads]), tuple(parts), title, _NOTES)
