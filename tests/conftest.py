@@ -15,6 +15,7 @@ from innerattn.cli.main import main
 from innerattn.errors import InnerattnError
 from innerattn.experiments.crossed.arms import plan_crossed
 from innerattn.experiments.plan import plan
+from innerattn.experiments.processes import Job
 from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.experiments.side_by_side import Run
 
@@ -67,36 +68,30 @@ def small() -> dict[str, object]:
     }
 
 
-def train_in_turn(
-    runs: Sequence[Run],
+def do_in_turn(
+    jobs: Sequence[Job],
     at_once: int,
     *,
-    changed: Callable[[Sequence[Run]], None],
-    failed: Callable[[Run], None],
+    changed: Callable[[Sequence[Job]], None],
+    failed: Callable[[Job], None],
     **_: object,
 ) -> None:
-    """What `train_side_by_side` does, without processes, which take long to start."""
-    from innerattn.evaluate import evaluate_run
-    from innerattn.train import train
-
+    """What `run_side_by_side` does, without processes, which take long to start."""
     assert at_once >= 1
-    for run in runs:
+    for job in jobs:
         try:
-            if not run.trained:
-                train(run.config, run.folder)
-            evaluation = evaluate_run(run.folder)
-            evaluation.write(run.folder / "evaluation")
-            run.state, run.share, run.summary = "done", 1.0, evaluation.summary
+            job.result = job.do(lambda _: None)
+            job.state, job.share = "done", 1.0
         except InnerattnError as error:
-            run.state, run.failure = "failed", str(error)
-            failed(run)
-        changed(runs)
+            job.state, job.failure = "failed", str(error)
+            failed(job)
+        changed(jobs)
 
 
 @pytest.fixture
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trains the runs of a study one after the other, in this process."""
-    monkeypatch.setattr("innerattn.experiments.train.train_side_by_side", train_in_turn)
+    monkeypatch.setattr("innerattn.experiments.train.train_side_by_side", do_in_turn)
 
 
 @pytest.fixture(scope="session")
@@ -105,7 +100,7 @@ def finished_study(tmp_path_factory: pytest.TempPathFactory, small: dict[str, ob
     out = tmp_path_factory.mktemp("studies") / "finished"
     planned = plan(("td-inner", "td-uniform"), ("mixed",), (0,), "quick", out, small)
     runs = [Run(one.config, one.folder) for one in planned]
-    train_in_turn(runs, 1, changed=lambda _: None, failed=lambda run: pytest.fail(str(run)))
+    do_in_turn(runs, 1, changed=lambda _: None, failed=lambda run: pytest.fail(str(run)))
     return out
 
 

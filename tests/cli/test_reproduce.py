@@ -6,19 +6,18 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from innerattn.cli import reproduce
 from innerattn.cli.main import main
 from innerattn.errors import RunError
-from innerattn.experiments.crossed.arms import plan_crossed
 from innerattn.experiments.lock import StudyLock
-from innerattn.experiments.plan import plan
 from innerattn.experiments.side_by_side import Run
+from innerattn.report.targets import TARGETS
 from innerattn.train.weights import read_weights
 
 Command = Callable[..., int]
@@ -30,9 +29,8 @@ def command(monkeypatch: pytest.MonkeyPatch, small: dict[str, object]) -> Comman
     """The command with small runs: target, folder, methods, then more options, in `mixed`."""
 
     def run(target: str, out: Path, methods: str, *options: str, **values: object) -> int:
-        for make in (plan, plan_crossed):
-            overridden = partial(make, overrides={**small, **values})
-            monkeypatch.setattr(reproduce, make.__name__, overridden)
+        plan = partial(TARGETS[target].plan, overrides={**small, **values})
+        monkeypatch.setitem(TARGETS, target, replace(TARGETS[target], plan=plan))
         given = ["--out", str(out), "--methods", methods, "--situations", "mixed"]
         return main(["reproduce", target, *given, *options])
 
@@ -256,7 +254,6 @@ def test_ctrl_c_keeps_what_is_finished(
 KILLED = """
 import sys
 from functools import partial
-from innerattn.cli import reproduce
 from innerattn.cli.main import main
 from innerattn.experiments.plan import plan
 if __name__ == "__main__":

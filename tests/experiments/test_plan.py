@@ -11,7 +11,7 @@ from innerattn.cli.main import main
 from innerattn.config import BUDGETS, RunConfig
 from innerattn.errors import ConfigError, RunError
 from innerattn.experiments.crossed.arms import plan_crossed
-from innerattn.experiments.plan import METHODS, SITUATIONS, TARGETS, Case, PlannedRun, plan
+from innerattn.experiments.plan import METHODS, SITUATIONS, Case, PlannedRun, plan
 
 OUT = Path("study")
 
@@ -43,13 +43,6 @@ def test_only_runs_of_one_seed_are_measured_in_the_same_worlds(make: Callable[..
     )
     worlds = {(one.case.seed, one.config.evaluate.seed) for one in planned}
     assert worlds == {(0, 12_345), (1, 12_346), (5, 12_350)}
-
-
-def test_targets() -> None:
-    assert set(TARGETS) == {"table2", "fig4", "fig5", "all", "crossed"}
-    assert TARGETS["fig5"] == ("td-inner", "ppo-inner")
-    assert TARGETS["table2"] == TARGETS["fig4"] == TARGETS["all"] == METHODS
-    assert TARGETS["crossed"] == ("td-inner", "td-uniform")
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,8 @@ from innerattn.cli import train as command
 from innerattn.cli.main import main
 from innerattn.cli.progress import SeveralRuns
 from innerattn.config import RunConfig, load_run_config
-from innerattn.experiments.side_by_side import Run, trained_share, work
+from innerattn.experiments.processes import work
+from innerattn.experiments.side_by_side import Run, trained_share
 from innerattn.train import Progress
 from innerattn.train.weights import read_weights
 
@@ -136,15 +137,16 @@ def test_ctrl_c_saves_every_run_and_leaves_no_process(
 
 def test_a_run_that_fails_says_why(tiny: list[str], tmp_path: Path) -> None:
     config, pipe, its_end = configured(tiny), *multiprocessing.Pipe()
-    work(config, tmp_path, its_end, debug=False)
-    assert pipe.recv() == 0.0
-    assert pipe.recv() == f"{tmp_path}: exists already; choose another run folder or remove it"
+    work(Run(config, tmp_path), its_end, debug=False)
+    assert pipe.recv() == ("running", 0.0)
+    reason = f"{tmp_path}: exists already; choose another run folder or remove it"
+    assert pipe.recv() == ("failed", reason)
 
 
 def test_a_run_stops_when_nobody_listens(tiny: list[str], tmp_path: Path) -> None:
     config, pipe, its_end = configured(tiny), *multiprocessing.Pipe()
     pipe.close()
-    work(config, tmp_path / "run", its_end, debug=False)
+    work(Run(config, tmp_path / "run"), its_end, debug=False)
     assert list(tmp_path.iterdir()) == []
 
 

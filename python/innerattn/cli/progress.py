@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import heapq
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 if TYPE_CHECKING:
-    from innerattn.experiments.side_by_side import Run
+    from innerattn.evaluate.robustness import Stage
+    from innerattn.experiments.processes import Job
     from innerattn.train import Progress as TrainProgress
 
 _PLAIN_EVERY_S = 10.0
 _STATES = ("running", "done", "failed")
-_TELLING = 0.05  # of a run; less says little of the pace, since runs begin slowly
+_TELLING = 0.05  # of a job; less says little of the pace, since jobs begin slowly
 
 
 class Work:
@@ -124,30 +125,35 @@ class Evaluating(Work):
         self.show(done, total, f"{done:,} of {total:,} episodes")
 
 
-class CheckingBounds(Work):
-    """Shows the check of bounds; call it with the levels done and the levels to do."""
+class MeasuringRobustness(Work):
+    """Shows `innerattn.evaluate.robustness.measure_robustness`; call it as that calls back."""
 
-    title = "checking bounds"
+    title = "evaluating"
+    _UNITS: ClassVar[Mapping[str, str]] = {
+        "evaluating": "episodes",
+        "checking bounds": "kinds and sizes of changes",
+        "watching attention": "plays of all worlds",
+    }
 
-    def __call__(self, done: int, total: int) -> None:
-        """Show how far the check of one run is."""
-        self.show(done, total, f"{done} of {total} kinds and sizes of changes")
+    def __init__(
+        self, console: Console | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """As `Work`."""
+        super().__init__(console, clock)
+        self._last_done, self._last_call = 0, self._start
+
+    def __call__(self, stage: Stage, done: int, total: int) -> None:
+        """Show how far a stage is; checking bounds and watching attention begin with each run."""
+        if stage != self.title or done <= self._last_done:
+            self.title, self._start = stage, self._last_call
+        self._last_done, self._last_call = done, self._clock()
+        self.show(done, total, f"{done:,} of {total:,} {self._UNITS[stage]}")
 
 
-class WatchingAttention(Work):
-    """Shows plays for attention; call it with the plays done and the plays to do."""
+class SeveralJobs(Work):
+    """Shows jobs side by side; call it with all of them."""
 
-    title = "watching attention"
-
-    def __call__(self, done: int, total: int) -> None:
-        """Show how far the plays of one run are."""
-        self.show(done, total, f"{done} of {total} plays of all worlds")
-
-
-class SeveralRuns(Work):
-    """Shows runs side by side, their evaluation included; call it with all of them."""
-
-    title = "training"
+    noun = "jobs"
 
     def __init__(
         self, console: Console | None = None, clock: Callable[[], float] = time.monotonic
@@ -155,34 +161,46 @@ class SeveralRuns(Work):
         """As `Work`."""
         super().__init__(console, clock)
         self._last_call = self._start
-        self._training = self._at_once = 0
-        self._spent = 0.0  # on all runs together, without the time that they take to start [s]
+        self._busy = self._at_once = 0
+        self._spent = 0.0  # on all jobs together, without the time that they take to start [s]
 
-    def __call__(self, runs: Sequence[Run]) -> None:
-        """Show how far the runs are."""
+    def __call__(self, jobs: Sequence[Job]) -> None:
+        """Show how far the jobs are."""
         now = self._clock()
-        self._spent += self._training * (now - self._last_call)
+        self._spent += self._busy * (now - self._last_call)
         self._last_call = now
-        self._training = sum(run.state == "running" and run.share > 0.0 for run in runs)
-        count = {state: sum(run.state == state for run in runs) for state in _STATES}
+        self._busy = sum(job.state == "running" and job.share > 0.0 for job in jobs)
+        count = {state: sum(job.state == state for job in jobs) for state in _STATES}
         self._at_once = max(self._at_once, count["running"])
-        done = sum(run.size * (1.0 if run.state == "failed" else run.share) for run in runs)
-        note = f"{count['done']} of {len(runs)} runs done, {count['running']} running"
+        done = sum(job.size * (1.0 if job.state == "failed" else job.share) for job in jobs)
+        note = f"{count['done']} of {len(jobs)} {self.noun} done, {count['running']} running"
         if count["failed"]:
             note += f", {count['failed']} failed"
-        self._put(now, done / sum(run.size for run in runs), note, self._left(runs))
+        self._put(now, done / sum(job.size for job in jobs), note, self._left(jobs))
 
-    def _left(self, runs: Sequence[Run]) -> float | None:
-        """Time until the last run is done [s]; each waiting one takes the first free place."""
-        progress = sum(run.size * run.share for run in runs)
+    def _left(self, jobs: Sequence[Job]) -> float | None:
+        """Time until the last job is done [s]; each waiting one takes the first free place."""
+        progress = sum(job.size * job.share for job in jobs)
         if progress < _TELLING or not self._spent:
             return None
-        a_run = self._spent / progress
-        running = [run for run in runs if run.state == "running"]
-        places = [(1.0 - run.share) * run.size * a_run for run in running]
-        places += [0.0] * (self._at_once - len(places))  # free until the next run is started
+        a_job = self._spent / progress
+        running = [job for job in jobs if job.state == "running"]
+        places = [(1.0 - job.share) * job.size * a_job for job in running]
+        places += [0.0] * (self._at_once - len(places))  # free until the next job is started
         heapq.heapify(places)
-        for run in runs:
-            if run.state == "waiting":
-                heapq.heapreplace(places, places[0] + run.size * a_run)
+        for job in jobs:
+            if job.state == "waiting":
+                heapq.heapreplace(places, places[0] + job.size * a_job)
         return max(places, default=0.0)
+
+
+class SeveralRuns(SeveralJobs):
+    """Shows runs that are trained side by side, their evaluation included."""
+
+    title, noun = "training", "runs"
+
+
+class SeveralMeasurements(SeveralJobs):
+    """Shows measurements side by side."""
+
+    title, noun = "measuring", "measurements"

@@ -7,41 +7,41 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
 from rich.console import Console
 
 from innerattn.cli.options import Command, UsageError
-from innerattn.cli.progress import SeveralRuns
+from innerattn.cli.progress import SeveralMeasurements, SeveralRuns
 from innerattn.config import BUDGETS
-from innerattn.experiments.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
-from innerattn.experiments.crossed.arms import plan_crossed
-from innerattn.experiments.plan import SITUATIONS, TARGETS, PlannedRun, plan
+from innerattn.experiments.plan import SITUATIONS, PlannedRun
 from innerattn.experiments.smoke import smoke_note
 from innerattn.report.tables.experiments import print_scores
+from innerattn.report.targets import TARGETS, Target
 
 if TYPE_CHECKING:
     from innerattn.experiments.lock import StudyLock
+    from innerattn.experiments.processes import Job
     from innerattn.experiments.scan import RunStatus
 
-    Target: TypeAlias = str
+    TargetName: TypeAlias = str
     Budget: TypeAlias = str
 else:
-    Target, Budget = Literal[tuple(TARGETS)], Literal[BUDGETS]
+    TargetName, Budget = Literal[tuple(TARGETS)], Literal[BUDGETS]
 
 _MOST_SEEDS = 1_000
+_WHAT = "\n".join(("What to make.", *(f"- {one.name}: {one.shows}." for one in TARGETS.values())))
 
 
 @dataclass(kw_only=True)
 class Reproduce(Command):
-    """Train the runs that a table or figure of the paper needs, then write it with a report.
+    """Train the runs that a result needs, then write it with a report.
 
     Runs that are there already are kept; the same command goes on with what is missing.
     """
 
-    target: tyro.conf.Positional[Target]
-    """What to make; all: table2, fig4 and fig5; crossed: a design on what makes sharing even."""
+    target: Annotated[tyro.conf.Positional[TargetName], tyro.conf.arg(help=_WHAT)]
     budget: Budget = "quick"
     """How long to train; quick gives no result; paper: its own numbers, for PPO the few printed."""
     seeds: int = 5
@@ -53,7 +53,7 @@ class Reproduce(Command):
     situations: str = "all"
     """Situations, separated by commas; all: what the target needs."""
     report_only: tyro.conf.FlagCreatePairsOff[bool] = False
-    """Train nothing: report on the runs that are finished, and name the others."""
+    """Train and measure nothing: report on the runs that are finished, and name the others."""
 
     def run(self) -> int:
         """Plan, train, print, write.
@@ -67,40 +67,38 @@ class Reproduce(Command):
             OSError: a file cannot be written.
             KeyboardInterrupt: the user stopped it; finished runs are kept.
         """
-        name = f"crossed-{self.budget}" if self.target == "crossed" else self.budget
-        out = self.out or Path("studies") / name
-        planned = self._planned(out)
+        target = TARGETS[self.target]
+        out = self.out or Path("studies") / f"{target.study}{self.budget}"
+        planned = self._planned(target, out)
 
         from innerattn.experiments.account import write_account
         from innerattn.experiments.lock import StudyLock
         from innerattn.experiments.scan import finished_runs, scan_runs
         from innerattn.experiments.score_means import method_scores
-        from innerattn.report.outputs import make_outputs
         from innerattn.report.plots.drawing import check_format
 
-        if self.target != "table2":
+        if target.draws:
             check_format(out / "figure.png")  # before hours of training, not after
-        whole = self.target not in ("table2", "crossed")
         console = Console(markup=False, highlight=False)
         with StudyLock.take(out) as lock:
-            found = scan_runs(planned, out, whole=whole)
+            found = scan_runs(planned, out, whole=target.whole)
             self._print_plan(console, found, out)
             try:
                 if not self.report_only:
                     self._train(found, out, lock)
+                    found = scan_runs(planned, out, whole=target.whole)
+                jobs = self._measure(target, found, out, lock)
             except KeyboardInterrupt:
-                found = scan_runs(planned, out, whole=whole)
+                found = scan_runs(planned, out, whole=target.whole)
                 write_account(out, self.target, self.budget, found)
                 _say_what_is_kept(found)
                 raise
-            if not self.report_only:
-                found = scan_runs(planned, out, whole=whole)
             write_account(out, self.target, self.budget, found)
             note = smoke_note(self.budget)
             unusable = [one for one in found if one.state != "finished"]
             reasons = [f"{one.planned.case}: {_reason(one)}" for one in unusable]
-            runs = finished_runs(found)
-            outputs = make_outputs(self.target, runs, out, self.budget, reasons)
+            reasons += [f"{job}: {job.failure or 'not measured'}" for job in jobs]
+            outputs = target.write(finished_runs(found), out, self.budget, reasons)
             account = write_account(out, self.target, self.budget, found, outputs)
         print_scores(console, method_scores(found))
         if reasons:
@@ -111,20 +109,20 @@ class Reproduce(Command):
             console.print(f"Written: {path}", soft_wrap=True)
         if note:
             console.print(note[:1].upper() + note[1:], style="bold")
-        return int(bool(unusable))
+        return int(bool(reasons))
 
-    def _planned(self, out: Path) -> list[PlannedRun]:
-        methods = _chosen("methods", self.methods, TARGETS[self.target])
-        crossed = self.target == "crossed"
-        named = ",".join(CROSSED_SITUATIONS) if crossed and self.situations == "all" else None
-        situations = _chosen("situations", named or self.situations, SITUATIONS)
+    def _planned(self, target: Target, out: Path) -> list[PlannedRun]:
+        methods = _chosen("methods", self.methods, target.methods)
+        situations = target.situations
+        if self.situations != "all":
+            situations = _chosen("situations", self.situations, SITUATIONS)
         if not 1 <= self.seeds <= _MOST_SEEDS:
             raise UsageError(f"--seeds = {self.seeds}: must be 1 to {_MOST_SEEDS:,}")
-        make = plan_crossed if crossed else plan
-        return make(methods, situations, range(self.seeds), self.budget, out)
+        return target.plan(methods, situations, range(self.seeds), self.budget, out)
 
     def _print_plan(self, console: Console, found: Sequence[RunStatus], out: Path) -> None:
-        from innerattn.experiments.train import places, to_measure, to_train
+        from innerattn.experiments.processes import places
+        from innerattn.experiments.train import to_measure, to_train
 
         states = Counter(one.state for one in found)
         train, measure = len(to_train(found)), len(to_measure(found))
@@ -146,13 +144,36 @@ class Reproduce(Command):
         for one in found:
             if one.state in ("other_configuration", "unreadable"):
                 text = f"left out: {one.planned.folder}: {_reason(one)}"
-                print(f"innerattn: {text} (move it away to have it trained)", file=sys.stderr)
+                _say(f"{text} (move it away to have it trained)")
 
     def _train(self, found: Sequence[RunStatus], out: Path, lock: StudyLock) -> None:
         from innerattn.experiments.train import train_missing
 
         with SeveralRuns() as progress:
             train_missing(found, out, lock, changed=progress, failed=_say_why, debug=self.debug)
+
+    def _measure(
+        self, target: Target, found: Sequence[RunStatus], out: Path, lock: StudyLock
+    ) -> list[Job]:
+        """Do what is to be done with finished runs, unless only a report is asked for.
+
+        Returns:
+            What is not done.
+        """
+        from innerattn.experiments.processes import places, run_side_by_side
+
+        jobs = target.jobs(found, out) if target.jobs else ()
+        if jobs and not self.report_only:
+            with SeveralMeasurements() as progress:
+                run_side_by_side(
+                    jobs,
+                    places(len(jobs)),
+                    changed=progress,
+                    failed=lambda job: _say(f"error: {job}: {job.failure}"),
+                    debug=self.debug,
+                    keep=lock,
+                )
+        return [job for job in jobs if job.state != "done"]
 
 
 def _chosen(option: str, text: str, known: Sequence[str]) -> tuple[str, ...]:
@@ -175,10 +196,13 @@ def _reason(found: RunStatus) -> str:
 
 
 def _say_why(planned: PlannedRun, reason: str) -> None:
-    print(f"innerattn: error: {planned.case}: {reason}", file=sys.stderr)
+    _say(f"error: {planned.case}: {reason}")
 
 
 def _say_what_is_kept(found: Sequence[RunStatus]) -> None:
     done = sum(one.state == "finished" for one in found)
-    text = f"{done} of {len(found)} runs are finished and kept; the same command goes on with them"
+    _say(f"{done} of {len(found)} runs are finished and kept; the same command goes on with them")
+
+
+def _say(text: str) -> None:
     print(f"innerattn: {text}", file=sys.stderr)

@@ -4,27 +4,22 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.console import Console
 
 from innerattn.cli.options import Command, UsageError, check_target
-from innerattn.cli.progress import CheckingBounds, Evaluating, WatchingAttention
+from innerattn.cli.progress import MeasuringRobustness
 from innerattn.config.files import write_whole
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.report.tables.robustness import print_robustness
 
 if TYPE_CHECKING:
-    from innerattn.evaluate.bounds.results import Bounds
-    from innerattn.evaluate.faults.grid import Grid, Retention
-    from innerattn.measures.faults.shift_results import FaultAttention
-    from innerattn.policies import Policy
+    from innerattn.evaluate.robustness import Robustness as MeasuredRobustness
 
-_SCRIPTED = ("greedy", "hungarian", "oracle")
 _MOST = 1_000_000  # episodes, and steps of one
 
 
@@ -63,20 +58,17 @@ class Robustness(Command):
             from innerattn.report.plots.drawing import check_format
 
             check_format(self.plot)
-        grid, found, methods = self._retention(kinds)
-        robots = grid.scenario.num_robots
-        bounds = self._bounds() if robots > 1 else {}
-        attention = self._attention(kinds, bounds) if robots > 2 else {}
+        found = self._measure(kinds)
+        robots = found.grid.scenario.num_robots
         if robots < 3:
             left_out = "where attention goes" if robots > 1 else "attention, its bounds included"
             why = f"left out: {left_out}, which has no choice in a team of {robots}"
             print(f"innerattn: {why}", file=sys.stderr)
         if self.json != Path("-"):
             console = Console(markup=False, highlight=False)
-            print_robustness(console, grid, found, bounds, attention)
+            print_robustness(console, found.grid, found.retention, found.bounds, found.attention)
         if self.json is not None:
-            parts = _document(grid, found, methods, bounds, attention)
-            document = json.dumps(parts, indent=1, allow_nan=False)
+            document = json.dumps(found.to_json(), indent=1, allow_nan=False)
             if self.json == Path("-"):
                 print(document)
             else:
@@ -84,8 +76,8 @@ class Robustness(Command):
         if self.plot is not None:
             from innerattn.report.plots.heatmap import write_heatmap
 
-            first = next(iter(found))
-            write_heatmap(self.plot, first, found[first], grid)
+            first = next(iter(found.retention))
+            write_heatmap(self.plot, first, found.retention[first], found.grid)
         return 0
 
     def _check(self) -> tuple[str, ...]:
@@ -113,88 +105,15 @@ class Robustness(Command):
             raise UsageError(f"--faults = {unknown[0]!r}: known are all, {known}")
         return kinds
 
-    def _retention(
-        self, kinds: tuple[str, ...]
-    ) -> tuple[Grid, dict[str, Retention], dict[str, str]]:
-        from innerattn.evaluate.faults.grid import Grid, play_all
-        from innerattn.evaluate.trained import load_trained
-        from innerattn.policies import scripted_policy
-        from innerattn.records.run_folder import read_config
-        from innerattn.train.build import thread_count, torch_threads
+    def _measure(self, kinds: tuple[str, ...]) -> MeasuredRobustness:
+        from innerattn.evaluate.robustness import measure_robustness
 
-        config = read_config(self.runs[0])
-        steps = self.episode_steps or 2 * config.scenario.episode_steps
-        given = {} if self.seed is None else {"seed": self.seed}
-        seed = config.evaluate.replace(**given).seed
-        scenario = config.scenario.replace(episode_steps=steps, faults=())
-        grid = Grid(scenario, kinds=kinds, episodes=self.episodes, seed=seed)
-        policies: list[tuple[str, Policy]] = []
-        methods: dict[str, str] = {}
-        for name, run in zip(_names(self.runs), self.runs, strict=True):
-            trained, policy = load_trained(run, scenario)
-            methods[name] = trained.train.method
-            policies.append((name, policy))
-        policies += [(name, scripted_policy(name, scenario, seed)) for name in _SCRIPTED]
-        with torch_threads(thread_count(config)), Evaluating() as progress:
-            found = play_all(policies, grid, num_threads=config.train.threads, progress=progress)
-        return grid, found, methods
-
-    def _bounds(self) -> dict[str, Bounds]:
-        from innerattn.evaluate.bounds.measure import bounds_of_run
-
-        with CheckingBounds() as progress:
-            return {
-                name: bounds_of_run(run, seed=self.seed, progress=progress)
-                for name, run in zip(_names(self.runs), self.runs, strict=True)
-            }
-
-    def _attention(
-        self, kinds: tuple[str, ...], bounds: dict[str, Bounds]
-    ) -> dict[str, FaultAttention]:
-        """Of the runs with learnt attention; weights that are not learnt do not move."""
-        from innerattn.evaluate.faults.attention import fault_attention_of_run
-
-        with WatchingAttention() as progress:
-            return {
-                name: fault_attention_of_run(
-                    run,
-                    kinds=kinds,
-                    episodes=self.episodes,
-                    steps=self.episode_steps,
-                    seed=self.seed,
-                    progress=progress,
-                )
-                for name, run in zip(_names(self.runs), self.runs, strict=True)
-                if bounds[name].attention == "inner"
-            }
-
-
-def _names(runs: Sequence[str]) -> list[str]:
-    """A name for each run: the shortest end of its path that no other has, nor a script."""
-    paths = [Path(run).resolve() for run in runs]
-    taken = [*(path.parts for path in paths), *((script,) for script in _SCRIPTED)]
-
-    def named(path: Path) -> str:
-        for length in range(1, len(path.parts)):
-            end = path.parts[-length:]
-            if sum(parts[-length:] == end for parts in taken) == 1:
-                return "/".join(end)
-        return str(path)
-
-    return [named(path) for path in paths]
-
-
-def _document(
-    grid: Grid,
-    found: dict[str, Retention],
-    methods: dict[str, str],
-    bounds: dict[str, Bounds],
-    attention: dict[str, FaultAttention],
-) -> dict[str, Any]:
-    from innerattn.evaluate.faults.document import robustness_document
-
-    return {
-        **robustness_document(grid, found, methods),
-        "bounds": {name: one.to_json() for name, one in bounds.items()},
-        "attention": {name: one.to_json() for name, one in attention.items()},
-    }
+        with MeasuringRobustness() as progress:
+            return measure_robustness(
+                self.runs,
+                kinds=kinds,
+                episodes=self.episodes,
+                episode_steps=self.episode_steps,
+                seed=self.seed,
+                progress=progress,
+            )

@@ -12,15 +12,6 @@ METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform")
 """The methods that are compared."""
 SITUATIONS = ("single", "double", "mixed")
 """The built-in scenarios that they are compared in."""
-TARGETS: Mapping[str, tuple[str, ...]] = {
-    "table2": METHODS,
-    "fig4": METHODS,
-    "fig5": tuple(method for method in METHODS if method.endswith("-inner")),
-    "all": METHODS,
-    "crossed": tuple(method for method in METHODS if method.startswith("td-")),
-}
-"""What can be reproduced, with the methods that it needs. All is what the paper shows, in every
-situation; the crossed design is apart, see `innerattn.experiments.crossed`."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +19,7 @@ class Case:
     """What tells the runs of one study apart.
 
     Attributes:
-        situation: name of the built-in scenario.
+        situation: name of the built-in scenario, such as "mixed" or "mixed-8".
         method: value of `train.method`.
         seed: of training.
         variant: what else was changed, as a word; nothing in the paper's own comparison.
@@ -63,6 +54,30 @@ class PlannedRun:
     folder: Path
 
 
+def planned_run(
+    case: Case, budget: str, out: Path, overrides: Mapping[str, object] | None = None
+) -> PlannedRun:
+    """The run of a study that ``case`` names, in a folder of that name.
+
+    It is what ``innerattn train --preset SITUATION --method METHOD --budget BUDGET --seed SEED
+    --train.threads 1 --evaluate.seed WORLDS`` trains with ``overrides`` as further options; see
+    `of_seed`.
+
+    Args:
+        case: which run; its variant only names what ``overrides`` change.
+        budget: name of a built-in budget.
+        out: folder of the study; its runs lie in ``runs``.
+        overrides: values by dotted key.
+
+    Raises:
+        ConfigError: an unknown name, or a value that is not allowed.
+    """
+    values = {**(overrides or {}), **of_seed(case.seed)}
+    config = load_run_config(case.situation, case.method, budget, overrides=values)
+    words = (case.situation, case.method, case.variant, budget, f"s{case.seed}")
+    return PlannedRun(case, config, out / "runs" / "-".join(filter(None, words)))
+
+
 def plan(
     methods: Sequence[str],
     situations: Sequence[str],
@@ -70,35 +85,27 @@ def plan(
     budget: str,
     out: Path,
     overrides: Mapping[str, object] | None = None,
+    variant: str = "",
 ) -> list[PlannedRun]:
-    """The runs of a study, in the order in which they are trained.
+    """The runs of a study, in the order in which they are trained; see `planned_run`.
 
-    Each is what ``innerattn train --preset SITUATION --method METHOD --budget BUDGET --seed SEED
-    --train.threads 1 --evaluate.seed WORLDS`` trains, see `of_seed`. All runs of one seed come
-    before those of the next, so that a study that is stopped has whole seeds.
+    All runs of one seed come before those of the next, so that a study that is stopped has whole
+    seeds.
 
     Args:
         methods: values of `train.method`.
         situations: names of built-in scenarios.
         seeds: seeds of training.
         budget: name of a built-in budget.
-        out: folder of the study; its runs lie in ``runs``.
+        out: folder of the study.
         overrides: values by dotted key that all runs share, e.g. to make them small.
+        variant: a word for what these change, for the runs' names.
 
     Raises:
         ConfigError: an unknown name, or a value that is not allowed.
     """
     return [
-        PlannedRun(
-            Case(situation, method, seed),
-            load_run_config(
-                situation,
-                method,
-                budget,
-                overrides={**(overrides or {}), **of_seed(seed)},
-            ),
-            out / "runs" / f"{situation}-{method}-{budget}-s{seed}",
-        )
+        planned_run(Case(situation, method, seed, variant), budget, out, overrides)
         for seed in seeds
         for situation in situations
         for method in methods

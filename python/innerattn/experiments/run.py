@@ -152,6 +152,23 @@ def measured_run(
     return FinishedRun(case, folder, config, info, summary, read)
 
 
+def read_metrics(run: FinishedRun, *names: str) -> list[tuple[Any, ...]]:
+    """What a run's training logged under some names, in the order in which it did.
+
+    Raises:
+        RunError: its ``metrics.jsonl`` is missing, as with an archived run, empty or damaged.
+    """
+    path = run.folder / "metrics.jsonl"
+    try:
+        lines = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
+        found = [tuple(line[name] for name in names) for line in lines]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise RunError(f"{path}: not the metrics of a run") from error
+    if not found:
+        raise RunError(f"{path}: holds no line")
+    return found
+
+
 def by_method(runs: Sequence[FinishedRun]) -> dict[tuple[str, str], list[FinishedRun]]:
     """Runs by situation and method, in the order these first appear; by seed within.
 

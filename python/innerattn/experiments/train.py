@@ -6,10 +6,10 @@ import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from innerattn.cores import usable_cores
 from innerattn.experiments.failures import forget_failures, note_failure
 from innerattn.experiments.lock import StudyLock
 from innerattn.experiments.plan import PlannedRun
+from innerattn.experiments.processes import places
 from innerattn.experiments.scan import TO_TRAIN, RunStatus
 from innerattn.experiments.side_by_side import Run, refuse_what_cannot_run, train_side_by_side
 
@@ -22,11 +22,6 @@ def to_train(found: Sequence[RunStatus]) -> list[PlannedRun]:
 def to_measure(found: Sequence[RunStatus]) -> list[PlannedRun]:
     """The runs that are trained and only to be measured, in their order."""
     return [one.planned for one in found if one.state == "unmeasured"]
-
-
-def places(runs: int) -> int:
-    """How many of ``runs`` runs, of one thread each, go at a time; at least 1."""
-    return max(1, min(usable_cores(), runs))
 
 
 def train_missing(

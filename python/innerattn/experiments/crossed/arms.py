@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from innerattn.config import load_run_config
-from innerattn.experiments.plan import Case, PlannedRun, of_seed
+from innerattn.experiments.plan import Case, PlannedRun, planned_run
 
 Credit = Literal["helpers", "team"]
 
@@ -79,15 +78,11 @@ def plan_crossed(
 ) -> list[PlannedRun]:
     """The runs of the `ARMS` of some methods, as `innerattn.experiments.plan.plan` lists runs."""
     return [
-        PlannedRun(
+        planned_run(
             Case(situation, arm.method, seed, arm.variant),
-            load_run_config(
-                situation,
-                arm.method,
-                budget,
-                overrides={**(overrides or {}), **arm.overrides(), **of_seed(seed)},
-            ),
-            out / "runs" / f"{situation}-{arm.method}-{arm.variant}-{budget}-s{seed}",
+            budget,
+            out,
+            {**(overrides or {}), **arm.overrides()},
         )
         for seed in seeds
         for situation in situations

@@ -6,7 +6,6 @@ run's; here every situation and method has its own courses, with a band over run
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.errors import RunError
-from innerattn.experiments.run import FinishedRun, by_method
+from innerattn.experiments.run import FinishedRun, by_method, read_metrics
 from innerattn.stats import Estimate
 from innerattn.stats.seeds import Array, SeedCurve, seed_curve, seed_estimate
 
@@ -150,12 +149,5 @@ def _part(times: int) -> int:
 
 def _entropies(run: FinishedRun) -> dict[int, dict[str, list[float]]]:
     """Entropy by env-steps, robot and head; empty where the method has none."""
-    path = run.folder / "metrics.jsonl"
-    try:
-        lines = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
-        found = {int(line["env_steps"]): dict(line["attention_entropy"]) for line in lines}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise RunError(f"{path}: not the metrics of a run") from error
-    if not found:
-        raise RunError(f"{path}: holds no line")
-    return {steps: entropy for steps, entropy in found.items() if entropy}
+    found = read_metrics(run, "env_steps", "attention_entropy")
+    return {int(steps): dict(entropy) for steps, entropy in found if entropy}

@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from innerattn.config.files import write_whole
 from innerattn.experiments.paper.fig4 import PRINTED_NATS, fig4_json
 from innerattn.experiments.paper.fig5 import evidence_json
 from innerattn.experiments.paper.findings import PARTS, Findings, find
 from innerattn.experiments.paper.scene import scene_json
 from innerattn.experiments.run import FinishedRun, named_from
-from innerattn.experiments.smoke import smoke_note
+from innerattn.report.folder import ReportFolder
 from innerattn.report.paper.fig4 import fig4_csv, fig4_lines
 from innerattn.report.paper.fig5 import evidence_lines, evidence_table
 from innerattn.report.paper.page import claims_page, report_page
 from innerattn.report.paper.table2 import table2_markdown
 from innerattn.report.paper.table2_csv import table2_csv
 from innerattn.report.plots.aligned import draw_aligned
-from innerattn.report.plots.drawing import check_format, write_figure
+from innerattn.report.plots.drawing import check_format
 from innerattn.report.plots.entropy import draw_entropy
 from innerattn.report.plots.handoff import draw_handoff
-from innerattn.report.smoke import mark_figure, noted_csv, noted_markdown
 from innerattn.report.table import csv_text, markdown
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 REPORT = ("report.md", "claims.md", "runs.csv")
 """The files of every report."""
@@ -77,66 +70,39 @@ def write_report(
         check_format(folder / "fig4.png")
     findings = find(runs, parts)
     folder.mkdir(parents=True, exist_ok=True)
-    _Folder(folder, budget).write(findings, left_out)
+    _write(ReportFolder(folder, budget), findings, left_out)
     return findings
 
 
-class _Folder:
-    """Where files go, each with the note of its budget."""
+def _write(folder: ReportFolder, findings: Findings, left_out: Sequence[str]) -> None:
+    """Write the report and the files of the parts that there are."""
+    if findings.table is not None and findings.comparison is not None:
+        folder.json("table2.json", findings.table.to_json())
+        folder.markdown("table2.md", table2_markdown(findings.table, findings.comparison))
+        folder.csv("table2.csv", table2_csv(findings.table))
+    if findings.courses is not None:
+        folder.json("fig4.json", fig4_json(findings.courses))
+        folder.csv("fig4.csv", fig4_csv(findings.courses))
+        lines = fig4_lines(findings.courses)
+        folder.draw("fig4", draw_entropy(lines, PRINTED_NATS) if lines else None)
+    if findings.evidence is not None:
+        _write_fig5(folder, findings)
+    folder.csv("runs.csv", _runs_csv(findings.runs, folder.path))
+    folder.markdown("claims.md", claims_page(findings))
+    folder.markdown("report.md", report_page(findings, folder.budget, left_out))
 
-    def __init__(self, folder: Path, budget: str) -> None:
-        self._folder, self._budget = folder, budget
 
-    def write(self, findings: Findings, left_out: Sequence[str]) -> None:
-        """Write the report and the files of the parts that there are."""
-        if findings.table is not None and findings.comparison is not None:
-            self._json("table2.json", findings.table.to_json())
-            self._markdown("table2.md", table2_markdown(findings.table, findings.comparison))
-            self._csv("table2.csv", table2_csv(findings.table))
-        if findings.courses is not None:
-            self._json("fig4.json", fig4_json(findings.courses))
-            self._csv("fig4.csv", fig4_csv(findings.courses))
-            lines = fig4_lines(findings.courses)
-            self._draw("fig4", draw_entropy(lines, PRINTED_NATS) if lines else None)
-        if findings.evidence is not None:
-            self._fig5(findings)
-        self._csv("runs.csv", _runs_csv(findings.runs, self._folder))
-        self._markdown("claims.md", claims_page(findings))
-        self._markdown("report.md", report_page(findings, self._budget, left_out))
-
-    def _fig5(self, findings: Findings) -> None:
-        found, scene = findings.evidence or (), findings.scene
-        self._json("fig5_evidence.json", evidence_json(found))
-        table = f"# Attention at handoffs, every run\n\n{markdown(evidence_table(found))}"
-        self._markdown("fig5_evidence.md", table)
-        self._draw("fig5_evidence", draw_aligned(evidence_lines(found)) if found else None)
-        if scene is not None:
-            self._json("fig5.json", scene_json(scene))
-        else:
-            (self._folder / "fig5.json").unlink(missing_ok=True)
-        self._draw("fig5", draw_handoff(scene) if scene else None)
-
-    def _json(self, name: str, document: dict[str, Any]) -> None:
-        noted = {"note": smoke_note(self._budget), **document}
-        text = f"{json.dumps(noted, allow_nan=False)}\n"
-        write_whole(self._folder / name, text.encode())
-
-    def _markdown(self, name: str, text: str) -> None:
-        write_whole(self._folder / name, noted_markdown(text, self._budget).encode())
-
-    def _csv(self, name: str, text: str) -> None:
-        write_whole(self._folder / name, noted_csv(text, self._budget).encode())
-
-    def _draw(self, name: str, figure: Figure | None) -> None:
-        """Write a figure, or remove that of other runs where there is none."""
-        if figure is not None:
-            mark_figure(figure, self._budget)
-        for suffix in (".pdf", ".png"):
-            drawn = self._folder / f"{name}{suffix}"
-            if figure is None:
-                drawn.unlink(missing_ok=True)
-            else:
-                write_figure(drawn, figure)
+def _write_fig5(folder: ReportFolder, findings: Findings) -> None:
+    found, scene = findings.evidence or (), findings.scene
+    folder.json("fig5_evidence.json", evidence_json(found))
+    table = f"# Attention at handoffs, every run\n\n{markdown(evidence_table(found))}"
+    folder.markdown("fig5_evidence.md", table)
+    folder.draw("fig5_evidence", draw_aligned(evidence_lines(found)) if found else None)
+    if scene is not None:
+        folder.json("fig5.json", scene_json(scene))
+    else:
+        (folder.path / "fig5.json").unlink(missing_ok=True)
+    folder.draw("fig5", draw_handoff(scene) if scene else None)
 
 
 def _runs_csv(runs: Sequence[FinishedRun], folder: Path) -> str:

@@ -1,0 +1,1 @@
+"""What methods learn within a budget: scores over seeds, and courses of training."""

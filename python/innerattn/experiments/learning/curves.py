@@ -1,0 +1,95 @@
+"""Courses of training from the metrics of finished runs: rescues against env-steps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.experiments.run import FinishedRun, read_metrics
+from innerattn.stats.seeds import SeedCurve, seed_curve
+
+Array = NDArray[np.float64]
+
+PARTS = 40
+"""Points of a curve: means over so many equal parts of a run."""
+SCRIPTS = ("hungarian", "greedy")
+"""The scripted policies that a curve is shown beside."""
+
+
+@dataclass(frozen=True)
+class LearningCurve:
+    """The course of one method in one situation.
+
+    Attributes:
+        situation: of the worlds.
+        method: of training.
+        env_steps: (PARTS,) in the middle of each part.
+        rescues: (PARTS,) per episode of training, over runs; NaN where no episode ended.
+        scripts: rescues per episode of `SCRIPTS` by name, in the worlds of the first run's
+            evaluation.
+    """
+
+    situation: str
+    method: str
+    env_steps: Array
+    rescues: SeedCurve
+    scripts: dict[str, float]
+
+
+def learning_curves(groups: Sequence[Sequence[FinishedRun]]) -> list[LearningCurve]:
+    """The courses of groups of runs; a group with a run in which no episode ended has none.
+
+    Args:
+        groups: runs of one situation and method, one per seed.
+
+    Raises:
+        RunError: a run has no readable metrics.
+    """
+    curves = (_curve(group) for group in groups)
+    return [curve for curve in curves if curve is not None]
+
+
+def _curve(group: Sequence[FinishedRun]) -> LearningCurve | None:
+    courses = [_course(run) for run in group]
+    if not all(len(steps) for steps, _ in courses):
+        return None
+    end = min(steps[-1] for steps, _ in courses)
+    edges = np.linspace(0.0, end, PARTS + 1)
+    first = group[0]
+    return LearningCurve(
+        situation=first.situation,
+        method=first.method,
+        env_steps=(edges[1:] + edges[:-1]) / 2.0,
+        rescues=seed_curve(np.stack([in_parts(steps, values, edges) for steps, values in courses])),
+        scripts={name: float(first.summary["scripted"][name]["mean"]) for name in SCRIPTS},
+    )
+
+
+def in_parts(steps: Array, values: Array, edges: Array) -> Array:
+    """Means over the parts between the edges.
+
+    A value on an edge belongs to the part before it; what lies after the last edge, to the last.
+
+    Args:
+        steps: (T,) times.
+        values: (T,) at these.
+        edges: (P + 1,) rising, from at most the first of ``steps``.
+
+    Returns:
+        (P,); NaN where a part has no value.
+    """
+    parts = len(edges) - 1
+    part = np.clip(np.searchsorted(edges, steps) - 1, 0, parts - 1)
+    count = np.bincount(part, minlength=parts)
+    total = np.bincount(part, values, parts)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _course(run: FinishedRun) -> tuple[Array, Array]:
+    """Env-steps and rescues per training episode, of the times at which episodes had ended."""
+    found = read_metrics(run, "env_steps", "rescues_per_episode")
+    known = np.array([both for both in found if both[1] is not None], np.float64).reshape(-1, 2)
+    return known[:, 0], known[:, 1]

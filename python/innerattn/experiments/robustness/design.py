@@ -1,0 +1,100 @@
+"""Which runs meet which faults, and which of them in the same worlds; it looks at no folder."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from innerattn.envs.batch import FAULT_KINDS
+from innerattn.experiments.plan import METHODS, SITUATIONS, Case, PlannedRun, planned_run
+
+Part = Literal["deployment", "training", "teams"]
+"""deployment: teams trained without faults; training: beside them, teams trained with faults;
+teams: by their size."""
+
+TRAINED = "td-inner"
+"""The method of training with faults, and of teams by their size; both are in mixed."""
+WITH_FAULTS = "mixed-faults"
+"""The built-in scenario of training with faults."""
+MASKED, TEAM = "masked", "team"
+"""Variants: unavailable robots are kept out of the critic's attention; a team of some size."""
+TEAMS = ("mixed-1-food", "mixed", "mixed-4-food", "mixed-8", "mixed-16")
+"""The built-in scenarios whose teams differ in size, for as many victims."""
+TEAM_BUDGET = "quick"
+"""The budget of these teams, whatever that of the other runs."""
+
+_CHANGES: Mapping[str, Mapping[str, object]] = {MASKED: {"network.mask_unavailable": True}}
+"""What variants change, by dotted key."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Runs that meet the same faults in the same worlds.
+
+    Attributes:
+        part: of the study.
+        name: that no other group has.
+        cases: the runs, in the order of tables.
+        kinds: of faults.
+        episodes: worlds in which each fault is tried.
+    """
+
+    part: Part
+    name: str
+    cases: tuple[Case, ...]
+    kinds: tuple[str, ...] = FAULT_KINDS
+    episodes: int = 100
+
+
+def plan_robustness(
+    methods: Sequence[str],
+    situations: Sequence[str],
+    seeds: Sequence[int],
+    budget: str,
+    out: Path,
+    overrides: Mapping[str, object] | None = None,
+) -> list[PlannedRun]:
+    """The runs of the study, as `innerattn.experiments.plan.plan` lists runs.
+
+    Training with faults and teams by their size are in it where `TRAINED` and mixed are.
+    """
+    whole = TRAINED in methods and "mixed" in situations
+    cases: list[tuple[Case, str]] = []
+    for seed in seeds:
+        cases += [(Case(s, method, seed), budget) for s in situations for method in methods]
+        if whole:
+            cases += [(case, budget) for case in _trained_with_faults(seed)]
+    if whole:
+        cases += [(case, TEAM_BUDGET) for case in map(_team, TEAMS)]
+    return [
+        planned_run(case, budget, out, {**(overrides or {}), **_CHANGES.get(case.variant, {})})
+        for case, budget in cases
+    ]
+
+
+def groups(cases: Collection[Case]) -> list[Group]:
+    """The groups of planned runs."""
+    found = []
+    for seed in sorted({case.seed for case in cases}):
+        for situation in SITUATIONS:
+            own = tuple(x for m in METHODS if (x := Case(situation, m, seed)) in cases)
+            if own:
+                found.append(Group("deployment", f"{situation}-s{seed}", own))
+        faulty = (*_trained_with_faults(seed), Case("mixed", TRAINED, seed))
+        if set(faulty) <= set(cases):
+            found.append(Group("training", f"trained-with-faults-s{seed}", faulty))
+    for team in map(_team, TEAMS):
+        if team in cases:
+            name = f"team-{team.situation}"
+            found.append(Group("teams", name, (team,), ("unavailable",), 200))
+    return found
+
+
+def _trained_with_faults(seed: int) -> tuple[Case, Case]:
+    return Case(WITH_FAULTS, TRAINED, seed), Case(WITH_FAULTS, TRAINED, seed, MASKED)
+
+
+def _team(name: str) -> Case:
+    return Case(name, TRAINED, 0, TEAM)

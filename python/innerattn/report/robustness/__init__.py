@@ -1,0 +1,1 @@
+"""The report on what faults cost: its page and its tables."""

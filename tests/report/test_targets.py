@@ -1,0 +1,50 @@
+"""The registry of targets: what each needs, and what is left where no run is finished."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from innerattn.experiments.plan import METHODS, SITUATIONS
+from innerattn.report.targets import TARGETS
+
+
+@pytest.mark.parametrize(
+    ("target", "gone"),
+    [
+        ("table2", {"report.md", "table2.csv"}),
+        ("all", {"report.md", "table2.csv", "fig5_evidence.pdf"}),
+        ("crossed", {"crossed.md"}),
+    ],
+)
+def test_files_of_earlier_runs_do_not_outlive_them(
+    target: str, gone: set[str], tmp_path: Path
+) -> None:
+    names = {"report.md", "table2.csv", "fig5_evidence.pdf", "crossed.md", "table2-mine.csv"}
+    for name in names:
+        (tmp_path / name).touch()
+    left_out = ["mixed td-inner seed 0: failed"]
+    assert TARGETS[target].write([], tmp_path, "short", left_out) == []
+    assert {path.name for path in tmp_path.iterdir()} == names - gone
+    assert TARGETS[target].write([], tmp_path / "none", "short", []) == []
+
+
+def test_what_each_target_needs() -> None:
+    inner = ("td-inner", "ppo-inner")
+    td = ("td-inner", "td-uniform")
+    needs = {name: (target.methods, target.situations) for name, target in TARGETS.items()}
+    assert needs["table2"] == needs["fig4"] == needs["all"] == (METHODS, SITUATIONS)
+    assert needs["fig5"] == (inner, SITUATIONS)
+    assert needs["crossed"] == (td, ("single", "mixed"))
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_reports_and_runs_of_a_target_have_names_of_their_own(name: str) -> None:
+    target = TARGETS[name]
+    assert target.name == name
+    planned = target.plan(target.methods, target.situations, range(2), "short", Path("study"))
+    assert len({one.folder for one in planned}) == len({one.case for one in planned})
+    assert len({one.folder for one in planned}) == len(planned) > 0
+    files = target.report().files
+    assert len(set(files)) == len(files) > 0
