@@ -7,6 +7,7 @@ left out. The code runs on today's PyTorch without a change.
 from __future__ import annotations
 
 import sys
+import warnings
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ class PublicCode:
     """The learner and the replay memory of the public code, of our sizes and numbers.
 
     Attributes:
+        model: The learner, an `AttentionSAC`.
         parameters: Count of the trained parameters of the critic and of all actors.
     """
 
@@ -40,11 +42,13 @@ class PublicCode:
         Raises:
             ImportError: Another package hides one of the checkout's.
         """
+        # It calls `clip_grad_norm_` by an old name, which still works.
+        warnings.filterwarnings("ignore", "`torch.nn.utils.clip_grad_norm`", FutureWarning)
         sys.dont_write_bytecode = True  # the checkout stays as it is
         sys.path.insert(0, str(checkout))
         learner, memory = _module("algorithms.attention_sac"), _module("utils.buffer")
         width, actions = team.obs_width, team.num_actions
-        self._model = learner.AttentionSAC(
+        self.model = learner.AttentionSAC(
             [{"num_in_pol": width, "num_out_pol": actions}] * team.num_robots,
             [(width, actions)] * team.num_robots,
             gamma=td.gamma,
@@ -56,7 +60,7 @@ class PublicCode:
             critic_hidden_dim=network.hidden_width,
             attend_heads=network.attention_heads,
         )
-        self._model.prep_training(device="cpu")
+        self.model.prep_training(device="cpu")
         self._replay = memory.ReplayBuffer(
             td.replay_capacity,
             team.num_robots,
@@ -64,7 +68,7 @@ class PublicCode:
             [actions] * team.num_robots,
         )
         self._team, self._log = team, _NoLog()
-        modules = [self._model.critic, *self._model.policies]
+        modules = [self.model.critic, *self.model.policies]
         self.parameters = sum(one.numel() for module in modules for one in module.parameters())
 
     def add(self, batch: Transitions) -> None:
@@ -85,9 +89,9 @@ class PublicCode:
 
     def update(self, batch: Any) -> None:
         """Update critic, policies and targets, call by call as in its `main.py`."""
-        self._model.update_critic(batch, logger=self._log)
-        self._model.update_policies(batch, logger=self._log)
-        self._model.update_all_targets()
+        self.model.update_critic(batch, logger=self._log)
+        self.model.update_policies(batch, logger=self._log)
+        self.model.update_all_targets()
 
 
 def _module(name: str) -> Any:

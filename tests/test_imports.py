@@ -28,3 +28,15 @@ def test_the_check_finds_what_is_imported() -> None:
     command = [sys.executable, "-c", _IMPORT, "innerattn.nn"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "torch" in done.stdout.split()
+
+
+def test_gymnasium_and_pettingzoo_wait_until_their_view_is_asked_for() -> None:
+    code = """
+import sys
+import innerattn.envs
+early = {"gymnasium", "pettingzoo"} & set(sys.modules)
+from innerattn.envs import parallel_env
+print(sorted(early), {"gymnasium", "pettingzoo"} <= set(sys.modules), parallel_env.__name__)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[] True parallel_env\n"

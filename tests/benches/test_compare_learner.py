@@ -9,6 +9,7 @@ from typing import Any
 
 import compare_learner
 import learner_update
+import maac_agreement
 import maac_checkout
 import pytest
 import torch
@@ -16,6 +17,7 @@ from maac_learner import PublicCode
 
 from innerattn.config import NetworkConfig, TDConfig
 from innerattn.learn import TD, Team, Transitions
+from innerattn.nn import action_noise, sample_actions
 
 # A learner with the calls of the public code, which writes down what it is told.
 LEARNER = """
@@ -167,7 +169,7 @@ TD_CONFIG = TDConfig(batch_size=8, replay_capacity=40, gamma=0.9)
 @pytest.mark.usefixtures("importing")
 def test_the_public_code_is_called_as_its_main_program_calls_it(checkout: Path) -> None:
     public: Any = PublicCode(checkout, TEAM, NETWORK, TD_CONFIG)
-    agents, sizes, numbers = public._model.made
+    agents, sizes, numbers = public.model.made
     assert agents == [{"num_in_pol": 3, "num_out_pol": 4}] * 2
     assert sizes == [(3, 4)] * 2
     assert numbers["gamma"] == 0.9
@@ -175,7 +177,7 @@ def test_the_public_code_is_called_as_its_main_program_calls_it(checkout: Path) 
     assert public._replay.sizes == (40, 2, [3, 3], [4, 4])
     assert public.parameters == 2 * 3 + 3 + 2 * (1 + 1)
     public.update(public.sample(5))
-    assert public._model.calls == [
+    assert public.model.calls == [
         ("prep_training", "cpu"),
         ("update_critic", 5),
         ("update_policies", 5),
@@ -202,6 +204,17 @@ def test_the_public_code_gets_the_same_transitions(checkout: Path) -> None:
     assert [one.sum(axis=1).tolist() for one in actions] == [[1.0] * 6] * 2
     assert [one.argmax(axis=1).tolist() for one in actions] == batch.actions.t().tolist()
     assert dones.tolist() == [[done, done] for done in batch.terminated.tolist()]
+
+
+def test_the_public_code_can_be_made_to_draw_our_actions() -> None:
+    shape = (3, 4, 50)
+    log_prob = torch.randn(shape, dtype=torch.float64).log_softmax(dim=1)
+    noise = action_noise(shape, torch.Generator().manual_seed(0), torch.float64)
+    categorical_sample = maac_agreement.draw_from([*noise])
+    for robot, wanted in enumerate(sample_actions(log_prob, noise)):
+        actions, one_hot = categorical_sample(log_prob[robot].t().exp())
+        assert (actions.squeeze(1) == wanted).all()
+        assert (one_hot == torch.eye(4, dtype=torch.float64)[wanted]).all()
 
 
 @pytest.mark.usefixtures("importing")

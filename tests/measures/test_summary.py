@@ -61,6 +61,9 @@ def test_figures_by_hand() -> None:
         "greedy": 1.0,
         "hungarian": 3.0,
     }
+    scores = {name: summary.standard.script_score(name) for name in summary.standard.scripted}
+    assert scores == {"random": 0.0, "greedy": pytest.approx(1 / 3), "hungarian": 1.0}
+    assert replace(summary.standard, score=None).script_score("greedy") is None
     # Cooperation is of the recorded episodes alone.
     assert summary.cooperation == {
         "task_1": {"food_0": 1, "food_1": 0},

@@ -1,4 +1,4 @@
-"""`innerattn reproduce`: train the runs that a table or figure needs, and make it of them."""
+"""`innerattn reproduce`: train the runs that a table or figure needs, then write it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _MOST_SEEDS = 1_000
 
 @dataclass(kw_only=True)
 class Reproduce(Command):
-    """Train the runs that a table or figure of the paper needs, and make it of them.
+    """Train the runs that a table or figure of the paper needs, then write it with a report.
 
     Runs that are there already are kept; the same command goes on with what is missing.
     """

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.envs import BatchEnv
+if TYPE_CHECKING:
+    from innerattn.envs import BatchEnv
 
 
 class WorldState(NamedTuple):

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -188,6 +187,11 @@ def _read(
     return table, records
 
 
+def _of_record(table: pa.Table, index: int) -> pa.Table:
+    """The rows of one record."""
+    return table.filter(pa.array(_numbers(table["record"]) == index))
+
+
 def _lengths(heads: Sequence[dict[str, Any]], episodes: pa.Table) -> list[Length]:
     """Which length of an evaluation each record is of.
 
@@ -198,7 +202,7 @@ def _lengths(heads: Sequence[dict[str, Any]], episodes: pa.Table) -> list[Length
     lengths: list[Length] = []
     for index, head in enumerate(heads):
         name = head["policy"]
-        rows = episodes.filter(pc.equal(episodes["record"], index))
+        rows = _of_record(episodes, index)
         again = name in begun and int(_numbers(rows["episode"])[0]) == 0
         lengths.append(head.get("length", "long" if again else "standard"))
         begun.add(name)
@@ -214,8 +218,8 @@ def _record(
     steps: bool,
     scenarios: dict[str, Scenario],
 ) -> Record:
-    rows = episodes.filter(pc.equal(episodes["record"], index))
-    events = rescues.filter(pc.equal(rescues["record"], index))
+    rows = _of_record(episodes, index)
+    events = _of_record(rescues, index)
     described = json.dumps(head["scenario"])
     if described not in scenarios:
         scenarios[described] = Scenario.model_validate(head["scenario"])

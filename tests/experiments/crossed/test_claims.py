@@ -14,8 +14,8 @@ from innerattn.experiments.crossed.outcome import Outcome
 EVEN = Outcome(0.02, 0.48, 2.0, 0.7, 0.9, 0.48)
 IDLE = replace(EVEN, imbalance=0.4, least_share=0.1, first_share=0.1)
 
-MAKES_EVEN = "attention (mean over λ) makes sharing even"
-MAKES_EVEN_FREE = "attention (λ = 0) makes sharing even"
+MAKES_EVEN = "attention (mean over λ) makes sharing even under team credit"
+MAKES_EVEN_FREE = "attention (λ = 0) makes sharing even under team credit"
 RESCUES_MORE = "attention (mean over λ) rescues more"
 RESCUES_MORE_FREE = "attention (λ = 0) rescues more"
 TEAM_UNEVEN = "team credit makes sharing uneven"

@@ -66,7 +66,7 @@ def test_the_page_opens_with_its_figure_and_links_the_rest(crossed_study: Crosse
     text = (out / "crossed.md").read_text()
     opening = text.split("\n## ")[0]
     assert opening.splitlines()[2].endswith("(crossed_seeds.png)")
-    assert "18 runs in all, budget `short`, seeds 0, 1." in opening
+    assert "18 runs, budget `short`, seeds 0, 1." in opening
     linked = {name for name in FILES if f"({name})" in text}
     assert linked == {"crossed.png", "crossed_seeds.png", "crossed.csv", "crossed_tables.md"}
     claims = {row[0]: row[1:] for row in rows_of(text)}

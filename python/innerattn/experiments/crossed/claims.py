@@ -89,8 +89,14 @@ class Answer:
 def answers(situation: str, outcomes: Outcomes, effects: Sequence[Effect]) -> list[Answer]:
     """All expectations in one situation, from its runs and their `effects`."""
     found = [
-        (f"attention (λ = {_FREE:g}) makes sharing even", _makes_even(outcomes, [_FREE])),
-        ("attention (mean over λ) makes sharing even", _makes_even(outcomes, PENALTIES)),
+        (
+            f"attention (λ = {_FREE:g}) makes sharing even under team credit",
+            _makes_even(outcomes, [_FREE]),
+        ),
+        (
+            "attention (mean over λ) makes sharing even under team credit",
+            _makes_even(outcomes, PENALTIES),
+        ),
         (f"attention (λ = {_FREE:g}) rescues more", _above_0(_free_attention(outcomes, "score"))),
         ("attention (mean over λ) rescues more", _above_0(_effect(effects, ATTENTION, "score"))),
         ("team credit makes sharing uneven", _above_0(_effect(effects, CREDIT, "imbalance"))),

@@ -21,7 +21,9 @@ def competence_terms() -> str:
         if name in MEASURES and MEASURES[name].needs
     ]
     return (
-        "\n".join(meant) + "\n\nThese are of the episodes recorded step by step; of scripted "
+        "Choices of robots and times:\n\n"
+        + "\n".join(meant)
+        + "\n\nThese are of the episodes recorded step by step; of scripted "
         "policies, which stand last, that is all episodes.\n"
     )
 
