@@ -1,4 +1,4 @@
-"""Robustness over seeds and methods: what is kept under faults, bounds, attention, redundancy.
+"""Robustness over seeds and methods: retention under faults, bounds, attention, redundancy.
 
 `python benches/robustness.py RUNS` trains every missing run, measures them with
 `innerattn robustness` (one core each, side by side), keeps the documents in RUNS, and fills the
@@ -85,7 +85,7 @@ def kinds_table(head: Sequence[str], kinds: Sequence[str], cell: Callable[[str, 
 
 
 def deployment(documents: Sequence[Document]) -> str:
-    """What each method keeps, by kind, and inner minus uniform."""
+    """Retention of each method, by kind, and inner minus uniform."""
     kinds = list(documents[0]["policies"][0]["by_kind"])
     names = (*METHODS, *SCRIPTED)
 
@@ -108,12 +108,16 @@ def deployment(documents: Sequence[Document]) -> str:
     clean = table(["", *names], [["rescues", *rescues]])
     heads = ["inner - uniform", "td", "ppo"]
     return "\n\n".join(
-        [kinds_table(["kept", *names], kinds, cell), clean, kinds_table(heads, kinds, difference)]
+        [
+            kinds_table(["retention", *names], kinds, cell),
+            clean,
+            kinds_table(heads, kinds, difference),
+        ]
     )
 
 
 def recovery(documents: Sequence[Document]) -> str:
-    """What is kept soon after a fault in the middle of an episode, and later."""
+    """Retention soon after a fault in the middle of an episode, and later."""
     parts = ("early", "late", "late_minus_early")
     kinds = list(documents[0]["policies"][0]["after_onset"])
     cases = [(method, part) for method in (0, 1) for part in parts]
@@ -122,8 +126,8 @@ def recovery(documents: Sequence[Document]) -> str:
         method, part = cases[column]
         return of_runs([one["policies"][method]["after_onset"][kind][part] for one in documents])
 
-    words = {"early": "soon", "late": "later", "late_minus_early": "difference"}
-    head = ["kept", *(f"{METHODS[method]}, {words[part]}" for method, part in cases)]
+    words = {"early": "early", "late": "late", "late_minus_early": "difference"}
+    head = ["retention", *(f"{METHODS[method]}, {words[part]}" for method, part in cases)]
     return kinds_table(head, kinds, cell)
 
 
@@ -207,7 +211,7 @@ def training(documents: Sequence[Document]) -> str:
     """Trained with faults, the same with unavailable robots masked, and without faults."""
     kinds = list(documents[0]["policies"][0]["by_kind"])
     ordered = [*SEEN, *(kind for kind in kinds if kind not in (*SEEN, "all")), "all"]
-    head = ["kept", "trained with faults", "and masked", "without", "with - without", "mask"]
+    head = ["retention", "trained with faults", "and masked", "without", "with - without", "mask"]
 
     def cell(kind: str, column: int) -> str:
         each = [[by_kind(one, index, kind) for index in range(3)] for one in documents]
@@ -231,7 +235,7 @@ def training(documents: Sequence[Document]) -> str:
 
 
 def redundancy(documents: dict[str, Document]) -> str:
-    """What is kept when one robot of a kind is lost from the start, against the team's size."""
+    """Retention when one robot of a kind is lost from the start, against the team's size."""
     rows = []
     for preset, document in documents.items():
         for index, policy in enumerate(document["policies"]):

@@ -7,7 +7,7 @@ from matplotlib.image import imsave
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.envs.render import draw_world
-from innerattn.policies import View, scripted_policy
+from innerattn.policies import PolicyInput, WorldState, scripted_policy
 
 IMAGES = Path(__file__).parent / "images"
 SEED = 99
@@ -21,8 +21,8 @@ def main() -> None:
     with BatchEnv(scenario, 1, seed=SEED) as env:
         obs = env.reset()
         for _ in range(STEPS):
-            view = View.of(env, obs)
-            obs = env.step(policy.act(view)).obs
+            seen = PolicyInput(obs, WorldState.of(env))
+            obs = env.step(policy.act(seen)).obs
         picture = draw_world(
             scenario,
             env.positions()[0],
