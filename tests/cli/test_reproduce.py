@@ -253,11 +253,13 @@ def test_ctrl_c_keeps_what_is_finished(
 
 KILLED = """
 import sys
+from dataclasses import replace
 from functools import partial
 from innerattn.cli.main import main
-from innerattn.experiments.plan import plan
+from innerattn.report.targets import TARGETS
 if __name__ == "__main__":
-    reproduce.plan = partial(plan, overrides={overrides!r})
+    plan = partial(TARGETS["fig4"].plan, overrides={overrides!r})
+    TARGETS["fig4"] = replace(TARGETS["fig4"], plan=plan)
     main(["reproduce", "fig4", "--seeds", "1", "--out", sys.argv[1], "--methods",
           "td-inner,td-uniform", "--situations", "mixed"])
 """
