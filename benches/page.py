@@ -10,12 +10,10 @@ from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 
+from innerattn.errors import RunError
+from innerattn.report.marks import fill
+
 PERFORMANCE = Path(__file__).parents[1] / "docs" / "performance.md"
-LEARNING = PERFORMANCE.with_name("learning.md")
-ROBUSTNESS = PERFORMANCE.with_name("robustness.md")
-REPRODUCTION = PERFORMANCE.with_name("reproduction.md")
-CROSSED = PERFORMANCE.with_name("crossed.md")
-PAPER_PROTOCOL = PERFORMANCE.with_name("paper_protocol.md")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -50,28 +48,14 @@ def machine(*packages: str) -> str:
     return f"{processor}, {cores} cores, Python {python}, {versions}, {date.today()}"
 
 
-def require(section: str, page: Path = PERFORMANCE) -> tuple[str, str]:
-    """The text before and after what stands in a section of the page, with its marks.
+def publish(part: str, text: str) -> None:
+    """Print a text and put it into a part of the page on speed.
 
     Raises:
-        SystemExit: the page has no such section.
-    """
-    begin, end = f"<!-- {section}: begin -->\n", f"<!-- {section}: end -->"
-    before, found, rest = page.read_text().partition(begin)
-    _, found_end, after = rest.partition(end)
-    if not found or not found_end:
-        sys.exit(f"{page}: no marks {begin.strip()} and {end}")
-    return before + begin, end + after
-
-
-def publish(section: str, text: str, page: Path = PERFORMANCE) -> None:
-    """Print text and put it between the marks of its section of the page.
-
-    Raises:
-        SystemExit: the page has no such section.
+        SystemExit: the page has no such part.
     """
     print(text, flush=True)
-    before, after = require(section, page)
-    new = page.with_suffix(".new")
-    new.write_text(f"{before}\n{text}\n\n{after}")
-    new.replace(page)
+    try:
+        fill(PERFORMANCE, part, text)
+    except RunError as error:
+        sys.exit(str(error))

@@ -2,20 +2,18 @@
 
 import shutil
 import sys
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent / "support"))
 
+from in_turn import do_in_turn
 from made_run import made_run
 
 from innerattn.cli.main import main
-from innerattn.errors import InnerattnError
 from innerattn.experiments.crossed.arms import plan_crossed
 from innerattn.experiments.plan import plan
-from innerattn.experiments.processes import Job
 from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.experiments.side_by_side import Run
 
@@ -66,26 +64,6 @@ def small() -> dict[str, object]:
         "evaluate.long_episodes": 2,
         "evaluate.long_episode_steps": 5,
     }
-
-
-def do_in_turn(
-    jobs: Sequence[Job],
-    at_once: int,
-    *,
-    changed: Callable[[Sequence[Job]], None],
-    failed: Callable[[Job], None],
-    **_: object,
-) -> None:
-    """What `run_side_by_side` does, without processes, which take long to start."""
-    assert at_once >= 1
-    for job in jobs:
-        try:
-            job.result = job.do(lambda _: None)
-            job.state, job.share = "done", 1.0
-        except InnerattnError as error:
-            job.state, job.failure = "failed", str(error)
-            failed(job)
-        changed(jobs)
 
 
 @pytest.fixture

@@ -19,8 +19,8 @@ RECORDS = DOCS / "records"
 PAGES = ("reproduction", "paper_protocol", "crossed")
 NEEDS_STEPS = ("## Fig. 4: ", "## Fig. 5: ")
 
-sys.path.insert(0, str(ROOT / "benches"))
-from reproduction import PLACES, sections  # noqa: E402
+sys.path.insert(0, str(DOCS))
+from publish import PLACES, sections  # noqa: E402
 
 
 def page(name: str) -> str:
@@ -134,3 +134,13 @@ def test_the_answer_about_seeds_is_what_was_measured() -> None:
     for situation in ("single", "mixed"):
         correlation = rows[situation, "team"].split(" ")[0]
         assert f"{correlation} in {situation}" in answer
+
+
+def test_the_table_of_learning_is_made_of_the_same_runs(tmp_path: Path) -> None:
+    shutil.copyfile(RECORDS / "reproduction.parquet", tmp_path / FILE)
+    arguments = ["reproduce", "learning", "--budget", "short", "--report-only"]
+    assert main([*arguments, "--out", str(tmp_path)]) == 0
+    made = (tmp_path / "learning.md").read_text("utf-8")
+    shown = rows_of(part("learning", "learning_short"))
+    assert rows_of(made) == shown
+    assert len(shown) == 1 + 12 + 1 + 6

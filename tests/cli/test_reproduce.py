@@ -12,10 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from in_turn import do_in_turn
 
 from innerattn.cli.main import main
 from innerattn.errors import RunError
 from innerattn.experiments.lock import StudyLock
+from innerattn.experiments.robustness import design
 from innerattn.experiments.side_by_side import Run
 from innerattn.report.targets import TARGETS
 from innerattn.train.weights import read_weights
@@ -175,6 +177,102 @@ def test_the_crossed_design_has_runs_and_files_of_its_own(
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {
         f"mixed-td-uniform-{credit}-quick-s0" for credit in ("helpers", "team")
     }
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_variants_of_learning_have_runs_and_files_of_their_own(
+    study: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command("learning", study, "td-inner,td-uniform", "--seeds", "1") == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("learning, budget quick: 2 runs of 1 seed; 2 finished, 0 to train\n")
+    assert account(study)["outputs"] == ["learning.json", "learning.md"]  # no episode ended
+    assert command("learning-entities", study, "td-inner", "--seeds", "1") == 0
+    out, err = capsys.readouterr()
+    assert "1 run of 1 seed; 0 finished, 1 to train, 1 at a time\n" in out
+    assert err == ""
+    assert ["td-inner", "entities", "1", "of", "1"] in [
+        line.split()[:5] for line in out.split("\n")
+    ]
+    assert account(study)["outputs"] == ["learning_entities.json", "learning_entities.md"]
+    assert (study / "runs" / "mixed-td-inner-entities-quick-s0").is_dir()
+    assert "| td-inner entities, mixed |" in (study / "learning_entities.md").read_text()
+    assert "| td-inner, mixed |" in (study / "learning.md").read_text()
+
+
+@pytest.fixture
+def few_faults(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robustness is measured by one kind of fault in few worlds, in this process."""
+
+    def few(cases: list[design.Case]) -> list[design.Group]:
+        return [replace(one, kinds=("blackout",), episodes=3) for one in design.groups(cases)]
+
+    monkeypatch.setattr("innerattn.experiments.robustness.measurement.groups", few)
+    monkeypatch.setattr("innerattn.experiments.processes.run_side_by_side", do_in_turn)
+
+
+@pytest.mark.usefixtures("few_faults")
+def test_robustness_is_measured_once_and_then_read(
+    study: Path,
+    command: Command,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    robustness = partial(command, "robustness", study, "td-uniform", "--seeds", "1")
+    assert robustness("--report-only") == 1
+    out, err = capsys.readouterr()
+    assert "  faults of mixed-s0: not measured\n" in out
+    assert "- faults of mixed-s0: not measured\n" in (study / "robustness.md").read_text()
+    assert not (study / "faults").exists()
+
+    assert robustness() == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("robustness, budget quick: 1 run of 1 seed; 1 finished, 0 to train\n")
+    assert err == ""
+    files = ["robustness.json", "robustness.md"]
+    assert account(study)["outputs"] == files
+    (document,) = (study / "faults").iterdir()
+    texts = [(study / name).read_bytes() for name in files]
+    assert b"not measured" not in texts[1]
+    assert json.loads(texts[0])["deployments"][0]["kinds"] == ["blackout"]
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("it was measured again")
+
+    monkeypatch.setattr("innerattn.evaluate.robustness.measure_robustness", refuse)
+    before = times(document)
+    for options in ([], ["--report-only"]):
+        assert robustness(*options) == 0
+        assert [(study / name).read_bytes() for name in files] == texts
+        assert times(document) == before
+
+
+@pytest.mark.usefixtures("few_faults")
+def test_a_measurement_that_fails_is_named(
+    study: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.rmtree(study / "runs" / NAMES[1] / "checkpoints")
+    assert command("robustness", study, "td-uniform", "--seeds", "1") == 1
+    out, err = capsys.readouterr()
+    reason = f"{study / 'runs' / NAMES[1]}: holds no checkpoint yet"
+    assert err == f"innerattn: error: faults of mixed-s0: {reason}\n"
+    assert f"  faults of mixed-s0: {reason}\n" in out
+
+
+def test_ctrl_c_while_faults_are_measured_keeps_the_runs(
+    study: Path,
+    command: Command,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def press_ctrl_c(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("innerattn.experiments.processes.run_side_by_side", press_ctrl_c)
+    assert command("robustness", study, "td-uniform", "--seeds", "1") == 130
+    err = capsys.readouterr().err.splitlines()
+    assert err[0].startswith("innerattn: 1 of 1 runs are finished and kept")
+    assert states(study) == ["finished"]
 
 
 def test_a_run_that_is_not_measured_is_measured_and_not_trained(

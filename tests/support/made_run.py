@@ -46,7 +46,7 @@ def made_run(
     )
     path = make_run(folder / f"{situation}-{method}-s{seed}", config)
     rng = np.random.default_rng(chance)
-    _write_metrics(path / "metrics.jsonl", method, rng)
+    _write_metrics(path / "metrics.jsonl", method, rng, chance)
     worlds, long_worlds = config.scenario, config.scenario.replace(episode_steps=LONG_STEPS)
 
     def run(name: str, count: int, first: int = 0, fields: tuple[str, ...] = ()) -> Record:
@@ -75,14 +75,17 @@ def made_attention(rng: np.random.Generator, method: str, record: Record) -> np.
     return (weights / weights.sum(-1, keepdims=True)).astype(np.float32)
 
 
-def _write_metrics(path: Path, method: str, rng: np.random.Generator) -> None:
+def _write_metrics(path: Path, method: str, rng: np.random.Generator, chance: int) -> None:
+    """Entropy and rescues; no episode has ended at the first time."""
     names = ("food_0", "food_1", "navigation_0", "medical_0")
     even = float(np.log(3.0))
+    rescues = np.random.default_rng(chance + 1).random(LOGGED)
     with path.open("w") as file:
         for line in range(LOGGED):
             values = rng.uniform(0.2, 1.0, (ROBOTS, HEADS)) - 0.01 * line
             if method.endswith("uniform"):
                 values[:] = even
             entropy = dict(zip(names, values.tolist(), strict=True))
-            steps = {"env_steps": 100 * (line + 1), "attention_entropy": entropy}
-            file.write(json.dumps(steps) + "\n")
+            logged = {"env_steps": 100 * (line + 1), "attention_entropy": entropy}
+            logged["rescues_per_episode"] = line * float(rescues[line]) if line else None
+            file.write(json.dumps(logged) + "\n")

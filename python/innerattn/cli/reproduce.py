@@ -128,7 +128,8 @@ class Reproduce(Command):
         train, measure = len(to_train(found)), len(to_measure(found))
         count = train + measure
         left_out = len(found) - count - states["finished"]
-        line = f"{self.target}, budget {self.budget}: {len(found)} runs of {_seeds(self.seeds)}; "
+        line = f"{self.target}, budget {self.budget}: {_count(len(found), 'run')} of "
+        line += f"{_count(self.seeds, 'seed')}; "
         line += f"{states['finished']} finished, "
         if self.report_only:
             line += f"{count} not"
@@ -187,8 +188,8 @@ def _chosen(option: str, text: str, known: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in known if name in names)
 
 
-def _seeds(count: int) -> str:
-    return "1 seed" if count == 1 else f"{count} seeds"
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _reason(found: RunStatus) -> str:

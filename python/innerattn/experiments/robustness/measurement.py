@@ -57,6 +57,7 @@ class FaultMeasurement(Job):
             progress=progress,
         )
         text = json.dumps(measured.to_json(), indent=1, allow_nan=False)
+        self.path.parent.mkdir(exist_ok=True)
         write_whole(self.path, f"{text}\n".encode())
 
 
@@ -68,16 +69,12 @@ def missing_measurements(found: Sequence[RunStatus], out: Path) -> list[FaultMea
     Args:
         found: what is there of each planned run.
         out: folder of the study.
-
-    Raises:
-        OSError: the folder of documents cannot be made.
     """
     runs = {run.case: run for run in finished_runs(found)}
     jobs = []
     for group in groups([one.planned.case for one in found]):
         own = [runs[case] for case in group.cases if case in runs]
         if len(own) == len(group.cases) and not (path := _path(group, own, out)).exists():
-            path.parent.mkdir(exist_ok=True)
             folders = tuple(run.folder for run in own)
             jobs.append(FaultMeasurement(group, folders, path))
     return jobs

@@ -135,13 +135,18 @@ def read_robustness(runs: Sequence[FinishedRun], out: Path) -> Robustness:
     Raises:
         RunError: a document is damaged.
     """
-    found = read_measurements(runs, out)
-    seen = {
-        fault.kind
-        for run in runs
-        if run.situation == WITH_FAULTS
-        for fault in run.config.scenario.faults
-    }
+    faulty = (run for run in runs if run.situation == WITH_FAULTS)
+    seen = {fault.kind for run in faulty for fault in run.config.scenario.faults}
+    return over_groups(read_measurements(runs, out), seen)
+
+
+def over_groups(found: Sequence[GroupResult], seen: Collection[str]) -> Robustness:
+    """What faults cost, over the groups of a study.
+
+    Args:
+        found: the results of its groups.
+        seen: kinds of faults that were met in training with faults.
+    """
     deployed, trained, sized = (
         [one for one in found if one.group.part == part]
         for part in ("deployment", "training", "teams")

@@ -30,21 +30,17 @@ def learning_page(found: Learning, budget: str, figure: str | None, left_out: Se
     parts = ["# What is learnt\n"]
     if left_out:
         parts += ["**Left out of all results:**\n", *(f"- {one}" for one in left_out), ""]
+    count = sum(len(one.seeds) for one in found.learnt)
     parts += [
-        f"{sum(len(one.seeds) for one in found.learnt)} runs, budget `{budget}`. Score 0 plays "
-        "like `random` and 1 like `hungarian`, in the same worlds.\n",
+        f"{count} runs, budget `{budget}`. A score of 0 plays like `random`, a score of 1 like "
+        "`hungarian`, in the same worlds. Bold are means over seeds, with half the 95 % interval "
+        "(Student's t); in brackets are the values of each seed. *Alike*: two one-sided tests at "
+        f"5 % put the difference, one per seed, within {found.margin:g}.\n",
         f"## {SCORES}\n",
-        "Means over seeds, bold, with half their 95 % interval (Student's t); in brackets the "
-        "values of each seed.\n",
         markdown(scores_table(found, budget)),
     ]
     if found.differences:
-        parts += [
-            f"## {ATTENTION}\n",
-            "One difference per seed. *Alike*: two one-sided tests at 5 % put the difference "
-            f"within {found.margin:g}.\n",
-            markdown(attention_table(found)),
-        ]
+        parts += [f"## {ATTENTION}\n", markdown(attention_table(found))]
     if figure is not None:
         parts += [
             f"## {CURVES}\n",

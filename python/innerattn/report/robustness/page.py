@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from innerattn.experiments.robustness.design import TEAM_BUDGET
 from innerattn.experiments.robustness.results import Deployment, Robustness
 from innerattn.report.robustness.tables import (
     attention_table,
@@ -28,6 +29,23 @@ TEAMS = "Redundancy"
 """Headings of the other sections."""
 
 
+TERMS = """\
+- *Retention* is rescues with a fault divided by rescues without it, in the same worlds, from the
+  onset of the fault on: a mean over robots, onsets and severities from 0 to 1.
+- *Early* and *late* are the first and the second half of the time after a fault that begins in the
+  middle of an episode. `oracle` knows of the fault, so its retention is the ceiling of a script.
+- *With a fault*, rescues are per episode with a fault from the start, a mean over kinds, severities
+  from 0 to 1 and robots.
+- *Effect* is that of the worst fault on the attention weight that the failing robot receives, and
+  *AUC* says how well this weight tells a faulty robot from a healthy one; means over robots. *By
+  robot* is the least and the largest effect on any robot of any run.
+- *Masked* teams keep unavailable robots out of the critic's attention; *mask* is what that adds.
+- *Lost* is one robot of the kind, from start to end; a mean over the robots of that kind.
+- ± is half the 95 % interval over seeds (Student's t); of a single seed, over its worlds.
+"""
+"""What the words of the tables mean, in Markdown."""
+
+
 def robustness_page(found: Robustness, budget: str, left_out: Sequence[str]) -> str:
     """The page.
 
@@ -42,62 +60,33 @@ def robustness_page(found: Robustness, budget: str, left_out: Sequence[str]) -> 
     if found.deployments:
         parts.append(
             f"Budget `{budget}`, training seeds {format_seeds(found.seeds)}; each fault is tried "
-            f"in {found.episodes:,} worlds of each seed. Retention is rescues with a fault divided "
-            "by rescues without it. ± is half the 95 % interval over seeds (Student's t); of a "
-            "single seed, over its worlds.\n"
+            f"in {found.episodes:,} worlds of each seed. Teams by their size are single runs of "
+            f"budget `{TEAM_BUDGET}`.\n"
         )
+    parts.append(TERMS)
     for one in found.deployments:
         parts += _deployment(one)
     if found.training is not None:
-        parts += [
-            f"## {TRAINING}\n",
-            "Teams of td-inner in mixed. *Mask*: unavailable robots are kept out of the critic's "
-            "attention; its column is the second minus the first.\n",
-            markdown(training_table(found.training)),
-        ]
+        parts += [f"## {TRAINING}\n", markdown(training_table(found.training))]
     if found.teams:
-        parts += [
-            f"## {TEAMS}\n",
-            "Retention when one robot of a kind is unavailable from start to end, a mean over "
-            "the robots of that kind. One run of budget `quick` for each team.\n",
-            markdown(teams_table(found.teams)),
-        ]
+        parts += [f"## {TEAMS}\n", markdown(teams_table(found.teams))]
     return "\n".join(parts)
 
 
 def _deployment(found: Deployment) -> list[str]:
-    parts = [
-        f"## {RETENTION}: {found.situation}\n",
-        markdown(retention_table(found)),
-        "Rescues per episode; with a fault from the start, a mean over kinds, severities and "
-        "robots:\n",
-        markdown(rescues_table(found)),
-    ]
-    if found.differences:
-        parts += [
-            "Retention with inner minus that with uniform attention, one difference per seed:\n",
-            markdown(differences_table(found)),
-        ]
-    parts += [
-        f"## {RECOVERY}: {found.situation}\n",
-        "In the first and in the second half of the time after a fault that begins in the middle "
-        "of an episode. `oracle` knows of the fault: its retention is the ceiling of a script.\n",
-        markdown(recovery_table(found)),
-    ]
-    bounds = found.bounds
+    where, bounds = found.situation, found.bounds
+    tables = [markdown(retention_table(found)), markdown(rescues_table(found))]
+    tables += [markdown(differences_table(found))] if found.differences else []
+    parts = [f"## {RETENTION}: {where}\n", *tables]
+    parts += [f"## {RECOVERY}: {where}\n", markdown(recovery_table(found))]
     if bounds is not None:
         parts += [
-            f"## {BOUNDS}: {found.situation}\n",
+            f"## {BOUNDS}: {where}\n",
             f"{bounds.violations} violations in {bounds.checks:,} checks of {bounds.critics} "
-            f"critics with inner attention, of {bounds.runs} runs. Columns are means over runs of "
-            "medians, and largest values over runs.\n",
+            f"critics with inner attention, of {bounds.runs} runs. Numbers are means over critics "
+            "of medians, and largest values.\n",
             markdown(bounds_table(bounds)),
         ]
     if found.attention:
-        parts += [
-            f"## {ATTENTION}: {found.situation}\n",
-            "The effect of a fault on the weight that the failing robot receives, a mean over "
-            "robots; *by robot* is the least and the largest effect on any robot of any run.\n",
-            markdown(attention_table(found)),
-        ]
+        parts += [f"## {ATTENTION}: {where}\n", markdown(attention_table(found))]
     return parts

@@ -1,0 +1,166 @@
+"""Puts what `innerattn reproduce` made last in a study into the documentation.
+
+`python docs/publish.py STUDY` fills the marked parts of a page. Of the paper's figures and of the
+crossed design this is the whole report: figures go to `docs/images`, the tables that it links to a
+folder of the page in `docs/tables`, and its runs to an archive in `docs/records`. Of learning and
+robustness it is the tables. It makes no number and no figure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import shutil
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from innerattn.errors import InnerattnError, RunError
+from innerattn.experiments.archive import FILE, read_archive, write_archive
+from innerattn.experiments.plan import Case
+from innerattn.experiments.run import read_run
+from innerattn.report.learning.page import ATTENTION, SCORES
+from innerattn.report.marks import fill, marked
+from innerattn.report.robustness import page as robustness
+
+DOCS = Path(__file__).parent
+PLACES = {
+    ("all", "short"): (DOCS / "reproduction.md", "reproduction-"),
+    ("all", "paper"): (DOCS / "paper_protocol.md", "paper-protocol-"),
+    ("crossed", "short"): (DOCS / "crossed.md", ""),
+}
+"""Where a report goes by its target and budget, and how the names of its figures begin."""
+TABLES: dict[tuple[str, str], tuple[Path, Mapping[str, tuple[str, ...]]]] = {
+    (target, budget): (DOCS / "learning.md", {part: (SCORES, ATTENTION)})
+    for target, budget, part in (
+        ("learning", "quick", "learning_quick"),
+        ("learning", "short", "learning_short"),
+        ("learning-entities", "short", "learning_short_entities"),
+        ("learning-warm-start", "quick", "warm_start_quick"),
+    )
+} | {
+    ("robustness", "short"): (
+        DOCS / "robustness.md",
+        {
+            "deployment": (f"{robustness.RETENTION}: mixed",),
+            "recovery": (f"{robustness.RECOVERY}: mixed",),
+            "bounds": (f"{robustness.BOUNDS}: mixed",),
+            "attention": (f"{robustness.ATTENTION}: mixed",),
+            "training": (robustness.TRAINING,),
+            "redundancy": (robustness.TEAMS,),
+        },
+    )
+}
+"""By target and budget the page, and the headings of the report whose text makes each part."""
+
+
+def main() -> None:
+    """Publish the study that is named on the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("study", type=Path, help="folder of the study")
+    study = parser.parse_args().study
+    try:
+        account = json.loads((study / "runs.json").read_text())
+    except FileNotFoundError:
+        sys.exit(f"{study}: no study; `innerattn reproduce` makes one")
+    made = account["target"], account["budget"]
+    name = report_name(account["target"])
+    if made not in PLACES.keys() | TABLES.keys() or name not in account["outputs"]:
+        sys.exit(
+            f"{study}: last made {made[0]} of budget {made[1]!r}, for which no page has a place, "
+            f"or was interrupted; there are places for {_listed()}"
+        )
+    try:
+        if made in TABLES:
+            publish_tables(study / name, *TABLES[made])
+        else:
+            page, figures = PLACES[made]
+            _archive(account["runs"], study, DOCS / "records" / f"{page.stem}.parquet")
+            publish_report(study / name, page, figures)
+    except InnerattnError as error:
+        sys.exit(str(error))
+
+
+def report_name(target: str) -> str:
+    """The file of a target's report."""
+    return "report.md" if target == "all" else f"{target.replace('-', '_')}.md"
+
+
+def publish_tables(report: Path, page: Path, parts: Mapping[str, tuple[str, ...]]) -> None:
+    """Put sections of a report into parts of a page, and its figure where the page shows it.
+
+    Raises:
+        RunError: the page lacks a part, or the report the first section of one; nothing is
+            changed.
+    """
+    found = _by_heading(report.read_text())
+    for part, headings in parts.items():
+        marked(page, part)
+        if headings[0] not in found:
+            raise RunError(f"{report}: has no section {headings[0]!r}; runs are missing")
+    for part, headings in parts.items():
+        fill(page, part, "\n\n".join(found[one] for one in headings if one in found))
+        figure = DOCS / "images" / f"{part}.png"
+        if report.with_suffix(".png").exists() and f"(images/{figure.name})" in page.read_text():
+            shutil.copyfile(report.with_suffix(".png"), figure)
+
+
+def publish_report(report: Path, page: Path, figures: str) -> None:
+    """Put a report into its page, and copy what it links."""
+    summary, details = sections(report.read_text(), page, figures)
+    for name in re.findall(r"\]\(([^)/]+)\)", report.read_text()):
+        target = DOCS / links(f"({name})", page, figures).strip("()")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        suffixes = (".png", ".pdf") if target.suffix == ".png" else (target.suffix,)
+        for suffix in suffixes:
+            source = (report.parent / name).with_suffix(suffix)
+            shutil.copyfile(source, target.with_suffix(suffix))
+    fill(page, "summary", summary)
+    fill(page, "details", details)
+
+
+def sections(report: str, page: Path, figures: str) -> tuple[str, str]:
+    """What a page opens with and what stands below, without the report's own title."""
+    opening, details = links(report, page, figures).split("\n## ", 1)
+    return opening.split("\n", 1)[1].strip(), f"## {details.strip()}"
+
+
+def links(text: str, page: Path, figures: str) -> str:
+    """A text whose links go to where a page keeps figures and tables."""
+    text = re.sub(r"\(([\w-]+\.png)\)", rf"(images/{figures}\1)", text)
+    return re.sub(r"\(([\w-]+\.(?:md|csv))\)", rf"(tables/{page.stem}/\1)", text)
+
+
+def _by_heading(report: str) -> dict[str, str]:
+    """What stands below each heading of the second level."""
+    parts = (part.partition("\n") for part in re.split("^## ", report, flags=re.MULTILINE)[1:])
+    return {heading: text.strip() for heading, _, text in parts}
+
+
+def _listed() -> str:
+    return ", ".join(f"{target} of {budget}" for target, budget in (*PLACES, *TABLES))
+
+
+def _archive(runs: list[dict[str, Any]], study: Path, path: Path) -> None:
+    """Write the runs that a report is made of into one file."""
+    archive = study / FILE
+    archived = read_archive(archive) if os.path.lexists(archive) else []
+    by_name = {run.folder.name: run for run in archived}
+    finished = []
+    for run in runs:
+        if run["state"] != "finished":
+            continue
+        folder = study / run["folder"]
+        case = Case(run["situation"], run["method"], run["seed"], run["variant"])
+        if os.path.lexists(folder):
+            finished.append(read_run(case, folder, steps=False))
+        else:
+            finished.append(by_name[folder.name])
+    write_archive(finished, path)
+
+
+if __name__ == "__main__":
+    main()
