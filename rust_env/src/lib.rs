@@ -2,7 +2,7 @@
 //!
 //! Data flows one way: a [`scenario::Scenario`] becomes [`rules::Rules`], a [`batch::Batch`] holds
 //! [`world::World`]s that play by them, and each step writes flat arrays. Each file uses only those
-//! named above it here.
+//! named above it here, and a test says so. The threads of a batch are [`innerattn_pool::Pool`]'s.
 
 pub mod error;
 

@@ -118,8 +118,8 @@ impl World {
         }
     }
 
-    /// Does one control step. Robot 0's command is number `first` of `commands`; rescues are added to
-    /// `rescues` under the batch index `env`; `components` is R × C and `reward` R.
+    /// Does one control step of world number `env` of a batch, whose `commands` are E × R. Adds rescues
+    /// to `rescues`; `components` is R × C and `reward` R.
     #[allow(clippy::too_many_arguments)]
     pub fn step(
         &mut self,

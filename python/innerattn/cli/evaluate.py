@@ -1,4 +1,4 @@
-"""`innerattn evaluate`: measures a trained or scripted policy and shows or writes the figures."""
+"""`innerattn evaluate`: measures a trained or scripted policy; shows or writes the results."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Evaluate(Command):
     seed: int | None = None
     """Seed of the worlds; None: as the run says, or 12345."""
     json: Path | None = None
-    """Write the figures to this file too; - for standard output, and nothing else there."""
+    """Write the results to this file too; - for standard output, and nothing else there."""
 
     def run(self) -> int:
         """Measure, print, write.
@@ -55,7 +55,7 @@ class Evaluate(Command):
 
         Raises:
             InnerattnError: no such run or policy, or wrong options.
-            OSError: the figures cannot be written.
+            OSError: the results cannot be written.
         """
         if self.json is not None:
             check_target(self.json)

@@ -1,4 +1,4 @@
-"""`innerattn robustness`: what a trained team keeps when a robot fails, and its attention."""
+"""`innerattn robustness`: retention when a robot fails, bounds on attention, where it goes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MOST = 1_000_000  # episodes, and steps of one
 
 @dataclass(kw_only=True)
 class Robustness(Command):
-    """Measure what a trained team keeps when a robot fails, beside scripted policies."""
+    """Measure how many rescues remain when a robot fails, beside scripted policies."""
 
     runs: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="RUN [RUN ...]")]
     """Folders of runs; all meet the worlds of the first, without the faults of its training."""
@@ -39,9 +39,9 @@ class Robustness(Command):
     seed: int | None = None
     """Seed of the worlds; None: as the run says."""
     json: Path | None = None
-    """Write the figures to this file too; - for standard output, and nothing else there."""
+    """Write the results to this file too; - for standard output, and nothing else there."""
     plot: Path | None = None
-    """Draw the first run's figures as a heat map into this file (.pdf, .png or .svg)."""
+    """Draw the first run's retention as a heat map into this file (.pdf, .png or .svg)."""
 
     def run(self) -> int:
         """Measure, print, write.

@@ -59,7 +59,8 @@ class BatchEnv:
     let no thread read them while another steps. `copy=True` gives fresh arrays, as `reset` and
     `observe` always do.
     World i depends on scenario, seed, `first_env + i` and its actions alone, whatever the number of
-    threads or worlds.
+    threads or worlds. The scenario was checked when it was made; what it does not say (sizes, seed,
+    memory) is checked here.
 
     Args:
         scenario: a `Scenario` or the name of a preset.
@@ -195,7 +196,7 @@ class BatchEnv:
         """What is wrong with each robot now, (E, R) structured float32, a field for each kind.
 
         motor_gain and speed_limit are shares of the healthy value (1 = healthy), heading_bias an
-        angle [rad], position_noise [m] and velocity_noise [m/s] deviations on each axis,
+        angle [rad], position_noise [m] and velocity_noise [m/s] standard deviations on each axis,
         frozen_sensor, blackout, unavailable and lost_communication shares of the control steps
         that are struck (0 = healthy, 1 = all).
         """

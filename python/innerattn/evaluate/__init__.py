@@ -1,4 +1,4 @@
-"""Evaluation: runs policies, records episodes, and computes figures from the records alone.
+"""Evaluation: runs policies, records episodes, and computes results from the records alone.
 
 It trains nothing and prints nothing.
 """

@@ -1,6 +1,6 @@
 """A whole evaluation: which policies run in which worlds, and what is kept of it.
 
-What the figures mean is computed in `summary`, from the records alone.
+What the results are is computed in `summary`, from the records alone.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ProgressCall = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The figures of an evaluation and the records they come from."""
+    """The results of an evaluation and the records they come from."""
 
     summary: Summary
     records: tuple[Record, ...]

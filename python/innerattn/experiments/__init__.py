@@ -1,4 +1,4 @@
-"""Studies: many runs trained side by side, then seen together as the paper's tables and figures.
+"""Studies: many runs planned, trained side by side, and seen together as data.
 
 It prints nothing.
 """

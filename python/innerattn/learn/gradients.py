@@ -23,7 +23,7 @@ def average_over_robots(
     """Divide gradients of what robots share by the number of these robots, before clipping.
 
     A loss is a sum over robots, and so is the gradient of what they share. MAAC's code divides that
-    of the attention, which all robots share.
+    of the attention, which all robots share, and also those of each robot's state-action encoder.
 
     Args:
         gradients: By name; a critic's attention is called "attention".

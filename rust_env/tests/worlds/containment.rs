@@ -2,7 +2,6 @@
 //! another robot, and overlaps stay small beside a radius. Half a million env-steps for each engine;
 //! twenty times as many with `INNERATTN_SLOW=1`.
 
-use innerattn_env::batch::Options;
 use innerattn_env::geometry::{Solid, Vec2};
 use innerattn_env::rng::Stream;
 use innerattn_env::scenario::{Actions, Engine, Scenario};
@@ -107,7 +106,7 @@ fn play(name: &str, engines: &[Engine], scenario: &Scenario, steps: usize) {
     let steps = if slow { 20 * steps } else { steps };
     for (engine, play) in engines.iter().flat_map(|engine| PLAYS.map(|play| (*engine, play))) {
         let scenario = Scenario { engine, ..scenario.clone() };
-        let mut table = Table::new(scenario, Options { num_threads: Some(2), ..options(ENVS, 1) });
+        let mut table = Table::new(scenario, options(ENVS, 1));
         let mut chance = chance(2);
         let mut overlaps = Vec::with_capacity(steps);
         while overlaps.len() < steps {

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from innerattn.experiments.paper.workload import rescues_by_task
 from innerattn.experiments.run import FinishedRun
-from innerattn.measures.registry import MEASURES, measures_of
+from innerattn.measures.registry import MEASURES, measure_of
 from innerattn.policies import SCRIPTED
 from innerattn.stats import Estimate
 from innerattn.stats.seeds import seed_estimate
@@ -88,15 +88,14 @@ def _of_run(run: FinishedRun) -> tuple[dict[str, int], dict[str, float | None]]:
         RunError: a task is not one that two robots share.
     """
     rescues_by_task(run)
-    measured = _stored(run, run.method)
-    own = {name: _mean(value) for name, value in measures_of(*run.scored).items()}
-    known = {name: value for name, value in own.items() if value is not None}
-    score = run.summary["score"]
-    return _joined(
-        run,
-        run.recorded.num_episodes,
-        {**measured, **known, "score": None if score is None else float(score["mean"])},
-    )
+    score, rescues = run.summary["score"], float(run.summary["rescues_per_episode"]["mean"])
+    stored = {"rescues_per_episode": rescues, **_stored(run, run.method)}
+    values = {
+        name: stored[name] if name in stored else _mean(measure_of(name, *run.scored))
+        for name in MEASURES
+    }
+    values["score"] = None if score is None else float(score["mean"])
+    return _joined(run, run.recorded.num_episodes, values)
 
 
 def _of_script(name: str, run: FinishedRun) -> tuple[dict[str, int], dict[str, float | None]]:

@@ -127,8 +127,8 @@ def _course(group: Sequence[FinishedRun]) -> EntropyCourse | None:
     part = _part(len(times))
     overall = nats.mean((2, 3))
     begin, end = overall[:, :part].mean(1), overall[:, -part:].mean(1)
-    figures = [seed_estimate(values.tolist()) for values in (begin, end, end - begin)]
-    first, last, change = (figure for figure in figures if figure is not None)
+    estimates = [seed_estimate(values.tolist()) for values in (begin, end, end - begin)]
+    first, last, change = (one for one in estimates if one is not None)
     return EntropyCourse(
         situation=group[0].situation,
         method=group[0].method,

@@ -34,12 +34,12 @@ class Comparison:
     Attributes:
         pairs: learnt and uniform attention, seed by seed.
         together: the same over all situations.
-        merit: how imbalance goes with the score.
+        imbalance_score: how imbalance goes with the score.
     """
 
     pairs: tuple[Pair, ...]
     together: tuple[Together, ...]
-    merit: tuple[ImbalanceScoreCorrelation, ...]
+    imbalance_score: tuple[ImbalanceScoreCorrelation, ...]
 
 
 @dataclass(frozen=True)
@@ -111,8 +111,8 @@ def find(runs: Sequence[FinishedRun], parts: Collection[str] = PARTS) -> Finding
 def compare(table: Table2) -> Comparison:
     """What stands beside Table II."""
     beside = table.competence
-    merit = imbalance_score_correlations(beside)
-    return Comparison(tuple(pairs(beside)), tuple(together(beside)), tuple(merit))
+    correlations = imbalance_score_correlations(beside)
+    return Comparison(tuple(pairs(beside)), tuple(together(beside)), tuple(correlations))
 
 
 def _scene(groups: Sequence[Sequence[FinishedRun]]) -> HandoffScene | None:

@@ -227,6 +227,7 @@ def _pooled(runs: list[NDArray[np.int64]], seed: int) -> Estimate | None:
         times = drawn == index
         episodes = np.random.default_rng(int(rng.integers(2**32)))
         rows = episodes.integers(0, len(run), (int(times.sum()), len(run)))
-        sums[times] = np.stack([column[rows].sum(1) for column in run.T], 1)
+        both = (run[:, 0] + (run[:, 1] << 32))[rows].sum(1)  # two counts in one number
+        sums[times] = np.stack([both & 0xFFFFFFFF, both >> 32], 1)
     first, all_ = sums[..., 0].sum(1), sums.sum((1, 2))
     return percentile_interval(total[0] / total.sum(), first[all_ > 0] / all_[all_ > 0])

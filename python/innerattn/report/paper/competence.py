@@ -107,7 +107,7 @@ def together_table(found: Sequence[Together]) -> Table:
     )
 
 
-def merit_table(found: Sequence[ImbalanceScoreCorrelation]) -> Table:
+def imbalance_score_table(found: Sequence[ImbalanceScoreCorrelation]) -> Table:
     """Whether uneven runs score more."""
     heads = columns(["situation"], ["runs", "correlation", "p", "imbalance of hungarian"])
     rows = []

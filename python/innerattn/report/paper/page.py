@@ -9,7 +9,7 @@ from innerattn.experiments.paper.findings import Comparison, Findings
 from innerattn.experiments.paper.scene import SCENE_RULE
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION, Table2
 from innerattn.report.paper.claims import claims_summary, claims_table
-from innerattn.report.paper.competence import merit_table, pairs_summary
+from innerattn.report.paper.competence import imbalance_score_table, pairs_summary
 from innerattn.report.paper.fig4 import entropy_table, logged
 from innerattn.report.paper.fig5 import evidence_summary
 from innerattn.report.paper.table2 import sharing_summary
@@ -99,10 +99,10 @@ def _compared(found: Comparison) -> str:
             "Each seed gives one difference. *Alike*: two one-sided tests at 5 % put the "
             "difference within the margin. Means and p-values are in [table2.md](table2.md).\n"
         )
-    if found.merit:
+    if found.imbalance_score:
         text += (
             f"{chr(10) if text else ''}## Do uneven runs score more?\n\n"
-            f"{markdown(merit_table(found.merit))}\n"
+            f"{markdown(imbalance_score_table(found.imbalance_score))}\n"
             "Correlation of a run's imbalance and its score, each minus its method's mean: above 0 "
             "if uneven runs score more. p is of a permutation test that exchanges whole seeds, "
             "since runs of one seed are not independent, and of each situation by itself.\n"

@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 _INK_CHANGES_AT = 0.45  # dark ink on light cells and light ink on dark ones
 
 
-def draw_heatmap(name: str, kept: Retention, grid: Grid) -> Figure:
+def draw_heatmap(name: str, retention: Retention, grid: Grid) -> Figure:
     """Retention by kind (rows) and severity (columns), a panel for each robot and onset.
 
     Args:
         name: what the policy is called.
-        kept: its retention.
+        retention: what is drawn.
         grid: the faults.
     """
     from matplotlib.figure import Figure
@@ -33,7 +33,7 @@ def draw_heatmap(name: str, kept: Retention, grid: Grid) -> Figure:
     image: Any = None
     for o, onset in enumerate(ONSETS):
         for r, robot in enumerate(robots):
-            panel, values = panels[o, r], kept.cells.value[:, :, r, o]
+            panel, values = panels[o, r], retention.cells.value[:, :, r, o]
             image = panel.imshow(values, cmap="cividis", vmin=0.0, vmax=1.0, aspect="auto")
             for (k, s), value in np.ndenumerate(values):
                 ink = "white" if value < _INK_CHANGES_AT else "black"
@@ -54,7 +54,7 @@ def draw_heatmap(name: str, kept: Retention, grid: Grid) -> Figure:
     return figure
 
 
-def write_heatmap(path: Path, name: str, kept: Retention, grid: Grid) -> None:
+def write_heatmap(path: Path, name: str, retention: Retention, grid: Grid) -> None:
     """Draw a heat map into a file, whole or not at all.
 
     Raises:
@@ -62,4 +62,4 @@ def write_heatmap(path: Path, name: str, kept: Retention, grid: Grid) -> None:
         OSError: the file cannot be written.
     """
     check_format(path)
-    write_figure(path, draw_heatmap(name, kept, grid))
+    write_figure(path, draw_heatmap(name, retention, grid))
