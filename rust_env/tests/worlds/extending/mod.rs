@@ -10,6 +10,8 @@ fn the_pages_show_what_is_tested() {
         (include_str!("../../../../docs/extending/reward.md"), include_str!("reward.rs")),
     ];
     for (page, example) in pages {
-        assert!(page.replace("\r\n", "\n").contains(&format!("```rust\n{}```", example.replace("\r\n", "\n"))));
+        assert!(
+            page.replace("\r\n", "\n").contains(&format!("```rust\n{}```", example.replace("\r\n", "\n")))
+        );
     }
 }
