@@ -95,7 +95,7 @@ class PlainPPO:
         """Advantage and target (R, T * E) and so on; `drawn` (R, n) are actions at cuts."""
         numbers, robots = self.numbers, steps[0][0].obs.shape[1]
         steps = [
-            (Transitions(*(x.double() if x.is_floating_point() else x for x in b)), c)
+            (Transitions(*(x.double() if x.is_floating_point() else x for x in b[:5])), c)
             for b, c in steps
         ]
         if not self.returns:
@@ -246,7 +246,7 @@ def test_rollouts_and_updates_agree_with_the_plain_form(
     for round_ in range(2):
         steps = collect(learner, robots, round_)
         rollout = learner._rollout()
-        learner._steps = []
+        learner._buffer.clear()
         expected = plain.rollout(steps, drawn[-1])
         close(rollout.advantage, expected["advantage"])
         close(rollout.target, expected["target"])
@@ -269,7 +269,7 @@ def test_rollouts_and_updates_agree_with_the_plain_form(
 def test_learning_waits_for_a_full_rollout_and_then_uses_every_row() -> None:
     learner = make(2)
     steps = collect(learner, 2, 0)
-    learner._steps = []
+    learner._buffer.clear()
     for batch, truncated in steps[:-1]:
         learner.observe(batch, truncated)
         assert learner.learn() is None
