@@ -32,7 +32,7 @@ _METRICS = (
     "kl",
     "clip_share",
 )
-_CHUNK = 4096
+_CHUNK = 1024
 """Rows whose values are computed at a time."""
 
 
