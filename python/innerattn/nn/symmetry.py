@@ -84,7 +84,8 @@ class SquareSymmetry:
 
     def turn(self, obs: Tensor, element: Tensor) -> Tensor:
         """Observations (..., D) of worlds turned by elements (...)."""
-        signed = obs * self._signs[element].to(obs.dtype)
+        signs = self._signs.index_select(0, element.flatten()).view(obs.shape)
+        signed = obs * signs.to(obs.dtype)
         swapped = signed.index_select(-1, self._swapped)
         return torch.where((element >= 4).unsqueeze(-1), swapped, signed)
 
