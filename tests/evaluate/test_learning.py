@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from innerattn.config import EvaluateConfig, RunConfig, Scenario
+from innerattn.config import EvaluateConfig, RunConfig, Scenario, load_run_config
 from innerattn.evaluate.measure import evaluate_policy
 from innerattn.evaluate.trained import load_trained
 from innerattn.train import train
@@ -36,3 +36,13 @@ def test_two_robots_learn_to_rescue(method: str, tmp_path: Path) -> None:
     found = evaluate_policy(policy, scenario, settings, num_threads=1).summary.to_json()
     random = found["scripted"]["random"]["high"]
     assert found["rescues_per_episode"]["low"] > 1.0 > 5 * random
+
+
+def test_the_fast_budget_learns_within_seconds(tmp_path: Path) -> None:
+    given = {"train.env_steps": 150_000, "train.threads": 1, "train.compile": "off"}
+    config = load_run_config("single", "mappo", "fast", overrides=given)
+    _, policy = load_trained(train(config, tmp_path / "run"))
+    settings = EvaluateConfig(episodes=1, score_episodes=400, long_episodes=2)
+    found = evaluate_policy(policy, config.scenario, settings, num_threads=1).summary.to_json()
+    # A tenth of the worlds' steps that the budget has; the script rescues 2.7.
+    assert found["rescues_per_episode"]["low"] > 1.0
