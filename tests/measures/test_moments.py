@@ -12,7 +12,7 @@ from innerattn.envs import BatchEnv
 from innerattn.evaluate.play import run_episodes
 from innerattn.measures.moments import (
     FAULT_KINDS,
-    all_handoffs,
+    handoffs_of_all_robots,
     blocked,
     fault_spells,
     obstacle_places,
@@ -110,7 +110,7 @@ def test_fault_spells_have_the_scenarios_steps() -> None:
 
 def test_all_handoffs_are_those_of_each_robot() -> None:
     record = watched(episodes=60)
-    found = all_handoffs(record)
+    found = handoffs_of_all_robots(record)
     each = [
         row.tolist()
         for robot in record.robot_names

@@ -30,7 +30,7 @@ _LEAST_WAY_M = 5e-3
 _FREE_SHARE = 0.5
 
 
-def all_handoffs(record: Record) -> NDArray[np.void]:
+def handoffs_of_all_robots(record: Record) -> NDArray[np.void]:
     """The handoffs of every robot between any two tasks with two needs each.
 
     Returns:

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from innerattn import _core
 from innerattn.errors import RunError
-from innerattn.measures.moments import all_handoffs, blocked, fault_spells, obstacle_places
+from innerattn.measures.moments import (
+    handoffs_of_all_robots,
+    blocked,
+    fault_spells,
+    obstacle_places,
+)
 from innerattn.records.record import Record
 
 SCHEMA_VERSION = 1
@@ -158,7 +163,7 @@ def _run(record: Record, name: str, arrays: _Arrays) -> dict[str, Any]:
     steps = int(record.lengths.max())
     kept = {field: values[:, :steps] for field, values in record.steps.items()}
     fastest = max(float(np.abs(kept["velocities"]).max()), 1e-6)
-    handed, spells = all_handoffs(record), fault_spells(record)
+    handed, spells = handoffs_of_all_robots(record), fault_spells(record)
     found: dict[str, Any] = {
         "name": name,
         "policy": record.policy,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from innerattn.envs.render import paint_world
 from innerattn.errors import InnerattnError, RunError
-from innerattn.measures.moments import all_handoffs, obstacle_places
+from innerattn.measures.moments import handoffs_of_all_robots, obstacle_places
 from innerattn.records.record import Record
 from innerattn.report.replay.data import refuse_what_cannot_replay
 
@@ -88,7 +88,7 @@ def _chosen_episode(records: Sequence[Record], number: int | None) -> int:
             )
         return number - first
     record = _told_first(records)
-    handed = np.bincount(all_handoffs(record)["episode"] - first, minlength=count)
+    handed = np.bincount(handoffs_of_all_robots(record)["episode"] - first, minlength=count)
     return int(np.argmax(10 * handed + record.rescue_counts()))
 
 
@@ -102,7 +102,7 @@ def _drawn_robots(records: Sequence[Record], episode: int, robot: str | None) ->
     names = records[0].robot_names
     if robot is None:
         record = _told_first(records)
-        handed = all_handoffs(record)
+        handed = handoffs_of_all_robots(record)
         handed = handed[handed["episode"] == record.first_episode + episode]
         return (names[int(handed["robot"][0]) if len(handed) else 0],)
     if robot in names:
