@@ -12,9 +12,9 @@ from innerattn.envs import BatchEnv
 from innerattn.evaluate.play import run_episodes
 from innerattn.measures.moments import (
     FAULT_KINDS,
-    handoffs_of_all_robots,
     blocked,
     fault_spells,
+    handoffs_of_all_robots,
     obstacle_places,
 )
 from innerattn.measures.sharing.handoff import handoffs

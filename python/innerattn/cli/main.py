@@ -21,6 +21,7 @@ from innerattn.cli.evaluate import Evaluate
 from innerattn.cli.info import Info
 from innerattn.cli.options import UsageError
 from innerattn.cli.replay import Replay
+from innerattn.cli.report import Report
 from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
 from innerattn.cli.train import command_type
@@ -83,6 +84,7 @@ def _parse(argv: list[str]) -> Any:
         Annotated[train, tyro.conf.subcommand("train")]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
         | Annotated[Replay, tyro.conf.subcommand("replay")]
+        | Annotated[Report, tyro.conf.subcommand("report")]
         | Annotated[Robustness, tyro.conf.subcommand("robustness")]
         | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
         | Annotated[Info, tyro.conf.subcommand("info")]

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from innerattn import _core
 from innerattn.errors import RunError
 from innerattn.measures.moments import (
-    handoffs_of_all_robots,
     blocked,
     fault_spells,
+    handoffs_of_all_robots,
     obstacle_places,
 )
 from innerattn.records.record import Record

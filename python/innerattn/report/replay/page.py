@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import html
-import json
 from collections.abc import Sequence
+from html import escape
 from importlib.resources import files
 from typing import Any
 
 from innerattn.records.record import Record
+from innerattn.report.html import fill, json_text
 from innerattn.report.replay.data import replay_document
 
 _WEB = files("innerattn.report.replay") / "web"
@@ -35,23 +35,11 @@ def page_of(document: dict[str, Any], names: Sequence[str]) -> str:
     """The page of what `replay_document` gave."""
     return fill(
         _text("page.html"),
-        title=html.escape(" and ".join(names)),
+        title=escape(" and ".join(names)),
         style=_text("style.css"),
         script="\n".join(_text(name) for name in _SCRIPTS),
         data=json_text(document),
     )
-
-
-def fill(template: str, **values: str) -> str:
-    """The template with each ``@@name@@`` replaced; values are taken as they are."""
-    parts = template.split("@@")
-    return "".join(values[part] if index % 2 else part for index, part in enumerate(parts))
-
-
-def json_text(document: object) -> str:
-    """JSON that no text in it can end the script element around it."""
-    text = json.dumps(document, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c")
 
 
 def _text(name: str) -> str:
