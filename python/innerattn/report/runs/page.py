@@ -18,6 +18,7 @@ from innerattn.experiments.paper.fig5 import evidence
 from innerattn.experiments.paper.table2 import table2
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import FinishedRun, by_method, read_run, refuse_unlike
+from innerattn.records.run_folder import read_config
 from innerattn.report.html import fill, html_table, json_text
 from innerattn.report.paper.fig4 import entropy_table
 from innerattn.report.paper.fig5 import evidence_summary
@@ -52,19 +53,21 @@ class MissingLibraryError(InnerattnError):
 
 
 def read_runs(folders: Sequence[Path]) -> list[FinishedRun]:
-    """The finished runs in some folders, for a page.
+    """The finished runs in some folders that one page can tell of.
 
     Raises:
-        RunError: a folder holds no finished and measured run.
-        ConfigError: its configuration is not valid.
+        RunError: a folder holds no finished and measured run, or they cannot be compared.
+        ConfigError: a configuration is not valid.
+        MissingLibraryError: plotly is not installed.
     """
-    from innerattn.records.run_folder import read_config
-
     found = []
     for folder in folders:
         config = read_config(folder)
         case = Case(config.scenario.situation, config.train.method, config.train.seed)
         found.append(read_run(case, folder.resolve()))
+    by_method(found)
+    refuse_unlike(found)
+    _plotly()
     return found
 
 
