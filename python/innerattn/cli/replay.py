@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -14,8 +14,9 @@ from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
 from innerattn.policies import SCRIPTED
-from innerattn.records import FIELDS, Record, read_records
-from innerattn.records.run_folder import read_config
+
+if TYPE_CHECKING:
+    from innerattn.records import Record
 
 SCRIPTS = (*SCRIPTED, "oracle")
 SUFFIXES = (".html", ".gif", ".mp4")
@@ -98,6 +99,8 @@ class Replay(Command):
         ]
 
     def _played(self) -> list[Record]:
+        from innerattn.records.run_folder import read_config
+
         runs = [one for one in self.policies if one not in SCRIPTS]
         for one in runs:
             _refuse_nobody(one)
@@ -140,6 +143,8 @@ def recorded(name: str) -> Record:
     Raises:
         RunError: there are none, or they cannot be read.
     """
+    from innerattn.records import read_records
+
     _refuse_nobody(name)
     path = Path(name)
     if path.is_file():
@@ -169,6 +174,7 @@ def _refuse_nobody(name: str) -> None:
 def _play(name: str, scenario: Scenario, episodes: int, worlds: Record | int) -> Record:
     """Episodes of a script or a run, in the worlds of a record or of a seed."""
     from innerattn.evaluate import load_trained, run_episodes, scripted_policy
+    from innerattn.records import FIELDS
 
     seed, first = (worlds, 0) if isinstance(worlds, int) else (worlds.seed, worlds.first_episode)
     if name in SCRIPTS:
