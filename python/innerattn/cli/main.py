@@ -25,6 +25,7 @@ from innerattn.cli.report import Report
 from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
 from innerattn.cli.train import command_type
+from innerattn.cli.watch import Watch
 from innerattn.errors import needs_no_traceback, one_line
 
 _DESCRIPTION = "Train teams of unlike robots to rescue together, and measure how they do it."
@@ -85,6 +86,7 @@ def _parse(argv: list[str]) -> Any:
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
         | Annotated[Replay, tyro.conf.subcommand("replay")]
         | Annotated[Report, tyro.conf.subcommand("report")]
+        | Annotated[Watch, tyro.conf.subcommand("watch")]
         | Annotated[Robustness, tyro.conf.subcommand("robustness")]
         | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
         | Annotated[Info, tyro.conf.subcommand("info")]

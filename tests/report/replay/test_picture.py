@@ -10,8 +10,8 @@ from PIL import Image
 from watched import watched
 
 from innerattn.config import Scenario
-from innerattn.errors import RunError
-from innerattn.report.replay.picture import MissingLibraryError, moving_picture
+from innerattn.errors import MissingLibraryError, RunError
+from innerattn.report.replay.picture import moving_picture
 
 SHORT = Scenario.preset("mixed").replace(episode_steps=4)
 

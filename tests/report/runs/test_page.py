@@ -14,9 +14,9 @@ from browser import PHONE, WIDE, opened_browser, until, visit
 from playwright.sync_api import Browser
 
 from innerattn.cli.main import main
-from innerattn.errors import RunError
+from innerattn.errors import MissingLibraryError, RunError
 from innerattn.experiments.run import FinishedRun
-from innerattn.report.runs.page import MissingLibraryError, read_robustness, read_runs, runs_page
+from innerattn.report.runs.page import read_robustness, read_runs, runs_page
 from innerattn.stats import Estimate
 from innerattn.stats.text import format_estimate
 
@@ -166,7 +166,7 @@ def test_what_is_missing_is_named(
     with pytest.raises(RunError, match="not a document of innerattn robustness"):
         read_robustness(tmp_path / "nothing.json")
     monkeypatch.setitem(sys.modules, "plotly.offline", None)
-    with pytest.raises(MissingLibraryError, match="needs plotly: pip install plotly"):
+    with pytest.raises(MissingLibraryError, match="need plotly: pip install plotly"):
         runs_page(mixed[:1])
 
 

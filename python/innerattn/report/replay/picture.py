@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.envs.render import paint_world
-from innerattn.errors import InnerattnError, RunError
+from innerattn.errors import MissingLibraryError, RunError
 from innerattn.measures.moments import handoffs_of_all_robots, obstacle_places
 from innerattn.records.record import Record
 from innerattn.report.replay.data import refuse_what_cannot_replay
@@ -32,10 +32,6 @@ _LAST_MS = 1500
 _COLOURS = 64
 _WIDEST_PT = 14.0  # an arrow for a weight of 1
 _VIDEO_FPS = 1000 // _FRAME_MS
-
-
-class MissingLibraryError(InnerattnError):
-    """A library that is no dependency is needed and not installed; the message names it."""
 
 
 def moving_picture(

@@ -11,7 +11,7 @@ from typing import Any
 
 import tomli_w
 
-from innerattn.errors import InnerattnError, RunError
+from innerattn.errors import RunError
 from innerattn.experiments.learning.curves import learning_curves
 from innerattn.experiments.paper.fig4 import fig4
 from innerattn.experiments.paper.fig5 import evidence
@@ -23,6 +23,7 @@ from innerattn.report.html import fill, html_table, json_text
 from innerattn.report.paper.fig4 import entropy_table
 from innerattn.report.paper.fig5 import evidence_summary
 from innerattn.report.paper.table2 import sharing_summary
+from innerattn.report.plotly import plot_script, plotly_script
 from innerattn.report.replay.data import MOST_RECORDS, refuse_what_cannot_replay
 from innerattn.report.replay.page import replay_page
 from innerattn.report.runs.plots import (
@@ -48,10 +49,6 @@ _SHARING = (
 )
 
 
-class MissingLibraryError(InnerattnError):
-    """A library that is no dependency is needed and not installed; the message names it."""
-
-
 def read_runs(folders: Sequence[Path]) -> list[FinishedRun]:
     """The finished runs in some folders that one page can tell of.
 
@@ -67,7 +64,7 @@ def read_runs(folders: Sequence[Path]) -> list[FinishedRun]:
         found.append(read_run(case, folder.resolve()))
     by_method(found)
     refuse_unlike(found)
-    _plotly()
+    plotly_script()
     return found
 
 
@@ -107,19 +104,11 @@ def runs_page(runs: Sequence[FinishedRun], robustness: dict[str, Any] | None = N
         title=escape(title),
         subtitle=escape(f"{count}; {versions_text(runs)}"),
         style=_text("report.css"),
-        library=_plotly(),
-        script=_text("report.js"),
+        library=plotly_script(),
+        script=f"{plot_script()}\n{_text('report.js')}",
         parts="\n".join(parts),
         plots=json_text([plot.to_json() for plot in plots]),
     )
-
-
-def _plotly() -> str:
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError as error:
-        raise MissingLibraryError("a report needs plotly: pip install plotly") from error
-    return str(get_plotlyjs())
 
 
 def _section(title: str, *parts: str) -> str:
