@@ -106,14 +106,18 @@ def refuse_what_cannot_replay(records: Sequence[Record], names: Sequence[str]) -
 
 def _difference(one: Record, other: Record) -> str | None:
     """What the worlds of two records do not share; None: nothing."""
-    for what in ("seed", "first_episode", "num_episodes"):
-        values = getattr(one, what), getattr(other, what)
-        if values[0] != values[1]:
-            return f"{what.replace('_', ' ')} {values[1]}, not {values[0]}"
     if one.scenario != other.scenario:
         fields = type(one.scenario).model_fields
         keys = [k for k in fields if getattr(one.scenario, k) != getattr(other.scenario, k)]
         return f"another scenario: {', '.join(keys)}"
+    for what, word in (
+        ("seed", "seed"),
+        ("first_episode", "first episode"),
+        ("num_episodes", "number of episodes"),
+    ):
+        values = getattr(one, what), getattr(other, what)
+        if values[0] != values[1]:
+            return f"{word} {values[1]}, not {values[0]}"
     return None
 
 

@@ -48,14 +48,14 @@ class Charts {
   }
 
   attentionChart(head) {
-    const { run, episode, robot } = this;
+    const { run, episode, robot } = this, even = 1 / (run.size - 1);
     const lines = run.worlds.robots.filter((one) => one.index !== robot).map((one) => (
       this.lineOf(one.index, one.name, (step) => run.weight(episode, step, head, robot, one.index))
     ));
     const which = head < 0 ? `mean of ${counted(run.heads, "head")}` : `head ${head + 1}`;
     return this.chart(`Attention of ${this.name(robot)}`, `to each teammate, ${which}; dashed: even`, lines, {
-      low: 0, high: Math.max(0.5, ...lines.flatMap((line) => line.values)), text: percent,
-      level: 1 / Math.max(run.size - 1, 1), spans: this.handoffSpans(),
+      low: 0, high: Math.max(1.5 * even, ...lines.flatMap((line) => line.values)), text: percent,
+      level: even, spans: this.handoffSpans(),
     });
   }
 
