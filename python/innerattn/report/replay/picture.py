@@ -133,7 +133,12 @@ def _frames(
         if any("attention" in record.steps for record in records):
             whose = robots[0] if len(robots) == 1 else "all robots"
             where = (len(records) + 0.03) * share
-            figure.text(where, 0.38, f"arrows: attention\nof {_plain(whose)}", va="top")
+            figure.text(
+                where,
+                0.38,
+                f"wide arrows: attention\nof {_plain(whose)}\nblack arrows: velocity",
+                va="top",
+            )
         canvas.draw()  # type: ignore[no-untyped-call]
         pixels = canvas.buffer_rgba()  # type: ignore[no-untyped-call]
         frame = np.asarray(pixels, np.uint8)[..., :3]

@@ -68,7 +68,11 @@ def read_runs(folders: Sequence[Path]) -> list[FinishedRun]:
     return found
 
 
-def runs_page(runs: Sequence[FinishedRun], robustness: dict[str, Any] | None = None) -> str:
+def runs_page(
+    runs: Sequence[FinishedRun],
+    robustness: dict[str, Any] | None = None,
+    notes: Sequence[str] = (),
+) -> str:
     """A page that tells what was trained, how, what it scored and how it acts.
 
     Every number is stored in the runs or in ``robustness``, or is a mean over the runs.
@@ -76,6 +80,7 @@ def runs_page(runs: Sequence[FinishedRun], robustness: dict[str, Any] | None = N
     Args:
         runs: finished runs that can be compared, at least one, with their single steps.
         robustness: the document of ``innerattn robustness --json``.
+        notes: what is said above all else, such as which runs are missing.
 
     Returns:
         The page; it loads nothing from elsewhere.
@@ -89,6 +94,7 @@ def runs_page(runs: Sequence[FinishedRun], robustness: dict[str, Any] | None = N
     refuse_unlike(runs)
     plots: list[Plot] = []
     parts = [
+        *(f"<p>{escape(note)}</p>" for note in notes),
         _section("Result", html_table(scores_table(groups))),
         _training(runs, groups, plots),
         _attention(runs, groups, plots),
