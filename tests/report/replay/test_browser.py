@@ -161,6 +161,29 @@ def test_two_policies_side_by_side(browser: Browser, tmp_path: Path) -> None:
             assert text == f"{count} rescue{'s' * (count != 1)}"
 
 
+def test_episodes_that_end_at_different_steps(browser: Browser, tmp_path: Path) -> None:
+    scenario = Scenario.preset("mixed").replace(end_when_rescued=1)
+    records = watched(scenario), watched(scenario, script="random", heads=0)
+    path = written(tmp_path, *records, names=["a", "b"])
+    with visit(browser, path) as seen:
+        page = seen.page
+        ready(page)
+        page.get_by_role("combobox", name="Sorted").select_option("number")
+        for episode in range(3):
+            page.get_by_role("combobox", name="Episode").select_option(str(episode))
+            lengths = [int(record.lengths[episode]) for record in records]
+            page.get_by_role("slider", name="Step").fill(str(max(lengths) - 1))
+            assert page.locator("#clock").inner_text().startswith(f"step {lengths[0]} of ")
+            rescue = page.evaluate("replay.events.events.find((one) => one.type === 'rescue').step")
+            page.locator("#events button").last.click()
+            slider = page.locator("#scrubber").bounding_box()
+            mark = page.locator("#marks polygon").last.bounding_box()
+            assert slider is not None
+            assert mark is not None
+            share = (mark["x"] + mark["width"] / 2 - slider["x"] - 8) / (slider["width"] - 16)
+            assert share == pytest.approx(rescue / (max(lengths) - 1), abs=0.02)
+
+
 def test_sixteen_robots_are_drawn_in_time(browser: Browser, tmp_path: Path) -> None:
     path = written(tmp_path, watched(Scenario.preset("mixed-16"), episodes=2))
     with visit(browser, path) as seen:

@@ -35,11 +35,16 @@ def page_of(document: dict[str, Any], names: Sequence[str]) -> str:
     """The page of what `replay_document` gave."""
     return fill(
         _text("page.html"),
-        title=escape(" and ".join(names)),
+        title=escape(_listed(names)),
         style=_text("style.css"),
         script="\n".join(_text(name) for name in _SCRIPTS),
         data=json_text(document),
     )
+
+
+def _listed(names: Sequence[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def _text(name: str) -> str:

@@ -200,7 +200,7 @@ class App {
       button.setAttribute("aria-pressed", String(index === this.chosen));
     });
     this.scenes.forEach(({ pane }, index) => (pane.dataset.chosen = index === this.chosen));
-    this.events.show(run, this.episode);
+    this.events.show(run, this.episode, this.last + 1);
     this.showCharts();
   }
 
@@ -211,7 +211,7 @@ class App {
 
   fit() {
     this.scenes.forEach((scene) => scene.fit());
-    this.events.drawMarks(this.run.lengths[this.episode]);
+    this.events.drawMarks(this.last + 1);
     this.showCharts();
     this.draw();
   }

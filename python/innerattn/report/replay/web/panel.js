@@ -51,7 +51,8 @@ class EventList {
     Object.assign(this, { list, empty, marks, pick, events: [], rows: [] });
   }
 
-  show(run, episode) {
+  /** Shows the events of an episode; the scrubber has so many steps. */
+  show(run, episode, steps) {
     this.events = eventsOf(run, episode);
     this.empty.hidden = this.events.length > 0;
     this.rows = this.events.map((event) => {
@@ -62,7 +63,7 @@ class EventList {
       return button;
     });
     this.list.replaceChildren(...this.rows.map((row) => element("li", {}, row)));
-    this.drawMarks(run.lengths[episode]);
+    this.drawMarks(steps);
   }
 
   /** Marks above the scrubber, whose thumb leaves out half its width at both ends. */
