@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST := Cargo.toml Cargo.lock $(shell find rust_env -name '*.rs' -o -name Cargo.toml)
 CONSTRAINTS ?= constraints.txt
-TRAIN ?= --preset mixed --method td-inner --budget quick
+TRAIN ?= --preset mixed --method ppo-inner --budget fast
 export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 export PIP_CONSTRAINT := $(if $(CONSTRAINTS),$(CURDIR)/$(CONSTRAINTS))
 export PIP_QUIET := 1
@@ -14,7 +14,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 
 .PHONY: train test test-pool test-slow lint format bench lock docs setup clean
 
-train: setup ## train TD-innerATT on mixed rescue worlds, then evaluate it
+train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
 
 test: setup lint ## every check but the long one

@@ -143,6 +143,7 @@ def test_every_key_is_an_option(capsys: pytest.CaptureFixture[str]) -> None:
         main(["train", "--help"])
     text = capsys.readouterr().out.replace("_", "-")
     in_a_file = {f"scenario.{name}" for name in ("robots", "tasks", "obstacles", "faults")}
+    in_a_file.add("train.schedule")
     for section, table in load_run_config().model_dump().items():
         for key in table:
             offered = f"--{section}.{key.replace('_', '-')} " in text.replace(",", " ")

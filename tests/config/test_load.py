@@ -58,8 +58,9 @@ def test_paper_budget_is_the_papers(preset: str, key: str) -> None:
 
 def test_budgets_differ_in_length() -> None:
     steps = {budget: load_run_config(budget=budget).train.env_steps for budget in BUDGETS}
-    assert set(steps) == {"quick", "short", "paper"}
+    assert set(steps) == {"quick", "short", "paper", "fast", "strong"}
     assert steps["quick"] < steps["short"] < steps["paper"]
+    assert steps["fast"] < steps["strong"]
 
 
 @pytest.mark.parametrize("method", ["td-inner", "td-uniform", "mappo"])
@@ -79,8 +80,10 @@ def test_every_combination_loads_and_round_trips(
 def test_budgets_of_ppo_are_for_every_on_policy_method(budget: str) -> None:
     configs = [load_run_config(method=method, budget=budget) for method in ("ppo-inner", "mappo")]
     for config in configs:
-        assert config.train.num_envs == 256
-        assert config.ppo.gamma == (0.99 if budget == "paper" else 0.95)
+        strong = budget in ("fast", "strong")
+        assert config.train.num_envs == (1_024 if strong else 256)
+        assert config.ppo.gamma == (0.98 if strong else 0.99 if budget == "paper" else 0.95)
+        assert (config.network.symmetry == "canonical") == strong
         assert config.train.env_steps == configs[0].train.env_steps
 
 
@@ -100,7 +103,7 @@ def test_a_warm_start_has_numbers_of_its_own_for_ppo_alone(budget: str) -> None:
         }
 
     assert changed("td-inner") == {"train.warm_start"}
-    assert {"train.warm_start", "train.num_envs", "ppo.epochs"} <= changed("ppo-inner")
+    assert changed("ppo-inner") > {"train.warm_start"}
 
 
 def test_a_file_may_choose_a_warm_start(tmp_path: Path) -> None:
@@ -175,7 +178,7 @@ def test_wrong_values_are_named(overrides: dict[str, object], message: str) -> N
 def test_unknown_sources_are_named() -> None:
     with pytest.raises(ConfigError, match=r"'triple': known are double, mixed, .*single"):
         load_run_config("triple")
-    with pytest.raises(ConfigError, match=r"'long': known are paper, quick, short"):
+    with pytest.raises(ConfigError, match=r"'long': known are fast, paper, quick, short, strong"):
         load_run_config(budget="long")
     with pytest.raises(ConfigError, match=r"train\.method = 'ppo'"):
         load_run_config(method="ppo")

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from innerattn.config import NetworkConfig, PPOConfig
 from innerattn.learn import PPO, Team, Transitions, ppo
+from innerattn.learn.types import Scheduled
 
 CPU = torch.device("cpu")
 OBS_WIDTH, NUM_ACTIONS, ENVS, STEPS = 5, 3, 4, 3
@@ -95,7 +96,7 @@ class PlainPPO:
         """Advantage and target (R, T * E) and so on; `drawn` (R, n) are actions at cuts."""
         numbers, robots = self.numbers, steps[0][0].obs.shape[1]
         steps = [
-            (Transitions(*(x.double() if x.is_floating_point() else x for x in b)), c)
+            (Transitions(*(x.double() if x.is_floating_point() else x for x in b[:5])), c)
             for b, c in steps
         ]
         if not self.returns:
@@ -246,7 +247,7 @@ def test_rollouts_and_updates_agree_with_the_plain_form(
     for round_ in range(2):
         steps = collect(learner, robots, round_)
         rollout = learner._rollout()
-        learner._steps = []
+        learner._buffer.clear()
         expected = plain.rollout(steps, drawn[-1])
         close(rollout.advantage, expected["advantage"])
         close(rollout.target, expected["target"])
@@ -269,7 +270,7 @@ def test_rollouts_and_updates_agree_with_the_plain_form(
 def test_learning_waits_for_a_full_rollout_and_then_uses_every_row() -> None:
     learner = make(2)
     steps = collect(learner, 2, 0)
-    learner._steps = []
+    learner._buffer.clear()
     for batch, truncated in steps[:-1]:
         learner.observe(batch, truncated)
         assert learner.learn() is None
@@ -348,3 +349,41 @@ def test_a_loaded_learner_equals_the_saved_one() -> None:
     assert torch.equal(loaded.act(obs, greedy=True), saved.act(obs, greedy=True))
     with pytest.raises(ValueError, match=r"state has no tensor 'scale\.count'"):
         loaded.load({name: t for name, t in saved.state().items() if name != "scale.count"})
+
+
+@pytest.mark.parametrize("advantage", ["counterfactual", "value"])
+def test_probabilities_kept_from_acting_are_those_computed_anew(advantage: str) -> None:
+    acting, given = (make(2, numbers={"advantage": advantage}) for _ in range(2))
+    source = torch.Generator().manual_seed(0)
+    none = torch.zeros(ENVS, dtype=torch.bool)
+    obs = torch.randn(ENVS, 2, OBS_WIDTH, generator=source)
+    for _ in range(STEPS):
+        after = torch.randn(ENVS, 2, OBS_WIDTH, generator=source)
+        actions = acting.act(obs)
+        reward = torch.randn(ENVS, 2, generator=source)
+        acting.observe(Transitions(obs, actions, reward, after, none), none)
+        # A copy is not what the learner acted on, so that nothing is known of it.
+        given.observe(Transitions(obs.clone(), actions, reward, after, none), none)
+        obs = after
+    acting.seed_draws(1)
+    given.seed_draws(1)
+    kept, computed = acting._rollout(), given._rollout()
+    for got, expected in zip(kept, computed, strict=True):
+        close(got, expected)
+    assert acting._buffer.steps().log_probs is not None
+    assert given._buffer.steps().log_probs is None
+
+
+def test_a_schedule_sets_discount_and_entropy_weight() -> None:
+    learner, fixed = make(2), make(2, numbers={"gamma": 0.5, "entropy_weight": 0.3})
+    learner.follow(Scheduled(gamma=0.5, entropy_weight=0.3))
+    results = []
+    for one in (learner, fixed):
+        collect(one, 2, 0)
+        one.learn()
+        results.append(one.state())
+    assert all(torch.equal(results[0][name], results[1][name]) for name in results[0])
+    unchanged = make(2)
+    collect(unchanged, 2, 0)
+    unchanged.learn()
+    assert any(not torch.equal(unchanged.state()[name], results[0][name]) for name in results[0])

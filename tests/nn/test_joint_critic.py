@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from innerattn.nn import JointCritic
+from innerattn.nn import CentralCritic, JointCritic
 
 R, B, D, W = 3, 6, 4, 8
 
@@ -71,3 +71,20 @@ def test_worlds_are_apart() -> None:
     torch.testing.assert_close(
         critic(obs[:, order], some_actions()).q, critic(obs, some_actions()).q[:, :, order]
     )
+
+
+@pytest.mark.parametrize("outputs", [1, 5])
+@pytest.mark.parametrize("robots", [1, 2, 4])
+def test_one_network_for_all_against_a_plain_loop(robots: int, outputs: int) -> None:
+    critic = CentralCritic(robots, D, outputs, W, generator(0)).double()
+    obs = observations(robots)
+    found = critic(obs, some_actions(robots))
+    assert found.attended is None
+    assert found.q.shape == (robots, outputs, B)
+    parts = dict(critic.named_parameters())
+    for b in range(B):
+        x = torch.cat([obs[j, b] for j in range(robots)])
+        for layer in ("first", "second", "output"):
+            x = parts[f"{layer}.weight"][0] @ x + parts[f"{layer}.bias"][0]
+            x = x if layer == "output" else torch.where(x > 0, x, 0.01 * x)
+        torch.testing.assert_close(found.q[:, :, b].flatten(), x, rtol=1e-10, atol=1e-10)

@@ -65,7 +65,7 @@ def test_transitions_stay_when_the_worlds_go_on() -> None:
     env = BatchEnv("mixed", 3, seed=0, num_threads=1)
     collector = Collector(env, Scripted(env), torch.device("cpu"))
     first, _ = collector.step()
-    copy = [tensor.clone() for tensor in first]
+    copy = [tensor.clone() for tensor in first[:5]]
     for _ in range(5):
         collector.step()
-    assert all(torch.equal(a, b) for a, b in zip(first, copy, strict=True))
+    assert all(torch.equal(a, b) for a, b in zip(first[:5], copy, strict=True))

@@ -111,8 +111,8 @@ def test_broken_weights_are_never_saved(
     monkeypatch: pytest.MonkeyPatch,
     interrupted: bool,
 ) -> None:
-    def poisoned(config: RunConfig, env: BatchEnv) -> Learner:
-        learner = build_learner(config, env)
+    def poisoned(config: RunConfig, env: BatchEnv, *, training: bool) -> Learner:
+        learner = build_learner(config, env, training=training)
         state = learner.state()
         next(tensor for name, tensor in state.items() if name.startswith("actor.")).fill_(math.nan)
         learner.load(state)

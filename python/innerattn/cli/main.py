@@ -26,6 +26,7 @@ from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
 from innerattn.cli.train import command_type
 from innerattn.cli.watch import Watch
+from innerattn.cores import let_waiting_threads_sleep
 from innerattn.errors import needs_no_traceback, one_line
 
 _DESCRIPTION = "Train teams of unlike robots to rescue together, and measure how they do it."
@@ -47,6 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # better a "?" than no table at all
+    let_waiting_threads_sleep()
     try:
         with _stopped_like_by_hand():
             return int(_parse(argv).run())

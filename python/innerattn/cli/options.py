@@ -22,9 +22,15 @@ _SHORT = ("method", "warm_start", "seed", "device", "compile")
 """Keys of the section `train` that are options by their last word too."""
 
 _FILE_ONLY = frozenset(
-    {"scenario.robots", "scenario.tasks", "scenario.obstacles", "scenario.faults"}
+    {
+        "scenario.robots",
+        "scenario.tasks",
+        "scenario.obstacles",
+        "scenario.faults",
+        "train.schedule",
+    }
 )
-"""Keys that hold lists of tables, which only a TOML file can say well."""
+"""Keys that hold tables, which only a TOML file can say well."""
 
 OptionField = tuple[str, Any, Any]
 """Name, type and default, as `dataclasses.make_dataclass` takes them."""

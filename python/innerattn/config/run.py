@@ -129,6 +129,11 @@ class RunConfig(Model):
                     )
         refuse_late_faults(self.scenario, self.evaluate)
         gamma, world = self.algorithm.gamma, self.scenario
+        if world.shaping == "potential" and self.train.schedule.gamma is not None:
+            raise ValueError(
+                "train.schedule.gamma: potential shaping needs one discount throughout; "
+                "scenario.shaping_discount has one"
+            )
         if world.shaping == "potential" and world.shaping_discount != gamma:
             raise ValueError(
                 f"scenario.shaping_discount = {world.shaping_discount!r}: potential shaping leaves "

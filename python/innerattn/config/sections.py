@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from innerattn.config.model import ADDED_LATER, MOST_ROWS, MOST_STEPS, Model, OneOf
 from innerattn.config.registry import attentions, methods, register_attention
+from innerattn.config.schedule import ScheduleConfig
 
 register_attention("inner", "innerattn.nn:InnerAttention")
 register_attention("uniform", "innerattn.nn:UniformAttention")
@@ -48,6 +49,17 @@ class NetworkConfig(Model):
         "sum",
         description="gradient of layers that robots of a kind share: the sum of the robots' "
         "gradients, or their mean; that of the attention is always the mean",
+    )
+    joint_critic: Annotated[Literal["per_robot", "central"], ADDED_LATER] = Field(
+        "per_robot",
+        description="critic without attention: per_robot: a network for each robot; central: one "
+        "network with an output for each robot",
+    )
+    symmetry: Annotated[Literal["none", "canonical", "augmented"], ADDED_LATER] = Field(
+        "none",
+        description="none: observations as they are; canonical: each turned and mirrored so that "
+        "its first victim lies at x >= y >= 0, and actions turned back; augmented: worlds turned "
+        "at random in training",
     )
     precision: Literal["float32", "bfloat16"] = Field(
         "float32", description="of matrix products in an update; weights are always float32"
@@ -136,6 +148,21 @@ class TrainConfig(Model):
         ge=1,
         le=MOST_STEPS,
         description="steps of all worlds per line of metrics [env-steps]",
+    )
+    episode_steps: Annotated[int | None, ADDED_LATER] = Field(
+        None,
+        ge=1,
+        le=MOST_STEPS,
+        description="length of an episode in training [control steps]; None: the scenario's",
+    )
+    engine: Annotated[Literal["rapier", "discs"] | None, ADDED_LATER] = Field(
+        None, description="contacts in training; None: the scenario's"
+    )
+    stagger_starts: Annotated[bool, ADDED_LATER] = Field(
+        False, description="let worlds begin their episodes at different times"
+    )
+    schedule: Annotated[ScheduleConfig, ADDED_LATER] = Field(
+        default_factory=ScheduleConfig, description="what changes in the course of the run"
     )
 
 

@@ -104,6 +104,7 @@ class ActorCritic:
         self._robots_of_each_kind = None
         if network.shared_gradients == "mean" and team.kinds is not None:
             self._robots_of_each_kind = robots_of_each_kind(team.kinds).to(device, dtype)
+        self._acted: tuple[Tensor, Tensor] | None = None
         self._team = team
         self._updates = 0
 
@@ -129,6 +130,7 @@ class ActorCritic:
     def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
         """Choose actions (E, R) int64 for observations (E, R, D); see `Learner.act`."""
         logits = self.actor(self._robots_first(obs))
+        self._acted = (obs, logits)
         if greedy:
             actions: Tensor = logits.argmax(dim=1)
         else:
@@ -214,6 +216,16 @@ class ActorCritic:
             metrics = self._update_networks(self._networks, *tensors, _as_tensor(self._rate))
         self._updates += 1
         return metrics
+
+    def _log_probs_of(self, obs: Tensor) -> Tensor | None:
+        """(R, A, E) log-probabilities with which `act` drew actions for just these observations."""
+        if self._acted is None or self._acted[0] is not obs:
+            return None
+        return self._acted[1].log_softmax(dim=1)
+
+    def _number(self, value: float) -> Tensor:
+        """() of the networks' type. A compiled graph would be compiled anew for a plain number."""
+        return torch.tensor(value, dtype=self._dtype, device=self._device)
 
     def _draw(self, shape: tuple[int, ...]) -> Tensor:
         """Noise for `sample_actions`, of the shape of the logits."""

@@ -48,6 +48,7 @@ class ReturnScale:
     """Running standard deviation of discounted returns, by which rewards are divided.
 
     Attributes:
+        gamma: Discount of a control step.
         count: () float64, number of returns.
         mean: (R,) float64.
         squares: (R,) float64, sum of squared differences from the mean.
@@ -55,7 +56,7 @@ class ReturnScale:
 
     def __init__(self, num_robots: int, gamma: float, device: torch.device) -> None:
         """Start without returns; rewards of ``num_robots`` robots are discounted by ``gamma``."""
-        self._gamma = gamma
+        self.gamma = gamma
         self._open: Tensor | None = None
         self.count = torch.zeros((), dtype=torch.float64, device=device)
         self.mean = torch.zeros(num_robots, dtype=torch.float64, device=device)
@@ -66,7 +67,7 @@ class ReturnScale:
         returns = []
         before = self._open
         for step_reward, step_ended in zip(reward.double(), ended, strict=True):
-            before = step_reward if before is None else step_reward + self._gamma * before
+            before = step_reward if before is None else step_reward + self.gamma * before
             returns.append(before)
             before = before * ~step_ended
         self._open = before

@@ -63,7 +63,7 @@ def attention_logit_regularisation(attended: Attended | None, weight: float) -> 
 
 
 def expected_policy_loss(
-    log_prob: Tensor, q: Tensor, actions: Tensor, temperature: float
+    log_prob: Tensor, q: Tensor, actions: Tensor, temperature: Tensor | float
 ) -> Tensor:
     """sum_a pi(a) (tau log pi(a) - Q(a)): the exact expectation over the own action.
 
@@ -77,7 +77,9 @@ def expected_policy_loss(
     return (log_prob.exp() * (temperature * log_prob - q)).sum(dim=1).mean(dim=1).sum()
 
 
-def sampled_policy_loss(log_prob: Tensor, q: Tensor, actions: Tensor, temperature: float) -> Tensor:
+def sampled_policy_loss(
+    log_prob: Tensor, q: Tensor, actions: Tensor, temperature: Tensor | float
+) -> Tensor:
     """The loss log pi(a) [tau log pi(a) - (Q(a) - b)] for the drawn a, with a constant bracket.
 
     b = sum_a pi(a) Q(a) is the counterfactual baseline. Arguments as in `expected_policy_loss`.

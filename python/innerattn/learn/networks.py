@@ -13,6 +13,7 @@ from innerattn.config.registry import attentions
 from innerattn.learn.types import Team
 from innerattn.nn import (
     Actor,
+    CentralCritic,
     Critic,
     EntityColumns,
     JointCritic,
@@ -29,7 +30,7 @@ def draw_networks(
     network: NetworkConfig,
     generator: torch.Generator,
     critic_outputs: int | None = None,
-) -> tuple[Actor, Critic | JointCritic]:
+) -> tuple[Actor, nn.Module]:
     """Actors and critics with initial parameters, float32 on the CPU.
 
     A critic without attention takes whole observations and shares nothing between robots: its input
@@ -53,7 +54,8 @@ def draw_networks(
     if network.attention == "none":
         actor = Actor(robots, obs_width, num_actions, width, generator, entities)
         outputs = critic_outputs or num_actions
-        critic: Critic | JointCritic = JointCritic(robots, obs_width, outputs, width, generator)
+        joint = CentralCritic if network.joint_critic == "central" else JointCritic
+        critic: nn.Module = joint(robots, obs_width, outputs, width, generator)
     else:
         kind: type[TeammateAttention] = resolve_name(attentions()[network.attention])
         attention = kind(width, network.attention_heads, generator)

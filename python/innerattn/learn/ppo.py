@@ -18,8 +18,8 @@ from innerattn.learn.adam import Forward
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
 from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
 from innerattn.learn.networks import draw_networks
-from innerattn.learn.rollout import Rollout, Steps, rows_of, standardised, steps_of
-from innerattn.learn.types import Team, Transitions
+from innerattn.learn.rollout import Rollout, RolloutBuffer, rows_of, standardised, steps_of
+from innerattn.learn.types import Scheduled, Team, Transitions
 from innerattn.nn import sample_actions
 
 _METRICS = (
@@ -32,7 +32,7 @@ _METRICS = (
     "kl",
     "clip_share",
 )
-_CHUNK = 4096
+_CHUNK = 1024
 """Rows whose values are computed at a time."""
 
 
@@ -76,8 +76,9 @@ class PPO(ActorCritic):
         )
         self._config = ppo
         self._shuffle = torch.Generator().manual_seed(self._data_seed)
-        self._steps: list[tuple[Transitions, Tensor]] = []
+        self._buffer = RolloutBuffer(ppo.rollout_steps, team, device, dtype)
         self._steps_of_frozen = False
+        self._gamma, self._entropy_weight = ppo.gamma, ppo.entropy_weight
         self.scale = ReturnScale(team.num_robots, ppo.gamma, device)
 
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
@@ -87,8 +88,16 @@ class PPO(ActorCritic):
         because imitation may have changed the policy since, and the other way round.
         """
         if self.actor_frozen != self._steps_of_frozen:
-            self._steps, self._steps_of_frozen = [], self.actor_frozen
-        self._steps.append((batch, truncated))
+            self._buffer.clear()
+            self._steps_of_frozen = self.actor_frozen
+        self._buffer.add(batch, truncated, self._log_probs_of(batch.obs))
+
+    def follow(self, scheduled: Scheduled) -> None:
+        """Take over discount and entropy weight; see `ScheduledLearner.follow`."""
+        if scheduled.gamma is not None:
+            self._gamma = self.scale.gamma = scheduled.gamma
+        if scheduled.entropy_weight is not None:
+            self._entropy_weight = scheduled.entropy_weight
 
     def learn(self) -> dict[str, float] | None:
         """Train on a full rollout, of `rollout_steps` control steps, for `epochs` passes.
@@ -98,10 +107,10 @@ class PPO(ActorCritic):
             of `TD.learn`, and `kl`, the mean divergence from the policy that acted [nats], and
             `clip_share`, the share of actions whose ratio was clipped.
         """
-        if len(self._steps) < self._config.rollout_steps:
+        if not self._buffer.full:
             return None
         rollout = self._rollout()
-        self._steps = []
+        self._buffer.clear()
         rows = []
         stop = self._config.stop_at_kl
         for _ in range(self._config.epochs):
@@ -127,7 +136,7 @@ class PPO(ActorCritic):
         Returns:
             (8,) the metrics that `learn` names, in that order.
         """
-        return self._update(*rows)
+        return self._update(*rows, self._number(self._entropy_weight))
 
     def _update_networks(
         self,
@@ -138,10 +147,13 @@ class PPO(ActorCritic):
         value: Tensor,
         advantage: Tensor,
         target: Tensor,
+        entropy_weight: Tensor,
         rate: Tensor,
     ) -> Tensor:
         critic_metrics = self._update_critic(nets, obs, actions, value, target, rate)
-        actor_metrics = self._update_actor(nets, obs, actions, log_prob, advantage, rate)
+        actor_metrics = self._update_actor(
+            nets, obs, actions, log_prob, advantage, entropy_weight, rate
+        )
         return torch.stack([*critic_metrics, *actor_metrics])
 
     def _update_critic(
@@ -181,6 +193,7 @@ class PPO(ActorCritic):
         actions: Tensor,
         before: Tensor,
         advantage: Tensor,
+        entropy_weight: Tensor,
         rate: Tensor,
     ) -> tuple[Tensor, ...]:
         """One step of the policies: loss, entropy, mean gradient norm, KL, clipped share."""
@@ -191,7 +204,7 @@ class PPO(ActorCritic):
             taken = losses.gather_actions(log_prob, actions)
             entropy = losses.entropy(log_prob).mean(dim=1)
             surrogate = losses.clipped_policy_loss(taken, before, advantage, config.clip)
-            loss = surrogate - config.entropy_weight * entropy.sum()
+            loss = surrogate - entropy_weight * entropy.sum()
             return loss, (loss.detach(), entropy.detach().mean(), taken.detach() - before)
 
         gradients, (loss, entropy, change) = nets.actor.gradients(loss_of)
@@ -208,57 +221,65 @@ class PPO(ActorCritic):
     def _rollout(self) -> Rollout:
         """The collected steps with their advantages, targets and log-probabilities."""
         config = self._config
-        steps = Steps.stack(self._steps, self._device, self._dtype)
+        steps = self._buffer.steps()
         self.scale.update(steps.reward, steps.ended)
         scale = self.scale.std(config.return_deviation_floor).unsqueeze(1)
         reward = (steps.reward / scale).to(self._dtype)
 
-        obs, actions = rows_of(steps.obs), rows_of(steps.actions)
-        log_prob, fitted, baseline = self._evaluate(obs, actions)
+        log_prob, fitted, baseline = self._evaluate(steps.obs, steps.actions, steps.log_probs)
         value = steps_of(baseline, len(reward))
         # Within an episode, the value of the next state is that of the next step. After its last
         # step, and after the last of the rollout, it takes actions drawn for that state.
         next_value = torch.cat([value[1:], torch.zeros_like(value[:1])])
-        drawn = steps.ended.clone()
-        drawn[-1] = True
-        step, env = drawn.nonzero(as_tuple=True)
-        after = steps.next_obs[step, :, env].transpose(0, 1)  # (R, n, D)
-        logits = self.actor(after)
+        step, env = steps.cut.nonzero(as_tuple=True)
+        logits = self.actor(steps.after)
         next_actions = sample_actions(logits, self._draw(logits.shape))
-        next_value[step, :, env] = self._evaluate(after, next_actions)[2].t()
+        next_value[step, :, env] = self._evaluate(steps.after, next_actions)[2].t()
         advantage = generalised_advantage(
             reward,
             value,
             next_value,
             steps.terminated,
             steps.ended,
-            config.gamma,
+            self._gamma,
             config.gae_lambda,
         )
         return Rollout(
-            obs=obs,
-            actions=actions,
-            log_prob=losses.gather_actions(log_prob, actions),
+            obs=steps.obs,
+            actions=steps.actions,
+            log_prob=log_prob,
             value=fitted,
             advantage=standardised(rows_of(advantage)),
             target=rows_of(advantage + value),
         )
 
-    def _evaluate(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Log-probabilities (R, A, B), fitted values (R, B) and baselines (R, B) of rows."""
+    def _evaluate(
+        self, obs: Tensor, actions: Tensor, log_probs: Tensor | None = None
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Log-probabilities of the actions, fitted values and baselines of rows, (R, B) each.
+
+        Args:
+            obs: (R, B, D).
+            actions: (R, B) int64.
+            log_probs: (R, A, B) of all actions, if they are known.
+        """
         parts = []
-        for some_obs, some_actions in zip(
-            torch.split(obs, _CHUNK, dim=1), torch.split(actions, _CHUNK, dim=1), strict=True
-        ):
-            log_prob = self.actor(some_obs).log_softmax(dim=1)
+        for first in range(0, obs.shape[1], _CHUNK):
+            chunk = slice(first, first + _CHUNK)
+            some_obs, some_actions = obs[:, chunk], actions[:, chunk]
+            if log_probs is None:
+                log_prob = self.actor(some_obs).log_softmax(dim=1)
+            else:
+                log_prob = log_probs[:, :, chunk]
             q = self.critic(some_obs, some_actions, self._available(some_obs)).q
             if self._config.advantage == "counterfactual":
                 baseline = (log_prob.exp() * q).sum(dim=1)
             else:
                 baseline = q.squeeze(1)
-            parts.append((log_prob, self._fitted(q, some_actions), baseline))
-        log_probs, values, baselines = zip(*parts, strict=True)
-        return torch.cat(log_probs, dim=2), torch.cat(values, dim=1), torch.cat(baselines, dim=1)
+            taken = losses.gather_actions(log_prob, some_actions)
+            parts.append((taken, self._fitted(q, some_actions), baseline))
+        taken, values, baselines = (torch.cat(found, dim=1) for found in zip(*parts, strict=True))
+        return taken, values, baselines
 
     def _fitted(self, q: Tensor, actions: Tensor) -> Tensor:
         """(R, B) the values that are fitted to targets: of the actions taken, or of the state."""

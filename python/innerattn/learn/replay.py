@@ -1,6 +1,7 @@
 """A ring buffer of transitions, one contiguous row each, with statistics of their rewards.
 
-It stores and draws; it does not normalise.
+It stores and draws; it does not normalise. Where a run weighs the parts of its rewards, the parts
+are stored, and every draw weighs them as it is right now.
 """
 
 from __future__ import annotations
@@ -15,12 +16,17 @@ from innerattn.learn.types import Team, Transitions
 class Replay:
     """The last `capacity` transitions, drawn uniformly with replacement.
 
-    A row is obs, next_obs, actions, reward, terminated, all float32 (actions are small integers,
-    which float32 holds exactly), so that a batch is one gather of whole rows.
+    A row is obs, next_obs, actions, reward or its parts, terminated, all float32 (actions are small
+    integers, which float32 holds exactly), so that a batch is one gather of whole rows.
     """
 
     def __init__(
-        self, capacity: int, team: Team, seed: int, device: torch.device | None = None
+        self,
+        capacity: int,
+        team: Team,
+        seed: int,
+        device: torch.device | None = None,
+        reward_parts: int = 1,
     ) -> None:
         """Reserve the memory.
 
@@ -29,6 +35,7 @@ class Replay:
             team: Sizes of the team.
             seed: Seed of the draws.
             device: Where rows are held; None: the CPU.
+            reward_parts: P, parts of a reward; 1: rewards are stored whole.
 
         Raises:
             ValueError: The capacity is less than 1.
@@ -37,16 +44,23 @@ class Replay:
             raise ValueError(f"capacity = {capacity}: must be at least 1 transition")
         robots, width = team.num_robots, team.num_robots * team.obs_width
         self._team = team
-        self._splits = [width, width, robots, robots, 1]
+        self._parts = reward_parts
+        self._weights = torch.ones(reward_parts, device=device)
+        self._splits = [width, width, robots, robots * reward_parts, 1]
         # NumPy asks the system for huge pages, with which a draw of rows is twice as fast.
         rows = np.empty((capacity, sum(self._splits)), np.float32)
         self._rows = torch.from_numpy(rows).to(device or "cpu")
-        self._reward = slice(2 * width + robots, 2 * width + 2 * robots)
+        self._reward = slice(2 * width + robots, 2 * width + (1 + reward_parts) * robots)
         self._generator = torch.Generator(self._rows.device).manual_seed(seed)
         self._start = 0  # where the next row goes
         self._size = 0
-        self._sum = torch.zeros(robots, dtype=torch.float64, device=device)
-        self._sum_of_squares = torch.zeros_like(self._sum)
+        # Of rewards, or of each product of two parts: enough for the moments under any weights.
+        self._sum = torch.zeros(robots, reward_parts, dtype=torch.float64, device=device)
+        self._sum_of_products = self._sum.new_zeros(robots, reward_parts, reward_parts)
+
+    def weigh(self, weights: Tensor) -> None:
+        """Weigh the parts of all rewards by ``weights`` (P,) from now on."""
+        self._weights = weights.to(self._rows)
 
     def __len__(self) -> int:
         """Transitions held."""
@@ -58,21 +72,27 @@ class Replay:
         return self._rows.shape[0]
 
     @property
+    def parts(self) -> int:
+        """P, parts of a reward."""
+        return self._parts
+
+    @property
     def reward_mean(self) -> Tensor:
         """(R,) float64, mean reward of each robot over the transitions held; 0 when empty."""
-        return self._sum / max(self._size, 1)
+        return self._sum @ self._weights.double() / max(self._size, 1)
 
     @property
     def reward_std(self) -> Tensor:
         """(R,) float64, its population standard deviation; 0 when empty."""
-        mean_of_squares = self._sum_of_squares / max(self._size, 1)
+        weights = self._weights.double()
+        mean_of_squares = self._sum_of_products @ weights @ weights / max(self._size, 1)
         return (mean_of_squares - self.reward_mean.square()).clamp_min(0.0).sqrt()
 
     def add(self, batch: Transitions) -> None:
         """Take in transitions, oldest first; of more than `capacity` only the last are kept.
 
         Raises:
-            ValueError: The batch is of another team.
+            ValueError: The batch is of another team, or lacks the parts of its rewards.
         """
         expected = (self._team.num_robots, self._team.obs_width)
         if tuple(batch.obs.shape[1:]) != expected:
@@ -80,7 +100,10 @@ class Replay:
                 f"obs of shape {tuple(batch.obs.shape)}: must be (B, R, D) with R, D = {expected}"
             )
         terminated = batch.terminated.unsqueeze(1)
-        parts = (batch.obs, batch.next_obs, batch.actions, batch.reward, terminated)
+        reward = batch.reward if self._parts == 1 else batch.reward_parts
+        if reward is None or (self._parts > 1 and reward.shape[2] != self._parts):
+            raise ValueError(f"reward_parts: must be (B, R, P) with P = {self._parts}")
+        parts = (batch.obs, batch.next_obs, batch.actions, reward, terminated)
         rows = torch.cat([part.flatten(1).to(self._rows) for part in parts], dim=1)
         rows = rows[-self.capacity :]
         fits = min(len(rows), self.capacity - self._start)
@@ -106,6 +129,8 @@ class Replay:
             rows, self._splits, dim=1
         )
         shape = (batch_size, self._team.num_robots, self._team.obs_width)
+        if self._parts > 1:
+            reward = reward.view(batch_size, self._team.num_robots, self._parts) @ self._weights
         return Transitions(
             obs.view(shape),
             actions.to(torch.int64),
@@ -117,9 +142,15 @@ class Replay:
     def _write(self, start: int, rows: Tensor) -> None:
         """Put rows at `start`, where they fit, and keep the statistics true to what is held."""
         place = self._rows[start : start + len(rows)]
-        replaced = place[: max(0, self._size - start), self._reward].double()
-        added = rows[:, self._reward].double()
-        self._sum += added.sum(0) - replaced.sum(0)
-        self._sum_of_squares += added.square().sum(0) - replaced.square().sum(0)
+        replaced = self._moments(place[: max(0, self._size - start)])
+        added = self._moments(rows)
+        self._sum += added[0] - replaced[0]
+        self._sum_of_products += added[1] - replaced[1]
         place.copy_(rows)
         self._size = max(self._size, start + len(rows))
+
+    def _moments(self, rows: Tensor) -> tuple[Tensor, Tensor]:
+        """Sums (R, P) of the parts of rewards, and (R, P, P) of their products."""
+        shape = (len(rows), self._team.num_robots, self._parts)
+        parts = rows[:, self._reward].double().reshape(shape)
+        return parts.sum(0), (parts.unsqueeze(3) * parts.unsqueeze(2)).sum(0)

@@ -1,57 +1,119 @@
-"""Rollouts of on-policy learners: collected steps, and rows to train on."""
+"""Rollouts of on-policy learners: a buffer that is filled in place, and rows to train on."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from innerattn.learn.types import Transitions
+from innerattn.learn.types import Team, Transitions
 
 
 class Steps(NamedTuple):
-    """T control steps of E worlds.
+    """T control steps of E worlds; rows go through the worlds of a step, step after step.
 
     Attributes:
-        obs: (T, R, E, D).
-        actions: (T, R, E) int64.
+        obs: (R, T * E, D).
+        actions: (R, T * E) int64.
+        log_probs: (R, A, T * E) of all actions when these were drawn; None if they are not known.
         reward: (T, R, E).
-        next_obs: (T, R, E, D), of the same episode.
         terminated: (T, E) bool.
         ended: (T, E) bool, terminated or truncated by a time limit.
+        cut: (T, E) bool, steps whose successor is not in the rollout: ends, and the last step.
+        after: (R, n, D) observations after the n cut steps, of the same episode, in order.
     """
 
     obs: Tensor
     actions: Tensor
+    log_probs: Tensor | None
     reward: Tensor
-    next_obs: Tensor
     terminated: Tensor
     ended: Tensor
+    cut: Tensor
+    after: Tensor
 
-    @classmethod
-    def stack(
-        cls,
-        steps: Sequence[tuple[Transitions, Tensor]],
-        device: torch.device,
-        dtype: torch.dtype,
-    ) -> Steps:
-        """Stack what `Learner.observe` was given, oldest step first; observations get ``dtype``."""
-        batches, truncated = zip(*steps, strict=True)
-        terminated = torch.stack([batch.terminated.to(device) for batch in batches])
 
-        def robots_first(obs: list[Tensor]) -> Tensor:
-            return torch.stack([one.to(device, dtype).transpose(0, 1) for one in obs])
+class RolloutBuffer:
+    """T control steps, written where the updates read them. It is used again and again."""
 
-        return cls(
-            obs=robots_first([batch.obs for batch in batches]),
-            actions=torch.stack([batch.actions.to(device).t() for batch in batches]),
-            reward=torch.stack([batch.reward.to(device).t() for batch in batches]),
-            next_obs=robots_first([batch.next_obs for batch in batches]),
-            terminated=terminated,
-            ended=terminated | torch.stack([flags.to(device) for flags in truncated]),
+    def __init__(self, steps: int, team: Team, device: torch.device, dtype: torch.dtype) -> None:
+        """Reserve nothing yet: the first step says how many worlds there are.
+
+        Args:
+            steps: T.
+            team: Sizes of the team.
+            device: Where the buffer is held.
+            dtype: Type of observations and log-probabilities.
+        """
+        self._num_steps, self._team = steps, team
+        self._device, self._dtype = device, dtype
+        self._envs = 0
+        self._filled = 0
+        self._all_known = True
+        self._after: list[Tensor] = []
+
+    @property
+    def full(self) -> bool:
+        """Whether T steps are held."""
+        return self._filled == self._num_steps
+
+    def clear(self) -> None:
+        """Hold no step; the memory is kept."""
+        self._filled, self._all_known, self._after = 0, True, []
+
+    def add(self, batch: Transitions, truncated: Tensor, log_probs: Tensor | None) -> None:
+        """Take one control step.
+
+        Args:
+            batch: The E transitions.
+            truncated: (E,) bool.
+            log_probs: (R, A, E) of all actions, under the policy that acted; None if not known.
+        """
+        if len(batch.obs) != self._envs:
+            self._reserve(len(batch.obs))
+        step = self._filled
+        self._obs[:, step].copy_(batch.obs.transpose(0, 1))
+        self._actions[:, step].copy_(batch.actions.t())
+        self._reward[step].copy_(batch.reward.t())
+        self._terminated[step].copy_(batch.terminated)
+        ended = self._ended[step]
+        ended.copy_(batch.terminated | truncated)
+        if log_probs is None:
+            self._all_known = False
+        else:
+            self._log_probs[:, :, step].copy_(log_probs)
+        self._filled += 1
+        cut = batch.next_obs if self.full else batch.next_obs[ended.to(batch.next_obs.device)]
+        self._after.append(cut.to(self._device, self._dtype))
+
+    def steps(self) -> Steps:
+        """The steps of a full buffer; views, valid until the next `add`."""
+        cut = self._ended.clone()
+        cut[-1] = True
+        return Steps(
+            obs=self._obs.flatten(1, 2),
+            actions=self._actions.flatten(1, 2),
+            log_probs=self._log_probs.flatten(2) if self._all_known else None,
+            reward=self._reward,
+            terminated=self._terminated,
+            ended=self._ended,
+            cut=cut,
+            after=torch.cat(self._after).transpose(0, 1),
         )
+
+    def _reserve(self, envs: int) -> None:
+        """Make the memory for E worlds; what is held is dropped."""
+        robots, steps = self._team.num_robots, self._num_steps
+        self._envs = envs
+        like = torch.empty((), dtype=self._dtype, device=self._device)
+        self._obs = like.new_empty(robots, steps, envs, self._team.obs_width)
+        self._log_probs = like.new_empty(robots, self._team.num_actions, steps, envs)
+        self._actions = like.new_empty(robots, steps, envs, dtype=torch.int64)
+        self._reward = like.new_empty(steps, robots, envs, dtype=torch.float32)
+        self._terminated = like.new_empty(steps, envs, dtype=torch.bool)
+        self._ended = like.new_empty(steps, envs, dtype=torch.bool)
+        self.clear()
 
 
 class Rollout(NamedTuple):
@@ -75,7 +137,7 @@ class Rollout(NamedTuple):
 
     def take(self, rows: Tensor) -> Rollout:
         """Some rows, by their indices (n,) int64."""
-        return Rollout._make(tensor[:, rows] for tensor in self)
+        return Rollout._make(tensor.index_select(1, rows) for tensor in self)
 
 
 def rows_of(steps: Tensor) -> Tensor:

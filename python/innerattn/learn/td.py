@@ -18,7 +18,7 @@ from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward, Network
 from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
 from innerattn.learn.replay import Replay
-from innerattn.learn.types import Team, Transitions
+from innerattn.learn.types import Scheduled, Team, Transitions
 from innerattn.nn import sample_actions
 
 _TARGETS = {"consistent": losses.consistent_target, "maac": losses.maac_target}
@@ -88,9 +88,10 @@ class TD(ActorCritic):
         )
         self._config = td
         self._temperature = 1.0 / td.reward_scale
+        self._gamma = td.gamma
         self._target_form = _TARGETS[td.entropy_target]
         self._policy_loss = _POLICY_LOSSES[td.policy_gradient]
-        self.replay = Replay(td.replay_capacity, team, self._data_seed, device)
+        self.replay = self._new_replay(1)
         self.target_actor = copy.deepcopy(self.actor).requires_grad_(False)
         self.target_critic = copy.deepcopy(self.critic).requires_grad_(False)
         self._networks: TDNetworks = TDNetworks(
@@ -100,6 +101,18 @@ class TD(ActorCritic):
             Network(self.target_critic),
         )
         self._pending_env_steps = 0
+
+    def follow(self, scheduled: Scheduled) -> None:
+        """Take over discount, temperature and weights of rewards; see `ScheduledLearner.follow`."""
+        if scheduled.gamma is not None:
+            self._gamma = scheduled.gamma
+        if scheduled.entropy_weight is not None:
+            self._temperature = scheduled.entropy_weight
+        weights = scheduled.reward_weights
+        if weights is not None:
+            if self.replay.parts != len(weights):
+                self.replay = self._new_replay(len(weights))
+            self.replay.weigh(weights)
 
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
         """Store one control step of E worlds; see `Learner.observe`."""
@@ -155,10 +168,15 @@ class TD(ActorCritic):
             batch.actions.to(self._device).t(),
             reward.t().to(self._dtype),
             self._robots_first(batch.next_obs),
-            self._config.gamma * continues.to(self._dtype),
+            self._gamma * continues.to(self._dtype),
             self._draw(shape),
             self._draw(shape),
+            self._number(self._temperature),
         )
+
+    def _new_replay(self, reward_parts: int) -> Replay:
+        capacity = self._config.replay_capacity
+        return Replay(capacity, self._team, self._data_seed, self._device, reward_parts)
 
     def _update_networks(
         self,
@@ -170,11 +188,12 @@ class TD(ActorCritic):
         discount: Tensor,
         next_noise: Tensor,
         noise: Tensor,
+        temperature: Tensor,
         rate: Tensor,
     ) -> Tensor:
-        target = self._targets(nets, reward, next_obs, discount, next_noise)
+        target = self._targets(nets, reward, next_obs, discount, next_noise, temperature)
         critic_metrics = self._update_critic(nets, obs, actions, target, rate)
-        actor_metrics = self._update_actor(nets, obs, noise, rate)
+        actor_metrics = self._update_actor(nets, obs, noise, temperature, rate)
         for slow, fast in ((nets.target_actor, nets.actor), (nets.target_critic, nets.critic)):
             torch._foreach_lerp_(
                 list(slow.values.values()), list(fast.values.values()), self._config.polyak
@@ -182,13 +201,19 @@ class TD(ActorCritic):
         return torch.stack([*critic_metrics, *actor_metrics])
 
     def _targets(
-        self, nets: TDNetworks, reward: Tensor, next_obs: Tensor, discount: Tensor, noise: Tensor
+        self,
+        nets: TDNetworks,
+        reward: Tensor,
+        next_obs: Tensor,
+        discount: Tensor,
+        noise: Tensor,
+        temperature: Tensor,
     ) -> Tensor:
         """The targets (R, B) of a batch; the next actions are drawn from the target policy."""
         log_prob = nets.target_actor(next_obs).log_softmax(dim=1)
         actions = sample_actions(log_prob, noise)
         q = nets.target_critic(next_obs, actions, self._available(next_obs)).q
-        entropy_term = self._temperature * losses.gather_actions(log_prob, actions)
+        entropy_term = temperature * losses.gather_actions(log_prob, actions)
         next_value = losses.gather_actions(q, actions)
         return self._target_form(reward, next_value, entropy_term, discount)
 
@@ -214,7 +239,12 @@ class TD(ActorCritic):
         return loss, q_mean, norm
 
     def _update_actor(
-        self, nets: TDNetworks, obs: Tensor, noise: Tensor, rate: Tensor
+        self,
+        nets: TDNetworks,
+        obs: Tensor,
+        noise: Tensor,
+        temperature: Tensor,
+        rate: Tensor,
     ) -> tuple[Tensor, ...]:
         """One step of the policies by the new critic: loss, entropy, mean gradient norm."""
 
@@ -224,7 +254,7 @@ class TD(ActorCritic):
                 actions = sample_actions(log_prob, noise)
                 q = nets.critic(obs, actions, self._available(obs)).q
                 entropy = losses.entropy(log_prob).mean()
-            loss = self._policy_loss(log_prob, q, actions, self._temperature)
+            loss = self._policy_loss(log_prob, q, actions, temperature)
             return loss, (loss.detach(), entropy)
 
         gradients, (loss, entropy) = nets.actor.gradients(loss_of)

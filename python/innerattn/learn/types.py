@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import torch
 from torch import Tensor
@@ -33,6 +33,20 @@ class Team(NamedTuple):
     entities: EntityColumns | None = None
 
 
+class Scheduled(NamedTuple):
+    """What a run's schedule says at one moment; None where it says nothing.
+
+    Attributes:
+        gamma: Discount of a control step.
+        entropy_weight: Weight of the policy's entropy.
+        reward_weights: (P,) float32, weights of `Transitions.reward_parts`.
+    """
+
+    gamma: float | None = None
+    entropy_weight: float | None = None
+    reward_weights: Tensor | None = None
+
+
 class Transitions(NamedTuple):
     """B transitions of the whole team.
 
@@ -42,6 +56,8 @@ class Transitions(NamedTuple):
         reward: (B, R) float32.
         next_obs: (B, R, D) float32, the observation after the step, before any reset.
         terminated: (B,) bool; a time limit is not a termination.
+        reward_parts: (B, R, P) float32, whose weighted sum the reward is; None if the run weighs
+            no rewards. A learner that remembers rewards weighs them anew.
     """
 
     obs: Tensor
@@ -49,6 +65,7 @@ class Transitions(NamedTuple):
     reward: Tensor
     next_obs: Tensor
     terminated: Tensor
+    reward_parts: Tensor | None = None
 
 
 class Learner(Protocol):
@@ -142,6 +159,14 @@ class Learner(Protocol):
         Raises:
             ValueError: A name, shape or dtype is wrong; the learner is left unchanged.
         """
+
+
+@runtime_checkable
+class ScheduledLearner(Protocol):
+    """A learner that can follow a schedule of its run (`train.schedule`)."""
+
+    def follow(self, scheduled: Scheduled) -> None:
+        """Take over numbers, for what is observed and learnt from now on."""
 
 
 class LearnerClass(Protocol):

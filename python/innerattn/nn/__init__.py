@@ -13,13 +13,16 @@ from innerattn.nn.attention import (
 )
 from innerattn.nn.critic import Critic, CriticOutput
 from innerattn.nn.encoder import EntityColumns, EntityEncoder
-from innerattn.nn.joint_critic import JointCritic
+from innerattn.nn.joint_critic import CentralCritic, JointCritic
 from innerattn.nn.linear import PerRobotLinear
 from innerattn.nn.sharing import is_shared_by_kind, robots_of_each_kind, share_by_kind
+from innerattn.nn.symmetry import NUM_ELEMENTS, SquareSymmetry, VectorColumns
 
 __all__ = [
+    "NUM_ELEMENTS",
     "Actor",
     "Attended",
+    "CentralCritic",
     "Critic",
     "CriticOutput",
     "EntityColumns",
@@ -27,8 +30,10 @@ __all__ = [
     "InnerAttention",
     "JointCritic",
     "PerRobotLinear",
+    "SquareSymmetry",
     "TeammateAttention",
     "UniformAttention",
+    "VectorColumns",
     "action_noise",
     "is_shared_by_kind",
     "robots_of_each_kind",

@@ -1,7 +1,6 @@
-"""The centralised critic without attention: each robot's values from all observations.
+"""The centralised critics without attention: each robot's values from all observations.
 
-It computes values; targets and losses are in `innerattn.learn`. Source: Yu et al. 2022 ("MAPPO"),
-with separate parameters for every robot.
+They compute values; targets and losses are in `innerattn.learn`. Source: Yu et al. 2022 ("MAPPO").
 """
 
 from __future__ import annotations
@@ -55,3 +54,36 @@ class JointCritic(nn.Module):
         hidden = functional.leaky_relu_(self.first(joint))
         hidden = functional.leaky_relu_(self.second(hidden))
         return CriticOutput(self.output.batch_last(hidden), None)
+
+
+class CentralCritic(nn.Module):
+    """One network for the whole team, with two hidden layers and an output for each robot.
+
+    A state is one row, not one for each robot: the cheapest critic there is.
+    """
+
+    def __init__(
+        self,
+        num_robots: int,
+        obs_width: int,
+        outputs: int,
+        hidden_width: int,
+        generator: torch.Generator,
+    ) -> None:
+        """Draw the parameters; arguments as in `JointCritic`."""
+        super().__init__()
+        self.num_robots = num_robots
+        self.first = PerRobotLinear(1, num_robots * obs_width, hidden_width, generator)
+        self.second = PerRobotLinear(1, hidden_width, hidden_width, generator)
+        self.output = PerRobotLinear(1, hidden_width, num_robots * outputs, generator)
+
+    def forward(
+        self, obs: Tensor, actions: Tensor, available: Tensor | None = None
+    ) -> CriticOutput:
+        """Value the state; arguments as in `JointCritic.forward`."""
+        del actions, available
+        joint = obs.transpose(0, 1).flatten(1).unsqueeze(0)  # (1, B, R * D)
+        hidden = functional.leaky_relu_(self.first(joint))
+        hidden = functional.leaky_relu_(self.second(hidden))
+        values = self.output.batch_last(hidden)
+        return CriticOutput(values.view(self.num_robots, -1, values.shape[2]), None)

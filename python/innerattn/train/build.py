@@ -4,26 +4,34 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pkgutil import resolve_name
 
 import torch
 
-from innerattn.config import RunConfig
+from innerattn.config import RunConfig, Scenario
 from innerattn.config.registry import methods
 from innerattn.cores import usable_cores
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
+from innerattn.learn.framed import FramedLearner
 from innerattn.learn.types import Learner, LearnerClass, Team
-from innerattn.train.columns import entity_columns
+from innerattn.nn import SquareSymmetry, VectorColumns
+from innerattn.train.columns import entity_columns, vector_columns
 
 
-def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
+def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -> Learner:
     """A learner with initial weights for the team in ``env``, seeded by `train.seed`.
 
+    Args:
+        config: the run.
+        env: worlds of its scenario.
+        training: whether it will be trained; worlds are turned at random only then.
+
     Raises:
-        ConfigError: the device does not exist here, or the actions are continuous.
+        ConfigError: the device does not exist here, the actions are continuous, or the scenario
+            does not allow `network.symmetry`.
     """
     if env.num_actions == 0:
         raise ConfigError(
@@ -39,14 +47,31 @@ def build_learner(config: RunConfig, env: BatchEnv) -> Learner:
         availability_column=names.index("own.available"),
         entities=entity_columns(names) if config.network.encoder == "entities" else None,
     )
-    learner: LearnerClass = resolve_name(methods()[config.train.method].algorithm.learner)
-    return learner(
-        team,
-        config.network,
-        config.algorithm,
-        seed=config.train.seed,
-        device=_device(config.train.device),
-    )
+    make: LearnerClass = resolve_name(methods()[config.train.method].algorithm.learner)
+    device = _device(config.train.device)
+    learner = make(team, config.network, config.algorithm, seed=config.train.seed, device=device)
+    if config.network.symmetry == "none":
+        return learner
+    symmetry = SquareSymmetry(_turning_columns(config.scenario, names), device)
+    if config.network.symmetry == "canonical":
+        return FramedLearner(learner, symmetry, None)
+    return FramedLearner(learner, symmetry, config.train.seed) if training else learner
+
+
+def _turning_columns(scenario: Scenario, names: Sequence[str]) -> VectorColumns:
+    """The columns that turn with worlds of a scenario.
+
+    Raises:
+        ConfigError: Obstacles make a turned world another one, which no robot could see.
+    """
+    for index, obstacle in enumerate(scenario.obstacles):
+        sides = obstacle.half_extents_m
+        if obstacle.position_m is not None or (sides is not None and sides[0] != sides[1]):
+            raise ConfigError(
+                f"scenario.obstacles[{index}]: network.symmetry must be 'none' where an obstacle "
+                "has a fixed place or is an oblong box; a turned world would be another one"
+            )
+    return vector_columns(names)
 
 
 _ROWS_PER_THREAD = 512

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from innerattn.envs import BatchEnv
 from innerattn.learn.types import Learner, Transitions
+from innerattn.train.schedule import Schedule
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,28 @@ class Tally:
 class Collector:
     """One policy acting in one batch of worlds, step by step."""
 
-    def __init__(self, env: BatchEnv, learner: Learner, device: torch.device) -> None:
-        """Reset the worlds; tensors are made on ``device``."""
+    def __init__(
+        self,
+        env: BatchEnv,
+        learner: Learner,
+        device: torch.device,
+        schedule: Schedule | None = None,
+        stagger_starts: bool = False,
+    ) -> None:
+        """Reset the worlds.
+
+        Args:
+            env: the worlds.
+            learner: the policy.
+            device: where tensors are made.
+            schedule: weighs the rewards; None: they are the worlds' own.
+            stagger_starts: let worlds be at different steps of their episodes.
+        """
         self._env = env
         self._learner = learner
         self._device = device
-        self._obs = self._tensor(env.reset())
+        self._schedule = schedule
+        self._obs = self._tensor(_staggered(env) if stagger_starts else env.reset())
         self._open_rescues: NDArray[np.int64] = np.zeros(env.num_envs, np.int64)
         self._episodes = self._rescues = self._total = 0
 
@@ -49,12 +66,16 @@ class Collector:
         actions = self._learner.act(self._obs)
         step = self._env.step(actions.cpu().numpy())
         truncated = self._tensor(step.truncated)
+        reward, parts = self._tensor(step.reward), None
+        if self._schedule is not None:
+            reward, parts = self._schedule.weigh(step, reward)
         transitions = Transitions(
             obs=self._obs,
             actions=actions,
-            reward=self._tensor(step.reward),
+            reward=reward,
             next_obs=self._tensor(step.final_obs),
             terminated=self._tensor(step.terminated),
+            reward_parts=parts,
         )
         self._obs = self._tensor(step.obs)
         np.add.at(self._open_rescues, step.rescues["env"], 1)
@@ -78,3 +99,19 @@ class Collector:
     def _tensor(self, array: NDArray[Any]) -> Tensor:
         # A copy, since the worlds reuse their buffers.
         return torch.tensor(array, device=self._device)
+
+
+def _staggered(env: BatchEnv) -> NDArray[np.float32]:
+    """Begin episodes so that worlds are at different steps of them; observations (E, R, D).
+
+    Until then the robots stand still.
+    """
+    obs = env.reset()
+    length = env.scenario.episode_steps
+    shape = (env.num_envs, env.num_robots, *([2] if env.continuous else []))
+    still = np.zeros(shape, np.float32 if env.continuous else np.int64)
+    begins = np.arange(env.num_envs) % length
+    for step in range(1, length):
+        env.step(still)
+        obs = env.reset(mask=begins == step)
+    return obs

@@ -1,4 +1,4 @@
-"""Finds out from their names which entity the columns of an observation belong to."""
+"""Finds out from their names what the columns of an observation are: whose, and which turn."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import zip_longest
 
 from innerattn.errors import ConfigError
-from innerattn.nn import EntityColumns
+from innerattn.nn import EntityColumns, VectorColumns
 
 
 def entity_columns(names: Sequence[str]) -> EntityColumns:
@@ -44,6 +44,36 @@ def entity_columns(names: Sequence[str]) -> EntityColumns:
         victims=victims,
         victim=len(victim),
         present=victim.index("present"),
+    )
+
+
+def vector_columns(names: Sequence[str]) -> VectorColumns:
+    """Columns that turn with the world: pairs ``*.x`` and ``*.y``, and angles.
+
+    Victims choose the frame, in the order of their slots; then the robot's own place and velocity.
+
+    Args:
+        names: Of all columns.
+
+    Raises:
+        ConfigError: A column ``*.x`` has no ``*.y`` beside it, or there is no ``own.position``.
+    """
+    place = {name: column for column, name in enumerate(names)}
+    stems = [name.removesuffix(".x") for name in names if name.endswith(".x")]
+    missing = [stem for stem in stems if f"{stem}.y" not in place]
+    if missing or "own.position" not in stems:
+        raise ConfigError(
+            "network.symmetry = 'canonical' or 'augmented': an observation needs own.position, and "
+            f"a column .y for every column .x; {(missing or ['own.position'])[0]} lacks it"
+        )
+    pairs = {stem: (place[f"{stem}.x"], place[f"{stem}.y"]) for stem in stems}
+    anchors = [pairs[stem] for stem in stems if stem.startswith("victim_")]
+    anchors += [pairs[stem] for stem in ("own.position", "own.velocity") if stem in pairs]
+    return VectorColumns(
+        width=len(names),
+        vectors=tuple(pairs.values()),
+        handed=tuple(place[name] for name in names if name.endswith(".fault.heading_bias")),
+        anchors=tuple(anchors),
     )
 
 

@@ -13,7 +13,7 @@ from typing import Literal
 
 import torch
 
-from innerattn.config import RunConfig
+from innerattn.config import RunConfig, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.learn.types import Learner, Transitions
 from innerattn.records.run_folder import State
@@ -31,6 +31,7 @@ from innerattn.train.imitate import Imitation
 from innerattn.train.interruption import remembered_interruptions
 from innerattn.train.matmul_backend import best_matmul_backend
 from innerattn.train.metrics import Interval, Metrics, MetricsFile, refuse_divergence
+from innerattn.train.schedule import Schedule
 
 Stage = Literal["imitating", "training"]
 Step = Callable[[float], tuple[Transitions, Mapping[str, float] | None]]
@@ -87,23 +88,36 @@ def train(
         remembered_interruptions() as check,
     ):
         env = BatchEnv(
-            config.scenario,
+            training_worlds(config),
             config.train.num_envs,
             seed=config.train.seed,
             num_threads=config.train.threads,
         )
         with closing(env):
-            learner = build_learner(config, env)
-            collector = Collector(env, learner, torch.device(config.train.device))
+            learner = build_learner(config, env, training=True)
+            schedule = Schedule(config, env, learner)
+            collector = Collector(
+                env,
+                learner,
+                torch.device(config.train.device),
+                schedule,
+                config.train.stagger_starts,
+            )
             compiled = compiles(config)
             if compiled:
                 learner.compile()
             warm = config.train.warm_start != "none"
             imitation = Imitation(config, env, learner, collector) if warm else None
             folder = RunFolder.create(path, config, threads, compiled, matmul_backend)
-            loop = _Loop(config, folder, learner, collector, env.robot_names, progress, check)
+            loop = _Loop(config, folder, learner, collector, schedule, env, progress, check)
             loop.run(imitation)
     return path
+
+
+def training_worlds(config: RunConfig) -> Scenario:
+    """The scenario in which a run trains: its own, or with another engine or episode length."""
+    chosen = {"episode_steps": config.train.episode_steps, "engine": config.train.engine}
+    return config.scenario.replace(**{k: v for k, v in chosen.items() if v is not None})
 
 
 class _Loop:
@@ -115,7 +129,8 @@ class _Loop:
         folder: RunFolder,
         learner: Learner,
         collector: Collector,
-        robot_names: tuple[str, ...],
+        schedule: Schedule,
+        env: BatchEnv,
         progress: Callable[[Progress], None] | None,
         check_interrupted: Callable[[], None],
     ) -> None:
@@ -123,7 +138,8 @@ class _Loop:
         self._folder = folder
         self._learner = learner
         self._collector = collector
-        self._attention = AttentionLog(robot_names, config.scenario.episode_steps)
+        self._schedule = schedule
+        self._attention = AttentionLog(env.robot_names, env.scenario.episode_steps)
         self._progress = progress
         self._check_interrupted = check_interrupted
         self._file = MetricsFile(folder.path / "metrics.jsonl")
@@ -182,6 +198,7 @@ class _Loop:
 
     def _step(self, share: float) -> tuple[Transitions, dict[str, float] | None]:
         """Collect and learn, with ``share`` of the budget spent."""
+        self._schedule.set_progress(share)
         transitions, truncated = self._collector.step()
         self._learner.observe(transitions, truncated)
         self._learner.set_progress(share)

@@ -24,7 +24,7 @@ from innerattn.evaluate.bounds.response import (
     respond_to_embedding,
     respond_to_observation,
 )
-from innerattn.nn import Actor, Critic, InnerAttention, JointCritic
+from innerattn.nn import Actor, CentralCritic, Critic, InnerAttention, JointCritic
 
 Changed = Literal["embedding", "observation"]
 """What is changed: e_j, or the critic's copy of o_j, through which e_j and e_j^s change."""
@@ -57,7 +57,7 @@ class Measurements(NamedTuple):
 
 
 def disturb(
-    critic: Critic | JointCritic,
+    critic: Critic | JointCritic | CentralCritic,
     actor: Actor,
     states: States,
     changed: Changed,
@@ -92,7 +92,7 @@ def disturb(
 
 
 def _disturb(
-    critic: Critic | JointCritic,
+    critic: Critic | JointCritic | CentralCritic,
     actor: Actor,
     states: States,
     changed: Changed,

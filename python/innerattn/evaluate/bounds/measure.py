@@ -26,8 +26,9 @@ from innerattn.evaluate.bounds.results import Attention, Bounds, Level, level_of
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import TrainedPolicy
 from innerattn.learn.actor_critic import ActorCritic
+from innerattn.learn.framed import FramedLearner
 from innerattn.learn.types import Learner
-from innerattn.nn import Actor, Critic, InnerAttention, JointCritic
+from innerattn.nn import Actor, CentralCritic, Critic, InnerAttention, JointCritic
 from innerattn.train import load_policy
 from innerattn.train.build import thread_count, torch_threads
 
@@ -56,7 +57,7 @@ _CHANGES: dict[Attention, tuple[tuple[Changed, Direction], ...]] = {
 
 
 def measure_bounds(
-    critic: Critic | JointCritic,
+    critic: Critic | JointCritic | CentralCritic,
     actor: Actor,
     states: States,
     seed: int,
@@ -143,10 +144,11 @@ def bounds_of_run(
     config, learner = load_policy(run)
     if config.scenario.num_robots < 2:
         raise RunError(f"{run}: its team is one robot; attention needs a teammate")
+    inner = learner.learner if isinstance(learner, FramedLearner) else learner
     if (
         config.network.attention not in _CHANGES
-        or not isinstance(learner, ActorCritic)
-        or not isinstance(learner.critic, Critic | JointCritic)
+        or not isinstance(inner, ActorCritic)
+        or not isinstance(inner.critic, Critic | JointCritic | CentralCritic)
     ):
         raise RunError(
             f"{run}: train.method = {config.train.method!r}: bounds are known only for built-in "
@@ -155,7 +157,7 @@ def bounds_of_run(
     seed = config.evaluate.seed if seed is None else seed
     with torch_threads(thread_count(config)):
         played = played_states(config, learner, states, seed)
-        return measure_bounds(learner.critic, learner.actor, played, seed, progress)
+        return measure_bounds(inner.critic, inner.actor, played, seed, progress)
 
 
 def played_states(config: RunConfig, learner: Learner, count: int, seed: int) -> States:
@@ -171,9 +173,11 @@ def played_states(config: RunConfig, learner: Learner, count: int, seed: int) ->
     )
     step = np.random.default_rng(seed).integers(0, record.lengths)
     obs, actions = (
-        torch.tensor(record.steps[name][np.arange(count), step]).transpose(0, 1)
-        for name in ("obs", "actions")
+        torch.tensor(record.steps[name][np.arange(count), step]) for name in ("obs", "actions")
     )
+    if isinstance(learner, FramedLearner):
+        obs, actions = learner.as_seen(obs, actions)
+    obs, actions = obs.transpose(0, 1), actions.t()
     available = None
     if config.network.mask_unavailable:
         with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:

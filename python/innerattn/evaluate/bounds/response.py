@@ -10,7 +10,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from innerattn.nn import Actor, Critic, CriticOutput, JointCritic
+from innerattn.nn import Actor, CentralCritic, Critic, CriticOutput, JointCritic
 
 
 class States(NamedTuple):
@@ -61,7 +61,7 @@ class Response(NamedTuple):
 
 @torch.no_grad()
 def respond_to_observation(
-    critic: Critic | JointCritic, states: States, change: Tensor
+    critic: Critic | JointCritic | CentralCritic, states: States, change: Tensor
 ) -> Response:
     """What moves when the critic's copy of o_j is changed.
 
@@ -125,7 +125,10 @@ def _repeated(states: States, change: Tensor) -> tuple[Tensor, Tensor | None]:
 
 
 def _response(
-    critic: Critic | JointCritic, before: CriticOutput, after: CriticOutput, change: Tensor
+    critic: Critic | JointCritic | CentralCritic,
+    before: CriticOutput,
+    after: CriticOutput,
+    change: Tensor,
 ) -> Response:
     rows = change.shape[:3]
     q = before.q[:, :, None, None]

@@ -1,0 +1,123 @@
+"""A learner that sees every observation turned, and whose actions are turned back.
+
+It stands between the worlds and any learner, which never learns of it. With frames of observations
+the policy and all values are exactly equivariant. With random elements the learner trains on turned
+worlds instead, which only teaches it the symmetry.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from innerattn.learn.types import Learner, Transitions
+from innerattn.nn import NUM_ELEMENTS, SquareSymmetry
+
+
+class FramedLearner:
+    """A learner in frames that observations choose themselves, or that are drawn.
+
+    Attributes:
+        learner: The learner inside, whose observations and actions are turned.
+    """
+
+    def __init__(self, learner: Learner, symmetry: SquareSymmetry, drawn: int | None) -> None:
+        """Wrap a learner.
+
+        Args:
+            learner: The learner inside.
+            symmetry: The group for its observations.
+            drawn: Seed of the elements that are drawn in training, one for each world and control
+                step; None: every observation has its own frame.
+        """
+        self.learner = learner
+        self._symmetry = symmetry
+        self._generator = None if drawn is None else torch.Generator().manual_seed(drawn)
+        self._acted: tuple[Tensor, Tensor, Tensor] | None = None
+
+    @property
+    def actor_frozen(self) -> bool:
+        """Whether `learn` leaves the policy as it is; see `Learner`."""
+        return self.learner.actor_frozen
+
+    @actor_frozen.setter
+    def actor_frozen(self, frozen: bool) -> None:
+        self.learner.actor_frozen = frozen
+
+    @property
+    def updates(self) -> int:
+        """Number of updates done so far."""
+        return self.learner.updates
+
+    def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
+        """Choose actions (E, R) int64 for observations (E, R, D); see `Learner.act`."""
+        element, seen = self._look(obs)
+        self._acted = (obs, element, seen)
+        return self._symmetry.turn_actions_back(self.learner.act(seen, greedy), element)
+
+    def observe(self, batch: Transitions, truncated: Tensor) -> None:
+        """Store one control step of E worlds; see `Learner.observe`."""
+        if self._acted is not None and self._acted[0] is batch.obs:
+            _, element, seen = self._acted
+        else:
+            element, seen = self._look(batch.obs)
+        after = element if self._generator is not None else self._symmetry.frame(batch.next_obs)
+        turned = batch._replace(
+            obs=seen,
+            actions=self._symmetry.turn_actions(batch.actions, element),
+            next_obs=self._symmetry.turn(batch.next_obs, after),
+        )
+        self.learner.observe(turned, truncated)
+
+    def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
+        """Train the policy to take given actions; see `Learner.imitate`."""
+        element, seen = self._look(obs)
+        turned = self._symmetry.turn_actions(actions, element)
+        return self.learner.imitate(seen, turned, learning_rate)
+
+    def attention(self, obs: Tensor, actions: Tensor) -> Tensor | None:
+        """Attention weights (B, H, R, R) of the critic; see `Learner.attention`."""
+        return self.learner.attention(*self.as_seen(obs, actions))
+
+    def as_seen(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor]:
+        """Observations (B, R, D) and actions (B, R) as the learner inside has them when it plays.
+
+        Elements that are drawn in training are left out.
+        """
+        if self._generator is not None:
+            return obs, actions
+        element, seen = self._look(obs)
+        return seen, self._symmetry.turn_actions(actions, element)
+
+    def seed_draws(self, seed: int) -> None:
+        """Let the next actions be drawn from ``seed``; see `Learner.seed_draws`."""
+        self.learner.seed_draws(seed)
+
+    def set_progress(self, share: float) -> None:
+        """Set how far training is; see `Learner.set_progress`."""
+        self.learner.set_progress(share)
+
+    def learn(self) -> dict[str, float] | None:
+        """Do the updates that are due; see `Learner.learn`."""
+        return self.learner.learn()
+
+    def compile(self) -> None:
+        """Compile the updates; see `Learner.compile`."""
+        self.learner.compile()
+
+    def state(self) -> dict[str, Tensor]:
+        """Copies of everything learnt, by name; see `Learner.state`."""
+        return self.learner.state()
+
+    def load(self, state: dict[str, Tensor]) -> None:
+        """Restore what `state` returned; see `Learner.load`."""
+        self.learner.load(state)
+
+    def _look(self, obs: Tensor) -> tuple[Tensor, Tensor]:
+        """Elements (B, R) and the turned observations (B, R, D)."""
+        if self._generator is None:
+            element = self._symmetry.frame(obs)
+        else:
+            worlds = torch.randint(NUM_ELEMENTS, (len(obs), 1), generator=self._generator)
+            element = worlds.to(obs.device).expand(obs.shape[:2])
+        return element, self._symmetry.turn(obs, element)

@@ -1,0 +1,107 @@
+"""Teams in frames: a turned world gets the turned actions, to the bit."""
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from innerattn.config import Fault, Obstacle, RunConfig, Scenario
+from innerattn.envs import BatchEnv
+from innerattn.errors import ConfigError
+from innerattn.nn import NUM_ELEMENTS, SquareSymmetry
+from innerattn.train.build import build_learner
+from innerattn.train.columns import vector_columns
+
+METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo")
+FAULTS = (Fault(robot="food_0", kind="heading_bias", value=0.4),)
+
+
+def run(method: str, scenario: Scenario, symmetry: str = "canonical") -> RunConfig:
+    return RunConfig.model_validate(
+        {
+            "scenario": scenario,
+            "network": {"symmetry": symmetry, "hidden_width": 16, "parameter_sharing": "kind"},
+            "train": {"method": method, "threads": 1},
+        }
+    )
+
+
+def some_observations(scenario: Scenario) -> NDArray[np.float32]:
+    draws = np.random.default_rng(0)
+    with closing(BatchEnv(scenario, 200, seed=3, num_threads=1)) as env:
+        env.reset()
+        for _ in range(7):
+            step = env.step(draws.integers(0, 5, (200, env.num_robots)))
+    return step.obs.copy()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("situation", ["mixed", "double", "single"])
+def test_a_turned_world_gets_the_turned_actions(method: str, situation: str) -> None:
+    scenario = Scenario.preset(situation).replace(faults=FAULTS, observe_faults=True)
+    obs = torch.from_numpy(some_observations(scenario))
+    with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
+        learner = build_learner(run(method, scenario), env)
+        symmetry = SquareSymmetry(vector_columns(env.observation_names()), torch.device("cpu"))
+    actions = learner.act(obs, greedy=True)
+    assert len(actions.unique()) > 1
+    weights = learner.attention(obs, actions)
+    for number in range(NUM_ELEMENTS):
+        element = torch.full(obs.shape[:2], number)
+        there = symmetry.turn(obs, element)
+        assert torch.equal(learner.act(there, greedy=True), symmetry.turn_actions(actions, element))
+        if weights is not None:
+            turned = learner.attention(there, symmetry.turn_actions(actions, element))
+            assert turned is not None
+            assert torch.equal(turned, weights)
+
+
+def test_without_frames_it_does_not() -> None:
+    scenario = Scenario.preset("mixed")
+    obs = torch.from_numpy(some_observations(scenario))
+    with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
+        learner = build_learner(run("mappo", scenario, "none"), env)
+        symmetry = SquareSymmetry(vector_columns(env.observation_names()), torch.device("cpu"))
+    element = torch.full(obs.shape[:2], 1)
+    there = learner.act(symmetry.turn(obs, element), greedy=True)
+    assert not torch.equal(there, symmetry.turn_actions(learner.act(obs, greedy=True), element))
+
+
+def test_worlds_turn_at_random_in_training_alone() -> None:
+    scenario = Scenario.preset("mixed")
+    obs = torch.from_numpy(some_observations(scenario))
+    config = run("mappo", scenario, "augmented")
+    with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
+        plain = build_learner(run("mappo", scenario, "none"), env)
+        playing = build_learner(config, env)
+        training = build_learner(config, env, training=True)
+        again = build_learner(config, env, training=True)
+    greedy = plain.act(obs, greedy=True)
+    assert torch.equal(playing.act(obs, greedy=True), greedy)
+    first, second = (training.act(obs, greedy=True) for _ in range(2))
+    assert not torch.equal(first, second)
+    assert torch.equal(again.act(obs, greedy=True), first)
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        Obstacle(shape="disc", radius_m=0.1, position_m=(0.2, 0.0)),
+        Obstacle(shape="box", half_extents_m=(0.1, 0.2)),
+    ],
+)
+def test_obstacles_that_break_the_symmetry_are_refused(obstacle: Obstacle) -> None:
+    scenario = Scenario(obstacles=(obstacle,))
+    with (
+        closing(BatchEnv(scenario, 1, num_threads=1)) as env,
+        pytest.raises(ConfigError, match=r"scenario\.obstacles\[0\]: network\.symmetry"),
+    ):
+        build_learner(run("td-inner", scenario), env)
+
+
+def test_obstacles_at_random_places_are_not() -> None:
+    scenario = Scenario(obstacles=(Obstacle(shape="disc", radius_m=0.1),))
+    with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
+        build_learner(run("td-inner", scenario), env)
