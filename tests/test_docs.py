@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from innerattn.config import Scenario, load_run_config
+from innerattn.config.schedule import Ramp
 
 ROOT = Path(__file__).parents[1]
 
@@ -44,3 +45,28 @@ def test_the_configuration_in_the_scenario_reference_is_one(tmp_path: Path) -> N
     config = load_run_config(config_file=tmp_path / "mine.toml")
     assert (config.scenario.rescue_credit, config.td.gamma) == ("team", 0.9)
     assert [task.name for task in config.scenario.tasks] == ["injured"]
+
+
+def test_the_schedule_on_the_page_about_training_is_one(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "training.md").read_text("utf-8")
+    (example,) = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
+    (tmp_path / "mine.toml").write_text(example)
+    schedule = load_run_config(config_file=tmp_path / "mine.toml").train.schedule
+    assert schedule.gamma is not None
+    assert (schedule.gamma.first, schedule.gamma.end) == (0.95, 1.0)
+
+
+def test_the_page_about_training_says_what_the_budgets_do() -> None:
+    text = (ROOT / "docs" / "training.md").read_text("utf-8")
+    for budget in ("fast", "strong"):
+        config = load_run_config("mixed", "ppo-inner", budget)
+        assert (config.network.symmetry, config.network.parameter_sharing) == ("canonical", "kind")
+        assert (config.ppo.gamma, config.ppo.epochs, config.ppo.minibatch_size) == (0.98, 2, 512)
+        assert (config.train.num_envs, config.ppo.rollout_steps) == (1_024, 25)
+        assert (config.train.engine, config.train.episode_steps) == ("discs", 50)
+        schedule = config.train.schedule
+        assert schedule.dense_weight == Ramp(first=0.3, last=0.0, end=0.1)
+        assert schedule.team_credit == Ramp(first=1.0, last=1.0)
+        assert schedule.entropy_weight == Ramp(first=0.015, last=0.0003)
+        for key in ("network.symmetry", "train.engine", "train.episode_steps", "ppo.gamma"):
+            assert f"`{key}`" in text

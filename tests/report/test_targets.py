@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from innerattn.cli.main import main
 from innerattn.experiments.plan import METHODS, SITUATIONS
 from innerattn.report.targets import TARGETS
 
@@ -52,3 +53,15 @@ def test_reports_and_runs_of_a_target_have_names_of_their_own(name: str) -> None
     assert len({one.folder for one in planned}) == len(planned) > 0
     files = target.report().files
     assert len(set(files)) == len(files) > 0
+
+
+def test_a_target_shows_further_methods_where_they_are_chosen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["reproduce", "learning", "--budget", "fast", "--report-only", "--seeds", "1"]
+    assert main([*command, "--out", str(tmp_path / "all")]) == 1
+    assert "mappo" not in capsys.readouterr().out
+    assert main([*command, "--methods", "mappo", "--out", str(tmp_path / "one")]) == 1
+    shown = capsys.readouterr().out
+    assert "0 finished, 3 not" in shown
+    assert "mixed mappo seed 0: missing" in shown

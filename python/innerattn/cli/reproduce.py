@@ -141,7 +141,9 @@ class Reproduce(Command):
         return [self.page]
 
     def _planned(self, target: Target, out: Path) -> list[PlannedRun]:
-        methods = _chosen("methods", self.methods, target.methods)
+        methods = target.methods
+        if self.methods != "all":
+            methods = _chosen("methods", self.methods, (*target.methods, *target.further))
         situations = target.situations
         if self.situations != "all":
             situations = _chosen("situations", self.situations, SITUATIONS)

@@ -65,7 +65,8 @@ class Target:
         shows: what it is, for the command's help.
         plan: lists the runs that it needs.
         report: loads its report.
-        methods: what can be chosen of `METHODS`.
+        methods: those that it has unless some are chosen.
+        further: other methods that can be chosen, too.
         situations: those that it has unless others of `SITUATIONS` are chosen.
         study: begins the name of its study's folder, which ends in the budget.
         whole: whether it needs metrics and steps of runs, so that archived ones do not do.
@@ -79,6 +80,7 @@ class Target:
     plan: PlanRuns
     report: Callable[[], Report]
     methods: tuple[str, ...] = METHODS
+    further: tuple[str, ...] = ()
     situations: tuple[str, ...] = SITUATIONS
     study: str = ""
     whole: bool = False
@@ -204,6 +206,7 @@ TARGETS: dict[str, Target] = {
             shows="what each method learns",
             plan=plan,
             report=_learning("learning"),
+            further=("mappo",),
             situations=LEARNING_SITUATIONS,
         ),
         Target(
