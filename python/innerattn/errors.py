@@ -29,3 +29,7 @@ class ConfigError(InnerattnError, ValueError):
 
 class RunError(InnerattnError):
     """A run folder is missing, foreign, damaged, or already there."""
+
+
+class MissingLibraryError(InnerattnError):
+    """A library that is no dependency is not installed; the message says how to install it."""

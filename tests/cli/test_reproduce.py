@@ -101,6 +101,25 @@ def test_finished_runs_are_used_and_the_missing_ones_trained(
     assert {name: (study / name).read_text() for name in made} == texts
 
 
+def test_a_page_about_the_finished_runs(
+    study: Path, command: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "study.html"
+    options = ["--seeds", "1", "--report-only", "--page", str(page)]
+    assert command("table2", study, "td-inner,td-uniform", *options) == 0
+    assert capsys.readouterr().out.count(f"Written: {page}\n") == 1
+    text = page.read_text("utf-8")
+    assert "a smoke run, no result" in text
+    assert all(f"{name} (seed 0)" in text for name in NAMES)
+    for wrong, message in (
+        (["crossed", study, "td-inner"], "--page: runs of crossed differ by more than a page"),
+        (["table2", study, "td-inner"], "--page x.pdf: must end in .html"),
+    ):
+        file = "x.pdf" if "x.pdf" in message else str(page)
+        assert command(*wrong, "--report-only", "--page", file) == 2
+        assert message in capsys.readouterr().err
+
+
 @pytest.mark.usefixtures("in_this_process")
 def test_another_configuration_is_named_and_neither_used_nor_changed(
     study: Path, command: Command, capsys: pytest.CaptureFixture[str]

@@ -54,9 +54,28 @@ def test_tables_a_file_and_a_picture(
     assert {path: path.stat().st_mtime_ns for path in run_dir.rglob("*")} == before
 
 
+def test_a_page_about_the_run(
+    run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page, document = tmp_path / "page.html", tmp_path / "found.json"
+    options = [str(run_dir), *FEW, "--report", str(page), "--json", str(document)]
+    assert main(["robustness", *options]) == 0
+    found = json.loads(document.read_text())["policies"][0]["by_kind"]["all"]
+    text = page.read_text("utf-8")
+    assert "Retention under faults" in text
+    if found is not None:
+        assert f"{found['mean']:.2f} [{found['low']:.2f}, {found['high']:.2f}]" in text
+    capsys.readouterr()
+    twice = tmp_path / "copy"
+    shutil.copytree(run_dir, twice)
+    assert main(["robustness", str(run_dir), str(twice), "--report", str(page)]) == 1
+    assert "must be one run of each seed" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
+        (["--report", "x.pdf"], 2, "--report x.pdf: must end in .html"),
         (["--faults", "rust"], 2, "--faults = 'rust': known are all, motor_gain"),
         (["--episodes", "1"], 2, "--episodes = 1: must be 2 to 1,000,000"),
         (["--episode-steps", "1"], 2, "--episode-steps = 1: must be 2 to 1,000,000"),

@@ -19,7 +19,7 @@ from innerattn.records.record import Record
 
 RECORDED, SCORED, LONG, LONG_STEPS, HEADS, ROBOTS = 40, 60, 2, 30, 2, 4
 LOGGED = 12
-FIELDS = ("positions", "velocities", "victims")
+FIELDS = ("actions", "rewards", "positions", "velocities", "victims", "faults")
 
 
 def made_run(

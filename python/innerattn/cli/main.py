@@ -20,9 +20,12 @@ import tyro
 from innerattn.cli.evaluate import Evaluate
 from innerattn.cli.info import Info
 from innerattn.cli.options import UsageError
+from innerattn.cli.replay import Replay
+from innerattn.cli.report import Report
 from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
 from innerattn.cli.train import command_type
+from innerattn.cli.watch import Watch
 from innerattn.cores import let_waiting_threads_sleep
 from innerattn.errors import needs_no_traceback, one_line
 
@@ -83,6 +86,9 @@ def _parse(argv: list[str]) -> Any:
     commands: Any = (
         Annotated[train, tyro.conf.subcommand("train")]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+        | Annotated[Replay, tyro.conf.subcommand("replay")]
+        | Annotated[Report, tyro.conf.subcommand("report")]
+        | Annotated[Watch, tyro.conf.subcommand("watch")]
         | Annotated[Robustness, tyro.conf.subcommand("robustness")]
         | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
         | Annotated[Info, tyro.conf.subcommand("info")]

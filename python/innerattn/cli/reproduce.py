@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 import tyro
 from rich.console import Console
 
-from innerattn.cli.options import Command, UsageError
+from innerattn.cli.options import Command, UsageError, check_target
 from innerattn.cli.progress import SeveralMeasurements, SeveralRuns
 from innerattn.config import BUDGETS
+from innerattn.config.files import write_whole
 from innerattn.experiments.plan import SITUATIONS, PlannedRun
 from innerattn.experiments.smoke import smoke_note
 from innerattn.report.tables.experiments import print_scores
@@ -23,6 +24,7 @@ from innerattn.report.targets import TARGETS, Target
 if TYPE_CHECKING:
     from innerattn.experiments.lock import StudyLock
     from innerattn.experiments.processes import Job
+    from innerattn.experiments.run import FinishedRun
     from innerattn.experiments.scan import RunStatus
 
     TargetName: TypeAlias = str
@@ -54,6 +56,8 @@ class Reproduce(Command):
     """Situations, separated by commas; all: what the target needs."""
     report_only: tyro.conf.FlagCreatePairsOff[bool] = False
     """Train and measure nothing: report on the runs that are finished, and name the others."""
+    page: Path | None = None
+    """Write a page about the finished runs too (.html), see innerattn report."""
 
     def run(self) -> int:
         """Plan, train, print, write.
@@ -77,19 +81,21 @@ class Reproduce(Command):
         from innerattn.experiments.score_means import method_scores
         from innerattn.report.plots.drawing import check_format
 
+        whole = target.whole or self.page is not None
+        self._check_page(planned)  # before hours of training, not after
         if target.draws:
-            check_format(out / "figure.png")  # before hours of training, not after
+            check_format(out / "figure.png")
         console = Console(markup=False, highlight=False)
         with StudyLock.take(out) as lock:
-            found = scan_runs(planned, out, whole=target.whole)
+            found = scan_runs(planned, out, whole=whole)
             self._print_plan(console, found, out)
             try:
                 if not self.report_only:
                     self._train(found, out, lock)
-                    found = scan_runs(planned, out, whole=target.whole)
+                    found = scan_runs(planned, out, whole=whole)
                 jobs = self._measure(target, found, out, lock)
             except KeyboardInterrupt:
-                found = scan_runs(planned, out, whole=target.whole)
+                found = scan_runs(planned, out, whole=whole)
                 write_account(out, self.target, self.budget, found)
                 _say_what_is_kept(found)
                 raise
@@ -100,6 +106,7 @@ class Reproduce(Command):
             reasons += [f"{job}: {job.failure or 'not measured'}" for job in jobs]
             outputs = target.write(finished_runs(found), out, self.budget, reasons)
             account = write_account(out, self.target, self.budget, found, outputs)
+        outputs += self._write_page(finished_runs(found), [*([note] if note else []), *reasons])
         print_scores(console, method_scores(found))
         if reasons:
             console.print("Runs that are not in it", style="bold")
@@ -110,6 +117,28 @@ class Reproduce(Command):
         if note:
             console.print(note[:1].upper() + note[1:], style="bold")
         return int(bool(reasons))
+
+    def _check_page(self, planned: Sequence[PlannedRun]) -> None:
+        """Refuse a page that could not be written after all."""
+        if self.page is None:
+            return
+        if self.page.suffix != ".html":
+            raise UsageError(f"--page {self.page}: must end in .html")
+        cases = {(run.case.situation, run.case.method, run.case.seed) for run in planned}
+        if len(cases) < len(planned):
+            raise UsageError(f"--page: runs of {self.target} differ by more than a page tells")
+        check_target(self.page)
+        from innerattn.report.plotly import plotly_script
+
+        plotly_script()
+
+    def _write_page(self, runs: Sequence[FinishedRun], notes: Sequence[str]) -> list[Path]:
+        if self.page is None or not runs:
+            return []
+        from innerattn.report.runs import runs_page
+
+        write_whole(self.page, runs_page(runs, notes=notes).encode())
+        return [self.page]
 
     def _planned(self, target: Target, out: Path) -> list[PlannedRun]:
         methods = target.methods

@@ -43,6 +43,9 @@ class Robustness(Command):
     plot: Path | None = None
     """Draw the first run's retention as a heat map into this file (.pdf, .png or .svg)."""
 
+    report: Path | None = None
+    """Write a page about the runs with these results (.html), see innerattn report."""
+
     def run(self) -> int:
         """Measure, print, write.
 
@@ -58,6 +61,11 @@ class Robustness(Command):
             from innerattn.report.plots.drawing import check_format
 
             check_format(self.plot)
+        runs = []
+        if self.report is not None:
+            from innerattn.report.runs.page import read_runs, runs_page
+
+            runs = read_runs([Path(run) for run in self.runs])  # before hours of measuring
         found = self._measure(kinds)
         robots = found.grid.scenario.num_robots
         if robots < 3:
@@ -78,6 +86,8 @@ class Robustness(Command):
 
             first = next(iter(found.retention))
             write_heatmap(self.plot, first, found.retention[first], found.grid)
+        if self.report is not None:
+            write_whole(self.report, runs_page(runs, found.to_json()).encode())
         return 0
 
     def _check(self) -> tuple[str, ...]:
@@ -93,9 +103,11 @@ class Robustness(Command):
             if value is not None and not least <= value <= _MOST:
                 flag = name.replace("_", "-")
                 raise UsageError(f"--{flag} = {value}: must be {least} to {_MOST:,}")
-        for path in (self.json, self.plot):
+        for path in (self.json, self.plot, self.report):
             if path is not None:
                 check_target(path)
+        if self.report is not None and self.report.suffix != ".html":
+            raise UsageError(f"--report {self.report}: must end in .html")
         if self.faults == "all":
             return FAULT_KINDS
         kinds = tuple(dict.fromkeys(kind.strip() for kind in self.faults.split(",")))

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from innerattn.cli.options import Command, UsageError, changed, run_options
 from innerattn.cli.progress import Evaluating, SeveralRuns, Training
+from innerattn.cli.replay import write_replay
 from innerattn.cli.seeds import parse_seeds
 from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
 from innerattn.config.registry import methods
@@ -124,6 +125,7 @@ class _Train(_Sources):
         _say_if_nothing_was_learnt([run_dir])
         print_summary(console, evaluation.summary, config.scenario)
         console.print(f"Measure it again with: innerattn evaluate {run_dir}", soft_wrap=True)
+        console.print(f"Watch it in a browser: {write_replay(run_dir)}", soft_wrap=True)
         return 0
 
     def _train_several(self, console: Console, configs: Sequence[RunConfig]) -> int:

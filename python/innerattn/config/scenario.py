@@ -17,6 +17,7 @@ from innerattn import _core
 from innerattn.config.files import preset_names, preset_table, toml_table
 from innerattn.config.model import Model, config_error
 from innerattn.errors import ConfigError
+from innerattn.shown import Shown
 
 SCENARIOS = preset_names("scenarios")
 """Names of the built-in scenarios."""
@@ -109,7 +110,7 @@ def _default_tasks() -> tuple[Task, ...]:
     )
 
 
-class Scenario(Model):
+class Scenario(Model, Shown):
     """Everything that defines a rescue world.
 
     Raises:

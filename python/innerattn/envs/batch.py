@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from innerattn import _core
 from innerattn.config.scenario import Scenario
+from innerattn.shown import Shown
 
 Autoreset = Literal["same_step", "disabled"]
 Array = TypeVar("Array", bound=NDArray[Any])
@@ -49,7 +50,7 @@ class Step(NamedTuple):
     """(n,) structured int64: env, episode, step, slot, victim, task, helper_0, ... (-1 = none)."""
 
 
-class BatchEnv:
+class BatchEnv(Shown):
     """E rescue worlds of one scenario, stepped together by compiled code on several threads.
 
     Autoreset is Gymnasium's SAME_STEP: on an episode's last step `obs` is the next episode's

@@ -19,6 +19,7 @@ from innerattn.measures.summary import Summary, summarise
 from innerattn.policies import SCRIPTED, Policy, scripted_policy
 from innerattn.records.parquet import write_records
 from innerattn.records.record import FIELDS, Record
+from innerattn.shown import Shown
 from innerattn.train.build import thread_count, torch_threads
 
 ProgressCall = Callable[[int, int], None]
@@ -26,7 +27,7 @@ ProgressCall = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class Evaluation(Shown):
     """The results of an evaluation and the records they come from."""
 
     summary: Summary

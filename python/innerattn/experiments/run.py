@@ -24,6 +24,7 @@ from innerattn.measures.summary import SCHEMA_VERSION
 from innerattn.records.parquet import RECORD_FILES, read_records
 from innerattn.records.record import Record
 from innerattn.records.run_folder import RunInfo, plain_file, read_info
+from innerattn.shown import Shown
 
 
 class NotMeasuredError(RunError):
@@ -40,7 +41,7 @@ class Scores:
 
 
 @dataclass(frozen=True)
-class FinishedRun:
+class FinishedRun(Shown):
     """A trained and measured run.
 
     Attributes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from innerattn.experiments.run import Scores
+from innerattn.experiments.run import FinishedRun, Scores
 from innerattn.experiments.scan import RunStatus
 from innerattn.measures.summary import Summary
 from innerattn.stats import Estimate
@@ -76,6 +76,11 @@ def seed_scores(summaries: Mapping[int, Summary | None]) -> SeedScores | None:
     by_seed = {seed: _scores(one) if one else None for seed, one in summaries.items()}
     means = _means([two for two in by_seed.values() if two is not None])
     return SeedScores(found[0].situation, by_seed, means)
+
+
+def scores_over_runs(runs: Sequence[FinishedRun]) -> tuple[MeanScores, MeanScores]:
+    """Means over finished runs, at least one, at both lengths of episodes."""
+    return _means([run.scores() for run in runs])
 
 
 def method_scores(found: Sequence[RunStatus]) -> list[MethodScores]:

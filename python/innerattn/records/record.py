@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
+from innerattn.shown import Shown
 
 FIELDS = (
     *("obs", "actions", "rewards", "positions", "velocities", "victims", "faults"),
@@ -21,8 +22,8 @@ Length = Literal["standard", "long"]
 """The scenario's own length of an episode, or the second one that policies are measured at."""
 
 
-@dataclass(frozen=True)
-class Record:
+@dataclass(frozen=True, repr=False)
+class Record(Shown):
     """Consecutive episodes of one policy.
 
     Fields with a time axis hold what was so before the step's action (rewards: what the step gave);
@@ -56,6 +57,13 @@ class Record:
     rewards_total: NDArray[np.float64]
     length: Length = "standard"
     steps: dict[str, NDArray[Any]] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """What it is of; its arrays would fill pages."""
+        return (
+            f"Record(policy={self.policy!r}, situation={self.scenario.situation!r}, "
+            f"episodes={self.num_episodes}, rescues={len(self.rescues)}, steps={list(self.steps)})"
+        )
 
     @property
     def num_episodes(self) -> int:

@@ -1,0 +1,195 @@
+"""`innerattn replay`: episodes of trained or scripted policies to watch, as a page or a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from innerattn.cli.options import Command, UsageError, check_target
+from innerattn.config import EvaluateConfig, Scenario
+from innerattn.config.files import write_whole
+from innerattn.errors import RunError
+from innerattn.policies import SCRIPTED
+
+if TYPE_CHECKING:
+    from innerattn.records import Record
+
+SCRIPTS = (*SCRIPTED, "oracle")
+SUFFIXES = (".html", ".gif", ".mp4")
+
+
+@dataclass(kw_only=True)
+class Replay(Command):
+    """Watch episodes in a browser, with attention drawn as arrows.
+
+    Recorded episodes of a run are shown as they are. Scripts play in the worlds of the first run.
+    With --episodes, --seed or --scenario all policies play anew, in the same worlds.
+    """
+
+    policies: Annotated[
+        tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN|POLICY|FILE ...")
+    ]
+    """Runs' folders, evaluation/episodes.parquet files, or random, greedy, hungarian, oracle; up to
+    four, shown side by side."""
+    output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("replay.html")
+    """File to write: .html is a page, .gif or .mp4 a moving picture of one episode."""
+    episodes: int | None = None
+    """Episodes to play; None: those that were recorded, or 20."""
+    seed: int | None = None
+    """Seed of the worlds to play in; None: as the first run says, or 12345."""
+    scenario: Path | None = None
+    """TOML file with the scenario to play in; None: that of the first run, or mixed."""
+    episode: int | None = None
+    """Number of the episode in a moving picture; None: that with most handoffs and rescues."""
+    robot: str | None = None
+    """Robot whose attention a moving picture shows, or all; None: the first that hands over."""
+
+    def run(self) -> int:
+        """Read or play, then write the file.
+
+        Returns:
+            The exit code, 0.
+
+        Raises:
+            InnerattnError: no such run or policy, nothing recorded, or wrong options.
+            OSError: the file cannot be written.
+        """
+        self._check()
+        names = _names(self.policies)
+        records = self._played() if self._plays_anew() else self._recorded()
+        if self.output.suffix == ".html":
+            from innerattn.report.replay import replay_page
+
+            write_whole(self.output, replay_page(records, names).encode())
+        else:
+            from innerattn.report.replay.picture import moving_picture
+
+            data = moving_picture(
+                records, names, self.output.suffix, episode=self.episode, robot=self.robot
+            )
+            write_whole(self.output, data)
+        size = self.output.stat().st_size / 1e6
+        print(f"{self.output}: {records[0].num_episodes} episodes, {size:.1f} MB")
+        return 0
+
+    def _check(self) -> None:
+        if not 1 <= len(self.policies) <= 4:
+            raise UsageError(f"{len(self.policies)} policies: must be 1 to 4 of RUN|POLICY|FILE")
+        if self.output.suffix not in SUFFIXES:
+            raise UsageError(f"-o {self.output}: must end in one of {', '.join(SUFFIXES)}")
+        if self.output.suffix == ".html" and (self.episode, self.robot) != (None, None):
+            raise UsageError("--episode, --robot: are for .gif and .mp4; a page has all of them")
+        check_target(self.output)
+
+    def _plays_anew(self) -> bool:
+        given = (self.episodes, self.seed, self.scenario)
+        return given != (None, None, None) or all(one in SCRIPTS for one in self.policies)
+
+    def _recorded(self) -> list[Record]:
+        """What was recorded; scripts play in the same worlds."""
+        found = {one: recorded(one) for one in self.policies if one not in SCRIPTS}
+        model = next(iter(found.values()))
+        return [
+            found[one] if one in found else _play(one, model.scenario, model.num_episodes, model)
+            for one in self.policies
+        ]
+
+    def _played(self) -> list[Record]:
+        from innerattn.records.run_folder import read_config
+
+        runs = [one for one in self.policies if one not in SCRIPTS]
+        for one in runs:
+            _refuse_nobody(one)
+            if Path(one).is_file():
+                raise UsageError(f"{one}: holds records, which cannot play; name the run's folder")
+        config = read_config(runs[0]) if runs else None
+        settings = config.evaluate if config else EvaluateConfig()
+        if self.scenario is not None:
+            scenario = Scenario.from_toml(self.scenario)
+        else:
+            scenario = config.scenario if config else Scenario.preset("mixed")
+        if self.seed is not None:
+            settings = settings.replace(seed=self.seed)
+        episodes = 20 if self.episodes is None else self.episodes
+        if episodes < 1 or episodes > 1000:
+            raise UsageError(f"--episodes {episodes}: must be 1 to 1000")
+        return [_play(one, scenario, episodes, settings.seed) for one in self.policies]
+
+
+def write_replay(run: Path) -> Path:
+    """Write ``replay.html`` of a run's recorded episodes into its folder, and give its path.
+
+    Raises:
+        RunError: no episode was recorded step by step.
+        OSError: the file cannot be written.
+    """
+    from innerattn.report.replay import replay_page
+
+    path = run / "replay.html"
+    write_whole(path, replay_page([recorded(str(run))], _names([str(run)])).encode())
+    return path
+
+
+def recorded(name: str) -> Record:
+    """The episodes that an evaluation recorded step by step.
+
+    Args:
+        name: a run's folder, a folder of records, or the file ``episodes.parquet`` in one.
+
+    Raises:
+        RunError: there are none, or they cannot be read.
+    """
+    from innerattn.records import read_records
+
+    _refuse_nobody(name)
+    path = Path(name)
+    if path.is_file():
+        if path.name != "episodes.parquet":
+            raise RunError(
+                f"{path}: must be named episodes.parquet, with rescues.parquet beside it"
+            )
+        folder = path.parent
+    else:
+        folder = path if (path / "episodes.parquet").is_file() else path / "evaluation"
+    if not (folder / "episodes.parquet").is_file():
+        raise RunError(
+            f"{path}: holds no recorded episodes (evaluation/episodes.parquet); "
+            "--episodes N plays some"
+        )
+    for record in read_records(folder):
+        if "positions" in record.steps:
+            return record
+    raise RunError(f"{folder}: no episode was recorded step by step; --episodes N plays some")
+
+
+def _refuse_nobody(name: str) -> None:
+    if not Path(name).exists():
+        raise RunError(f"{name}: neither a run's folder nor one of {', '.join(SCRIPTS)}")
+
+
+def _play(name: str, scenario: Scenario, episodes: int, worlds: Record | int) -> Record:
+    """Episodes of a script or a run, in the worlds of a record or of a seed."""
+    from innerattn.evaluate import load_trained, run_episodes, scripted_policy
+    from innerattn.records import FIELDS
+
+    seed, first = (worlds, 0) if isinstance(worlds, int) else (worlds.seed, worlds.first_episode)
+    if name in SCRIPTS:
+        policy = scripted_policy(name, scenario, seed)
+    else:
+        policy = load_trained(name, scenario)[1]
+    return run_episodes(policy, scenario, episodes, seed, first_episode=first, record=FIELDS)
+
+
+def _names(policies: Sequence[str]) -> list[str]:
+    """What to call each; the name of a folder, or the whole path where two are alike."""
+    short = []
+    for one in policies:
+        path = Path(one).resolve()
+        folder = path.parent if path.is_file() else path
+        folder = folder.parent if folder.name == "evaluation" else folder
+        short.append(one if one in SCRIPTS else folder.name)
+    return [a if short.count(a) == 1 else b for a, b in zip(short, policies, strict=True)]

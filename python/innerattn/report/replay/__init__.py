@@ -1,0 +1,5 @@
+"""Episodes to watch: a page of its own, or a moving picture. It plays nothing."""
+
+from innerattn.report.replay.page import replay_page
+
+__all__ = ["replay_page"]

@@ -1,0 +1,51 @@
+"""A replay as one page: records, styles and scripts in a single file that needs no network."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+from innerattn.records.record import Record
+from innerattn.report.html import fill, json_text
+from innerattn.report.replay.data import replay_document
+
+_WEB = files("innerattn.report.replay") / "web"
+_SCRIPTS = ("data.js", "story.js", "scene.js", "marks.js", "charts.js", "panel.js", "app.js")
+
+
+def replay_page(records: Sequence[Record], names: Sequence[str]) -> str:
+    """A page that replays recorded episodes in a browser.
+
+    Args:
+        records: of one to four policies, in the same worlds, recorded step by step.
+        names: what each is called; any text.
+
+    Returns:
+        The page; it loads nothing from elsewhere.
+
+    Raises:
+        RunError: none or too many records, steps were not recorded, or worlds differ.
+    """
+    return page_of(replay_document(records, names), names)
+
+
+def page_of(document: dict[str, Any], names: Sequence[str]) -> str:
+    """The page of what `replay_document` gave."""
+    return fill(
+        _text("page.html"),
+        title=escape(_listed(names)),
+        style=_text("style.css"),
+        script="\n".join(_text(name) for name in _SCRIPTS),
+        data=json_text(document),
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _text(name: str) -> str:
+    return (_WEB / name).read_text("utf-8")

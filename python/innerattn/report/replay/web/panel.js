@@ -1,0 +1,111 @@
+// The lists beside the arena: robots, events, legend; and the marks on the scrubber.
+
+function element(tag, attributes = {}, ...children) {
+  const node = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
+  node.append(...children);
+  return node;
+}
+
+function fillSelect(select, options, chosen) {
+  select.replaceChildren(...options.map(([value, text]) => {
+    const option = element("option", { value }, text);
+    option.selected = value === chosen;
+    return option;
+  }));
+}
+
+class RobotList {
+  constructor(list, worlds, choose) {
+    this.worlds = worlds;
+    this.rows = worlds.robots.map((robot) => {
+      const count = element("output"), note = element("small");
+      const button = element("button", { type: "button" },
+        robotSymbol(worlds, robot), element("strong", { title: robot.name }, robot.name), count, note);
+      button.addEventListener("click", () => choose(robot.index));
+      list.append(element("li", {}, button));
+      return { button, count, note };
+    });
+  }
+
+  show(run, episode, step, look) {
+    this.worlds.robots.forEach((robot, index) => {
+      const { button, count, note } = this.rows[index];
+      button.setAttribute("aria-pressed", String(index === look.robot));
+      count.textContent = counted(run.rescuesUntil(episode, step, index), "rescue");
+      const faults = run.faultsAt(episode, step, index).map((one) => faultText(this.worlds, one));
+      if (run.isBlocked(episode, step, index)) faults.push("blocked");
+      note.className = faults.length ? "bad" : "";
+      const parts = faults.length ? faults : [`offers ${listed(robot.abilities)}`];
+      if (run.attention && look.robot >= 0 && index !== look.robot) {
+        const weight = run.weight(episode, step, look.head, look.robot, index);
+        parts.push(`${percent(weight)} of ${this.worlds.robots[look.robot].name}'s attention`);
+      }
+      note.textContent = parts.join(" · ");
+    });
+  }
+}
+
+class EventList {
+  constructor(list, empty, marks, pick) {
+    Object.assign(this, { list, empty, marks, pick, events: [], rows: [] });
+  }
+
+  /** Shows the events of an episode; the scrubber has so many steps. */
+  show(run, episode, steps) {
+    this.events = eventsOf(run, episode);
+    this.empty.hidden = this.events.length > 0;
+    this.rows = this.events.map((event) => {
+      const time = element("time", {}, `${(event.step * run.worlds.dt_s).toFixed(1)} s`);
+      const button = element("button", { type: "button" }, time, symbol(eventMark(event.type, 0, 0)),
+        element("span", {}, event.text));
+      button.addEventListener("click", () => this.pick(event.step, event.robots[0]));
+      return button;
+    });
+    this.list.replaceChildren(...this.rows.map((row) => element("li", {}, row)));
+    this.drawMarks(steps);
+  }
+
+  /** Marks above the scrubber, whose thumb leaves out half its width at both ends. */
+  drawMarks(length) {
+    const width = this.marks.clientWidth || 600, thumb = 8;
+    const x = (step) => thumb + ((width - 2 * thumb) * step) / Math.max(length - 1, 1);
+    const marked = this.events.filter((event) => event.type !== "blocked");
+    this.marks.replaceChildren(...marked.map((event) => (
+      eventMark(event.type, x(event.step), event.type === "rescue" ? 6 : 18)
+    )));
+  }
+
+  showStep(step) {
+    this.rows.forEach((row, index) => {
+      row.setAttribute("aria-current", String(this.events[index].step === Math.floor(step)));
+    });
+  }
+
+  /** The next step with an event after one, or the one before it; -1: there is none. */
+  next(step, forward) {
+    const steps = this.events.map((event) => event.step);
+    const found = forward ? steps.find((one) => one > step) : steps.findLast((one) => one < step);
+    return found === undefined ? -1 : found;
+  }
+}
+
+function fillLegend(list, worlds) {
+  const row = (picture, text) => list.append(element("li", {}, picture, element("span", {}, text)));
+  list.replaceChildren();
+  for (const kind of worlds.kinds) {
+    const robot = worlds.robots.find((one) => one.kind === kind);
+    row(robotSymbol(worlds, robot), `${kind} robot, offers ${listed(robot.abilities)}`);
+  }
+  worlds.tasks.forEach((task, index) => {
+    row(taskSymbol(index), `victim of ${task.name}, needs ${listed(task.needs)}`);
+  });
+  const ring = svg("circle", { r: 9, fill: "none", stroke: "var(--victim)", "stroke-dasharray": "4 3", "stroke-width": 1.5 });
+  row(symbol(ring), "rescue radius: a need is filled while a robot that offers it is inside");
+  const brackets = svg("path", { d: "M-7 -6a9 9 0 0 0 0 12M7 -6a9 9 0 0 1 0 12", fill: "none", stroke: "var(--blocked)", "stroke-width": 3 });
+  row(symbol(brackets), "blocked robot");
+  row(symbol(eventMark("fault", 0, 0)), "a fault, or where it begins");
+  row(symbol(eventMark("recovery", 0, 0)), "where a fault ends");
+  row(symbol(eventMark("rescue", 0, 0)), "a rescue");
+  row(symbol(eventMark("handoff", 0, 0)), "a handoff: a robot rescues with another partner than before");
+}

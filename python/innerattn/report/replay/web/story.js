@@ -1,0 +1,131 @@
+// What happens in an episode, in words.
+
+function listed(names) {
+  return names.length < 2 ? names.join("") :
+    `${names.slice(0, -1).join(", ")} and ${names[names.length - 1]}`;
+}
+
+function counted(count, what) {
+  return `${count} ${what}${count === 1 ? "" : "s"}`;
+}
+
+function percent(share) {
+  return `${Math.round(100 * share)} %`;
+}
+
+function faultText(worlds, fault) {
+  const { name, unit } = worlds.fault_kinds[fault.kind];
+  const words = name.replaceAll("_", " ");
+  if (unit) return `${words} ${fault.value.toFixed(2)} ${unit}`;
+  return name === "unavailable" && fault.value >= 1 ? words : `${words} ${percent(fault.value)}`;
+}
+
+const LEAST_SPELL = 2; // steps in a row; less is hard to see
+
+/** Times in which a robot is blocked for some steps in a row, as {robot, start, end}. */
+function blockedSpells(run, episode) {
+  const spells = [];
+  for (let robot = 0; robot < run.size; robot++) {
+    for (let step = 0, start = -1; step <= run.lengths[episode]; step++) {
+      const now = step < run.lengths[episode] && run.isBlocked(episode, step, robot);
+      if (now && start < 0) start = step;
+      if (!now && start >= 0) {
+        if (step - start >= LEAST_SPELL) spells.push({ robot, start, end: step });
+        start = -1;
+      }
+    }
+  }
+  return spells;
+}
+
+/** Everything worth a mark on the scrubber: {step, type, text, robots}, in the order of time. */
+function eventsOf(run, episode) {
+  const { worlds } = run, name = (robot) => worlds.robots[robot].name, events = [];
+  for (const one of run.rescues[episode]) {
+    const verb = one.helpers.length === 1 ? "rescues" : "rescue";
+    events.push({
+      step: one.step, type: "rescue", robots: one.helpers,
+      text: `${listed(one.helpers.map(name))} ${verb} a victim of ${worlds.tasks[one.task].name}`,
+    });
+  }
+  for (const one of run.handoffs[episode]) {
+    events.push({
+      step: one.second, type: "handoff", robots: [one.robot],
+      text: `handoff: ${name(one.robot)} worked with ${name(one.before)} before, ` +
+        `now with ${name(one.after)}`,
+    });
+  }
+  for (const one of run.faults[episode]) {
+    events.push({
+      step: one.start, type: "fault", robots: [one.robot],
+      text: `fault: ${name(one.robot)}, ${faultText(worlds, one)}`,
+    });
+    if (one.end < run.lengths[episode]) {
+      events.push({
+        step: one.end, type: "recovery", robots: [one.robot],
+        text: `end of a fault: ${name(one.robot)}, ${faultText(worlds, one)}`,
+      });
+    }
+  }
+  for (const one of blockedSpells(run, episode)) {
+    events.push({
+      step: one.start, type: "blocked", robots: [one.robot],
+      text: `${name(one.robot)} is blocked for ${counted(one.end - one.start, "step")}`,
+    });
+  }
+  const order = ["fault", "recovery", "rescue", "handoff", "blocked"];
+  return events.sort(
+    (a, b) => a.step - b.step || order.indexOf(a.type) - order.indexOf(b.type),
+  );
+}
+
+/** How many moments of an episode are worth a look; a handoff or a fault counts like ten blocks. */
+function interest(run, episode) {
+  return 10 * (run.handoffs[episode].length + run.faults[episode].length) +
+    blockedSpells(run, episode).length;
+}
+
+const SORTS = {
+  interesting: { label: "most interesting first", of: (_, e, run) => interest(run, e) },
+  rescues: { label: "most rescues first", of: (_, e, run) => rescueCount(run, e) },
+  difference: { label: "largest difference first", of: (runs, e) => spread(runs, e), pairs: true },
+  number: { label: "by number", of: (_, e) => -e },
+};
+
+function rescueCount(run, episode) {
+  return run.rescues[episode].length;
+}
+
+function spread(runs, episode) {
+  const counts = runs.map((run) => rescueCount(run, episode));
+  return Math.max(...counts) - Math.min(...counts);
+}
+
+/** Numbers of all episodes, sorted by what happens in those of one run. */
+function sortedEpisodes(runs, sort, chosen) {
+  const keys = Array.from({ length: chosen.episodes }, (_, e) => SORTS[sort].of(runs, e, chosen));
+  return keys.map((_, e) => e).sort((a, b) => keys[b] - keys[a] || a - b);
+}
+
+function episodeText(runs, episode) {
+  const number = runs[0].worlds.first_episode + episode;
+  const rescues = runs.map((run) => rescueCount(run, episode));
+  const parts = [`Episode ${number}`];
+  parts.push(runs.length > 1 ? `${rescues.join(" : ")} rescues` : counted(rescues[0], "rescue"));
+  const total = (of) => runs.reduce((sum, run) => sum + of(run), 0);
+  const handoffs = total((run) => run.handoffs[episode].length);
+  const faults = total((run) => run.faults[episode].length);
+  if (handoffs) parts.push(counted(handoffs, "handoff"));
+  if (faults) parts.push(counted(faults, "fault"));
+  return parts.join(" · ");
+}
+
+/** Whom a robot attends to most, as a sentence; "" without attention. */
+function attentionText(run, episode, step, head, robot) {
+  if (!run.attention) return "";
+  const others = run.worlds.robots.filter((one) => one.index !== robot);
+  const weights = others.map((one) => run.weight(episode, step, head, robot, one.index));
+  const best = weights.indexOf(Math.max(...weights));
+  return `${run.worlds.robots[robot].name} attends most to ${others[best].name} ` +
+    `(${percent(weights[best])}).`;
+}

@@ -1,0 +1,1 @@
+"""Trainings in the browser while they go on, on this machine alone."""

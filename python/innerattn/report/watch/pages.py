@@ -1,0 +1,130 @@
+"""The pages of `innerattn watch`: the state of trainings, and episodes of their newest policy."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from innerattn.experiments.live import LiveRun, read_live
+from innerattn.records.record import Record
+from innerattn.report.html import fill
+from innerattn.report.plotly import plot_script, plotly_script
+from innerattn.report.replay.page import replay_page
+from innerattn.report.runs.plots import COLOURS, Plot
+from innerattn.report.watch.server import Answer
+
+_WEB = files("innerattn.report.watch") / "web"
+
+PlayNewest = Callable[[Path], Record]
+"""Plays some episodes with the newest policy of a run."""
+
+
+class NewestEpisodes:
+    """Replays of the newest policy of a run, played once for each checkpoint."""
+
+    def __init__(self, folder: Path, play: PlayNewest) -> None:
+        """Replay the run in ``folder``; ``play`` gives its episodes."""
+        self._folder, self._play = folder, play
+        self._lock = threading.Lock()
+        self._made: tuple[int, str] | None = None
+
+    def page(self) -> Answer:
+        """The replay.
+
+        Raises:
+            RunError: there is no checkpoint yet, or it cannot be played.
+        """
+        with self._lock:
+            live = read_live(self._folder)
+            if live.checkpoint is None or self._made is None or self._made[0] != live.checkpoint:
+                record = self._play(self._folder)
+                name = f"{live.name} after {live.checkpoint or 0:,} env-steps"
+                self._made = (live.checkpoint or 0, replay_page([record], [name]))
+            return Answer("text/html", self._made[1])
+
+
+def watch_pages(
+    folders: Sequence[Path], scripts: Mapping[str, float], play: PlayNewest
+) -> dict[str, Callable[[], Answer]]:
+    """All pages by name, for `innerattn.report.watch.server.LocalServer`.
+
+    Args:
+        folders: of the runs.
+        scripts: rescues per episode of scripts, to show beside the first run's.
+        play: plays the newest policy of a run.
+
+    Raises:
+        MissingLibraryError: plotly is not installed.
+    """
+    library = plotly_script()
+    first = fill(
+        _text("watch.html"),
+        style=_text("watch.css"),
+        script=f"{plot_script()}\n{_text('watch.js')}",
+    )
+    pages: dict[str, Callable[[], Answer]] = {
+        "": partial(Answer, "text/html", first),
+        "plotly.js": partial(Answer, "text/javascript", library),
+        "state": partial(_state, folders, scripts),
+    }
+    for index, folder in enumerate(folders):
+        pages[f"episodes/{index}"] = NewestEpisodes(folder, play).page
+    return pages
+
+
+def _state(folders: Sequence[Path], scripts: Mapping[str, float]) -> Answer:
+    runs = [read_live(folder) for folder in folders]
+    names = ("name", "method", "situation", "seed", "state", "env_steps", "total_env_steps")
+    numbers = ("env_steps_per_s", "seconds_left", "silent_s", "checkpoint")
+    rows: list[dict[str, Any]] = [
+        {
+            **{name: getattr(run, name) for name in (*names, *numbers)},
+            "rescues": next((value for value in run.rescues[::-1] if value is not None), None),
+        }
+        for run in runs
+    ]
+    plots = [plot.to_json() for plot in _plots(runs, scripts)]
+    return Answer("application/json", json.dumps({"runs": rows, "plots": plots}, allow_nan=False))
+
+
+def _plots(runs: Sequence[LiveRun], scripts: Mapping[str, float]) -> list[Plot]:
+    rescues = Plot(
+        title="Rescues per training episode",
+        note="",
+        traces=[_line(index, run, run.rescues) for index, run in enumerate(runs)],
+        x="env-steps",
+        y="rescues per episode",
+        levels=dict(scripts),
+    )
+    attentive = [(index, run) for index, run in enumerate(runs) if run.entropy]
+    evens = {f"even, {one.even_nats:.2f}": one.even_nats for _, one in attentive if one.even_nats}
+    entropy = Plot(
+        title="Attention entropy, mean",
+        note="",
+        traces=[_line(index, run, run.entropy) for index, run in attentive],
+        x="env-steps",
+        y="entropy [nats]",
+        levels=evens,
+    )
+    return [rescues, entropy] if attentive else [rescues]
+
+
+def _line(index: int, run: LiveRun, values: Sequence[float | None]) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "connectgaps": True,
+        "name": run.name,
+        "x": list(run.times),
+        "y": list(values),
+        "line": {"color": COLOURS[index % len(COLOURS)], "width": 2.5},
+    }
+
+
+def _text(name: str) -> str:
+    return (_WEB / name).read_text("utf-8")

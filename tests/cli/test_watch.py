@@ -1,0 +1,85 @@
+"""`innerattn watch`: the page of a training in a browser, and what is refused."""
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browser import PHONE, WIDE, Visit, opened_browser, until
+
+from innerattn.cli.main import main
+
+
+def mark(run: Path, **values: Any) -> None:
+    """Change what ``run.json`` says, whole, as training does."""
+    document = json.loads((run / "run.json").read_text()) | values
+    (run / "new.json").write_text(json.dumps(document))
+    (run / "new.json").replace(run / "run.json")
+
+
+def test_a_training_goes_on_under_the_eyes_of_its_reader(run_dir: Path, tmp_path: Path) -> None:
+    run = Path(shutil.copytree(run_dir, tmp_path / "mine <b>"))
+    lines = (run / "metrics.jsonl").read_text().splitlines(keepends=True)
+    (run / "metrics.jsonl").write_text(lines[0])
+    (run / "checkpoints").rename(run / "later")
+    mark(run, state="running", env_steps=json.loads(lines[0])["env_steps"])
+    command = [sys.executable, "-m", "innerattn", "watch", str(run), "--episodes", "2"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    problems: list[str] = []
+    try:
+        address = process.stdout.readline().split()[-1]
+        with opened_browser() as browser:
+            page = browser.new_page(viewport={"width": WIDE[0], "height": WIDE[1]})
+            page.on("pageerror", lambda error: problems.append(str(error)))
+            page.on("console", lambda m: problems.append(m.text) if m.type == "error" else None)
+            page.goto(address)
+            page.get_by_text("1 of 1 running.").wait_for()
+            row = page.locator("#runs tr")
+            assert row.locator("th").inner_text() == "mine <b>"
+            assert row.locator("td").last.inner_text() == "none yet"
+            assert page.get_by_text("The first checkpoint is not there yet.").is_visible()
+            (run / "metrics.jsonl").write_text("".join(lines))
+            (run / "later").rename(run / "checkpoints")
+            mark(run, state="done", env_steps=400)
+            page.get_by_text("All trainings have ended.").wait_for()
+            assert row.locator("td").nth(2).inner_text() == "400"
+            replay = page.frame_locator("#episodes")
+            replay.get_by_role("heading", level=1).get_by_text("after 400 env-steps").wait_for()
+            replay.get_by_role("button", name="Next event").click()
+            assert replay.locator("#episode option").count() == 2
+            until(page, "document.querySelectorAll('.plot .main-svg').length >= 4")
+            assert not Visit(page).serious_faults()
+            page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
+            until(page, f"document.documentElement.scrollWidth <= {PHONE[0]}")
+            assert not problems
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=30) == 0
+        process.stdout.close()
+
+
+def test_wrong_use(run_dir: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        cases = [
+            (2, [], "RUN: at least one run is needed"),
+            (1, ["nobody"], "nobody: no such run folder"),
+            (2, [str(run_dir), "--port", "70000"], "--port 70000: must be 0 to 65,535"),
+            (2, [str(run_dir), "--episodes", "0"], "--episodes 0: must be 1 to 100"),
+            (1, [str(run_dir), "--port", port], f"--port {port}: is taken"),
+        ]
+        for code, options, message in cases:
+            assert main(["watch", *options]) == code
+            captured = capsys.readouterr()
+            assert message in captured.err
+            assert captured.err.count(os.linesep) == 1
+            assert not captured.out

@@ -1,0 +1,81 @@
+"""Moving pictures: two frames for each step, arrows where there is attention, clear refusals."""
+
+import io
+import sys
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from PIL import Image
+from watched import watched
+
+from innerattn.config import Scenario
+from innerattn.errors import MissingLibraryError, RunError
+from innerattn.report.replay.picture import moving_picture
+
+SHORT = Scenario.preset("mixed").replace(episode_steps=4)
+
+
+def frames(data: bytes) -> list[np.ndarray]:
+    picture = Image.open(io.BytesIO(data))
+    found = []
+    for index in range(picture.n_frames):
+        picture.seek(index)
+        found.append(np.asarray(picture.convert("RGB")).astype(int))
+    return found
+
+
+def test_a_gif_has_two_frames_for_each_step() -> None:
+    record = watched(SHORT, episodes=2)
+    found = frames(moving_picture([record], ["$a_1$ <b>"], ".gif"))
+    assert len(found) == 2 * 4 - 1
+    assert all((one != other).any() for one, other in pairwise(found))
+    both = frames(moving_picture([record, record], ["a", "b"], ".gif", episode=1))
+    assert both[0].shape[1] > 1.5 * found[0].shape[1]
+
+
+def test_arrows_are_of_the_robots_that_were_asked_for() -> None:
+    without, record = watched(SHORT, heads=0), watched(SHORT)
+    painted = {
+        robot: frames(moving_picture([one], ["a"], ".gif", episode=0, robot=robot))[0]
+        for one, robot in ((without, "food_1"), (record, "medical_0"), (record, "all"))
+    }
+    inside = (slice(60, 360), slice(60, 340))
+    plain = painted["food_1"][inside]
+    one, everybody = (
+        int((np.abs(painted[robot][inside] - plain).sum(-1) > 60).sum())
+        for robot in ("medical_0", "all")
+    )
+    assert 100 < one < everybody
+
+
+def test_a_video() -> None:
+    data = moving_picture([watched(SHORT, episodes=1)], ["a"], ".mp4")
+    assert data[4:8] == b"ftyp"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"episode": 9}, "--episode 9: must be 0 to 5"),
+        ({"robot": "nobody"}, "--robot nobody: must be all, or one of food_0, food_1"),
+    ],
+)
+def test_what_was_not_recorded(options: dict[str, object], message: str) -> None:
+    with pytest.raises(RunError, match=message):
+        moving_picture([watched(SHORT)], ["a"], ".gif", **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("library", "suffix", "message"),
+    [
+        ("imageio_ffmpeg", ".mp4", "a video needs imageio-ffmpeg: pip install imageio-ffmpeg"),
+        ("matplotlib.figure", ".gif", "needs matplotlib: pip install matplotlib"),
+    ],
+)
+def test_a_missing_library_is_named(
+    monkeypatch: pytest.MonkeyPatch, library: str, suffix: str, message: str
+) -> None:
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(MissingLibraryError, match=message):
+        moving_picture([watched(SHORT, episodes=1)], ["a"], suffix)
