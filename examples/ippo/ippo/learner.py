@@ -14,7 +14,7 @@ from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
 from innerattn.learn.gradients import clip_norm_by_robot
-from innerattn.learn.rollout import Rollout, Steps, rows_of, standardised, steps_of
+from innerattn.learn.rollout import Rollout, RolloutBuffer, rows_of, standardised, steps_of
 from innerattn.learn.types import Team, Transitions
 from innerattn.nn import Actor, CriticOutput, PerRobotLinear
 from ippo import IPPOConfig
@@ -72,22 +72,23 @@ class IPPO(ActorCritic):
         self._config = config
         self._shuffle = torch.Generator().manual_seed(seed)
         self._scale = ReturnScale(team.num_robots, config.gamma, device)
-        self._steps: list[tuple[Transitions, Tensor]] = []
+        self._buffer = RolloutBuffer(config.rollout_steps, team, device, torch.float32)
         self._frozen = False
 
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
         """Store one control step of all worlds."""
         if self.actor_frozen != self._frozen:  # a rollout belongs to one policy
-            self._steps, self._frozen = [], self.actor_frozen
-        self._steps.append((batch, truncated))
+            self._buffer.clear()
+            self._frozen = self.actor_frozen
+        self._buffer.add(batch, truncated, None)
 
     def learn(self) -> dict[str, float] | None:
         """Train on the rollout when it is full; returns the means of the metrics."""
         config = self._config
-        if len(self._steps) < config.rollout_steps:
+        if not self._buffer.full:
             return None
         rollout = self._rollout()
-        self._steps = []
+        self._buffer.clear()
         found = []
         for _ in range(config.epochs):
             order = torch.randperm(rollout.obs.shape[1], generator=self._shuffle)
@@ -105,14 +106,14 @@ class IPPO(ActorCritic):
     def _rollout(self) -> Rollout:
         """Advantages and lambda-returns of each robot from its own rewards and values."""
         config = self._config
-        steps = Steps.stack(self._steps, self._device, self._dtype)
+        steps = self._buffer.steps()
         self._scale.update(steps.reward, steps.ended)
         reward = (steps.reward / self._scale.std(0.01).unsqueeze(1)).to(self._dtype)
-        obs, actions = rows_of(steps.obs), rows_of(steps.actions)
-        value, next_value = (
-            steps_of(self.critic(one, actions, None).q.squeeze(1), len(reward))
-            for one in (obs, rows_of(steps.next_obs))
-        )
+        rows = self.critic(steps.obs, steps.actions, None).q.squeeze(1)
+        value = steps_of(rows, len(reward))
+        next_value = torch.cat([value[1:], torch.zeros_like(value[:1])])
+        step, env = steps.cut.nonzero(as_tuple=True)  # no next step in the rollout
+        next_value[step, :, env] = self.critic(steps.after, steps.actions, None).q.squeeze(1).t()
         advantage = generalised_advantage(
             reward,
             value,
@@ -122,12 +123,12 @@ class IPPO(ActorCritic):
             config.gamma,
             config.gae_lambda,
         )
-        log_prob = self.actor(obs).log_softmax(dim=1)
+        log_prob = self.actor(steps.obs).log_softmax(dim=1)
         return Rollout(
-            obs=obs,
-            actions=actions,
-            log_prob=losses.gather_actions(log_prob, actions),
-            value=rows_of(value),
+            obs=steps.obs,
+            actions=steps.actions,
+            log_prob=losses.gather_actions(log_prob, steps.actions),
+            value=rows,
             advantage=standardised(rows_of(advantage)),
             target=rows_of(advantage + value),
         )
