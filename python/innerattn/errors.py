@@ -33,6 +33,10 @@ class RunError(InnerattnError):
     """A run folder is missing, foreign, damaged, or already there."""
 
 
+class UnsealedRunWarning(UserWarning):
+    """A run was read that has no manifest: nothing tells whether its files are what they were."""
+
+
 class WorldError(InnerattnError, RuntimeError):
     """Worlds failed inside compiled code; all others have done the step.
 

@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated, Any
@@ -23,7 +24,7 @@ from innerattn.cli.options import UsageError
 from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
 from innerattn.cli.train import command_type
-from innerattn.errors import needs_no_traceback, one_line
+from innerattn.errors import UnsealedRunWarning, needs_no_traceback, one_line
 
 _DESCRIPTION = "Train teams of unlike robots to rescue together, and measure how they do it."
 
@@ -45,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # better a "?" than no table at all
     try:
-        with _stopped_like_by_hand():
+        with _stopped_like_by_hand(), _plain_warnings():
             return int(_parse(argv).run())
     except KeyboardInterrupt:
         print("innerattn: interrupted", file=sys.stderr)
@@ -74,6 +75,24 @@ def _stopped_like_by_hand() -> Iterator[None]:
     finally:
         for one in changed:
             signal.signal(one, signal.SIG_DFL)
+
+
+@contextmanager
+def _plain_warnings() -> Iterator[None]:
+    """Show what we warn of in one line, as errors are."""
+    shown = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+        if issubclass(category, UnsealedRunWarning):
+            print(f"innerattn: warning: {message}", file=sys.stderr)
+        else:
+            shown(message, category, *rest, **more)
+
+    warnings.showwarning = show
+    try:
+        yield
+    finally:
+        warnings.showwarning = shown
 
 
 def _parse(argv: list[str]) -> Any:

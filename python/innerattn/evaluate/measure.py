@@ -19,6 +19,7 @@ from innerattn.measures.summary import Summary, summarise
 from innerattn.policies import SCRIPTED, Policy, scripted_policy
 from innerattn.records.parquet import write_records
 from innerattn.records.record import FIELDS, Record
+from innerattn.records.run_files import amend
 from innerattn.train.build import thread_count, torch_threads
 
 ProgressCall = Callable[[int, int], None]
@@ -35,12 +36,16 @@ class Evaluation:
     def write(self, folder: str | Path) -> None:
         """Write ``summary.json`` and the records into ``folder``, which is made if needed.
 
+        In a run that is sealed, they take their place in its manifest.
+
         Raises:
             OSError: the files cannot be written.
+            RunError: the run's manifest is damaged.
         """
         write_records(self.records, Path(folder))
         text = json.dumps(self.summary.to_json(), indent=1, allow_nan=False)
         write_whole(Path(folder) / "summary.json", f"{text}\n".encode())
+        amend(Path(folder).parent, Path(folder).name)
 
 
 def evaluate_policy(
