@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from in_turn import do_in_turn
+from reseal import reseal
 
 from innerattn.cli.main import main
 from innerattn.errors import RunError
@@ -108,6 +109,7 @@ def test_another_configuration_is_named_and_neither_used_nor_changed(
     foreign = study / "runs" / NAMES[0]
     config = foreign / "config.toml"
     config.write_text(config.read_text().replace("polyak = 0.02\n", "polyak = 0.03\n"))
+    reseal(foreign)
     before = times(foreign)
     assert command("fig4", study, "td-inner,td-uniform", "--seeds", "2") == 1
     out, err = capsys.readouterr()

@@ -12,8 +12,10 @@ from reseal import reseal
 from innerattn.errors import InnerattnError, RunError, UnsealedRunWarning
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import read_metrics, read_run
+from innerattn.experiments.side_by_side import Run
 from innerattn.records import read_records
 from innerattn.records.run_files import RunFiles, amend
+from innerattn.records.run_folder import read_config
 from innerattn.train import load_policy
 
 SHORT, FULL = 40, 1000
@@ -108,6 +110,15 @@ def test_links_in_place_of_folders_are_refused(run: Path, name: str) -> None:
     (run / name).symlink_to(away)
     with pytest.raises(RunError, match=r"plain|number|no checkpoint"):
         read_all(run)
+
+
+def test_nothing_is_written_through_a_link(run: Path, tmp_path: Path) -> None:
+    shutil.rmtree(run / "evaluation")
+    (tmp_path / "elsewhere").mkdir()
+    (run / "evaluation").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(RunError, match=r"evaluation: is a link; nothing is written through it"):
+        Run(read_config(run), run, trained=True).do(lambda _: None)
+    assert list((tmp_path / "elsewhere").iterdir()) == []
 
 
 def test_the_run_folder_may_be_a_link(run: Path) -> None:

@@ -51,10 +51,11 @@ def read_plain(path: Path, most_bytes: int, *, follow_link: bool = False) -> byt
         raise
     except OSError as error:
         raise _not_plain(path) from error
+    found = os.fstat(descriptor)
+    if not stat.S_ISREG(found.st_mode):
+        os.close(descriptor)
+        raise _not_plain(path)
     with os.fdopen(descriptor, "rb") as file:
-        found = os.fstat(file.fileno())
-        if not stat.S_ISREG(found.st_mode):
-            raise _not_plain(path)
         if found.st_size > most_bytes:
             raise RunError(f"{path}: has {found.st_size} bytes: must have at most {most_bytes}")
         data = file.read(found.st_size + 1)

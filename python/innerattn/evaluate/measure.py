@@ -12,6 +12,7 @@ from pathlib import Path
 
 from innerattn.config import EvaluateConfig, Scenario, refuse_late_faults
 from innerattn.config.files import write_whole
+from innerattn.errors import RunError
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
 from innerattn.measures.registry import needed_fields
@@ -40,8 +41,10 @@ class Evaluation:
 
         Raises:
             OSError: the files cannot be written.
-            RunError: the run's manifest is damaged.
+            RunError: ``folder`` is a link, or the run's manifest is damaged.
         """
+        if Path(folder).is_symlink():
+            raise RunError(f"{folder}: is a link; nothing is written through it")
         write_records(self.records, Path(folder))
         text = json.dumps(self.summary.to_json(), indent=1, allow_nan=False)
         write_whole(Path(folder) / "summary.json", f"{text}\n".encode())

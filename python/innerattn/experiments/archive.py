@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from innerattn.config import RunConfig
@@ -27,7 +26,7 @@ from innerattn.experiments.plan import Case
 from innerattn.experiments.run import FinishedRun, check_summary
 from innerattn.records.record import Record, rescue_dtype
 from innerattn.records.run_folder import run_info
-from innerattn.records.tables import MOST_FILE_BYTES, read_table
+from innerattn.records.tables import MOST_FILE_BYTES, read_table, table_bytes
 from innerattn.records.validity import refuse_impossible
 
 FORMAT = "innerattn.archive"
@@ -59,10 +58,8 @@ def write_archive(runs: Iterable[FinishedRun], path: Path) -> None:
         "reward_names": list(names.pop()) if names else [],
     }
     table = pa.table(columns).replace_schema_metadata({FORMAT: json.dumps(head)})
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd", compression_level=_COMPRESSION_LEVEL)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, sink.getvalue().to_pybytes())
+    write_whole(path, table_bytes(table, _COMPRESSION_LEVEL))
 
 
 def read_archive(path: Path) -> list[FinishedRun]:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
@@ -22,7 +21,7 @@ from innerattn.config.untrusted import read_plain
 from innerattn.errors import RunError
 from innerattn.records.record import FIELDS, Length, Record, rescue_dtype
 from innerattn.records.run_files import RunFiles
-from innerattn.records.tables import MOST_FILE_BYTES, read_table
+from innerattn.records.tables import MOST_FILE_BYTES, read_table, table_bytes
 from innerattn.records.validity import refuse_impossible, step_dtype, step_shape
 
 FORMAT = "innerattn.records"
@@ -172,9 +171,7 @@ def _write(tables: list[pa.Table], records: Sequence[Record], path: Path) -> Non
         "records": [_head(record) for record in records],
     }
     table = table.replace_schema_metadata({FORMAT: json.dumps(heads)})
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd")
-    write_whole(path, sink.getvalue().to_pybytes())
+    write_whole(path, table_bytes(table))
 
 
 def _read(
