@@ -296,6 +296,7 @@ def test_an_unfinished_run_is_trained_again(study: Path, command: Command) -> No
     left, kept = (study / "runs" / name for name in NAMES)
     info = json.loads((left / "run.json").read_text())
     (left / "run.json").write_text(json.dumps(info | {"state": "interrupted"}))
+    reseal(left)
     (left / "of an earlier try").touch()
     before_it = weights(left)
     before = times(kept)
@@ -373,6 +374,7 @@ def test_a_killed_study_goes_on(
     shutil.rmtree(left)
     config = kept / "config.toml"  # as if it had been trained for as long as the one that is killed
     config.write_text(config.read_text().replace("env_steps = 96\n", "env_steps = 10000000\n"))
+    reseal(kept)
     before = times(kept)
     script = study.parent / "killed.py"
     script.write_text(KILLED.format(overrides={**small, "train.env_steps": 10_000_000}))
