@@ -53,7 +53,7 @@ class Ours:
 
         changed = {"engine": engine, "substeps": substeps, "episode_steps": episode}
         scenario = Scenario.model_validate(Scenario.preset("mixed").model_dump() | changed)
-        self.env = BatchEnv(scenario, num_envs, seed=0)
+        self.env = BatchEnv(scenario, num_envs, seed=0, copy=False)
         self.env.reset()
         self.radii = np.array([robot.radius_m for robot in scenario.robots], dtype=np.float32)
         self.speed = max(robot.max_speed_mps for robot in scenario.robots)

@@ -62,7 +62,8 @@ def scenario(engine: str, robots: int, victims: int, obstacles: int) -> Scenario
 def microseconds(engine: str, case: dict[str, int]) -> float:
     """Time of an env-step, µs: median of rounds."""
     world = scenario(engine, case["robots"], case["victims"], case["obstacles"])
-    with BatchEnv(world, case["batch"], seed=0, num_threads=case["threads"]) as env:
+    threads = case["threads"]
+    with BatchEnv(world, case["batch"], seed=0, num_threads=threads, copy=False) as env:
         env.reset()
         actions = np.random.default_rng(0).integers(0, 5, (16, case["batch"], case["robots"]))
         times = []

@@ -52,7 +52,7 @@ def rates(engine: str) -> dict[str, list[float]]:
     with ExitStack() as stack:
         envs = {
             name: stack.enter_context(
-                BatchEnv(MIXED.replace(engine=engine, faults=chosen), ENVS, seed=0)
+                BatchEnv(MIXED.replace(engine=engine, faults=chosen), ENVS, seed=0, copy=False)
             )
             for name, chosen in CASES.items()
         }

@@ -1,9 +1,10 @@
 """Types and shapes of the compiled half of innerattn. Use it through `innerattn.envs.BatchEnv`."""
 
+from collections.abc import Sequence
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["FAULT_KINDS", "REWARD_COMPONENTS", "Batch", "Rules", "__version__"]
 
@@ -45,9 +46,10 @@ class Batch:
     E envs, R robots, D columns of an observation, V victim slots, O obstacles, C reward components
     (`REWARD_COMPONENTS`), K kinds of faults (`FAULT_KINDS`).
 
-    Arrays returned by `step` and `reward_components` are read-only and valid until the step after
-    next; all others are fresh. Not to be used from two threads at once (RuntimeError), nor, with
-    several threads, in a child process after a fork (RuntimeError).
+    Arrays that are given are copied before they are checked. Those returned by `step` and
+    `reward_components` are read-only and valid until the step after next; all others are fresh. Not
+    to be used from two threads at once (RuntimeError), nor, with several threads, in a child
+    process after a fork (RuntimeError).
 
     Raises:
         ValueError: num_envs or num_threads out of range, or more threads than the system gives.
@@ -74,11 +76,11 @@ class Batch:
     def observation_names(self) -> list[str]:
         """Names of the D columns; units are m and m/s."""
 
-    def reset(self, seed: int | None, mask: NDArray[np.bool_] | None) -> NDArray[np.float32]:
+    def reset(self, seed: int | None, mask: ArrayLike | None) -> NDArray[np.float32]:
         """Start new episodes in the worlds of `mask` (E,); returns observations (E, R, D)."""
 
     def step(
-        self, actions: NDArray[np.integer] | NDArray[np.floating]
+        self, actions: ArrayLike
     ) -> tuple[
         NDArray[np.float32],
         NDArray[np.float32],
@@ -95,10 +97,14 @@ class Batch:
             (-1 for none).
 
         Raises:
-            TypeError: wrong dtype.
+            TypeError: wrong dtype, a masked array, or no array.
             ValueError: wrong shape, an action out of range or not a number (env and robot are
-                named), or a world whose episode is over. Nothing has moved then.
+                named), or a world that waits for a reset. Nothing has moved then.
+            innerattn.errors.WorldError: worlds failed in this step; all others have done it.
         """
+
+    def _panic_in_next_step(self, envs: Sequence[int]) -> None:
+        """For tests: let these worlds fail in the next step."""
 
     def reward_components(self) -> NDArray[np.float32]:
         """Rewards of the last step by component, (E, R, C)."""
@@ -124,13 +130,13 @@ class Batch:
     def episodes(self) -> NDArray[np.int64]:
         """Each env's episode, from 0, (E,)."""
 
-    def set_motion(self, positions: NDArray[np.float32], velocities: NDArray[np.float32]) -> None:
+    def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
         """Put the robots at positions (E, R, 2), m, with velocities (E, R, 2), m/s."""
 
     def fault_state(self) -> NDArray[np.float32]:
         """Levels of the faults in effect, (E, R, K)."""
 
-    def set_faults(self, levels: NDArray[np.float32], mask: NDArray[np.bool_] | None) -> None:
+    def set_faults(self, levels: ArrayLike, mask: ArrayLike | None) -> None:
         """Put levels (E, R, K) in place of the scenario's faults in the worlds of `mask` (E,).
 
         Raises:

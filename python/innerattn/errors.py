@@ -1,5 +1,7 @@
 """Exceptions that a user of innerattn can catch; each message is one line."""
 
+from collections.abc import Sequence
+
 
 def one_line(error: BaseException) -> str:
     """What an error says, in one line; of one that lacked memory, first of all that."""
@@ -33,3 +35,19 @@ class RunError(InnerattnError):
 
 class MissingLibraryError(InnerattnError):
     """A library that is no dependency is not installed; the message says how to install it."""
+
+
+class UnsealedRunWarning(UserWarning):
+    """A run was read that has no manifest: nothing tells whether its files are what they were."""
+
+
+class WorldError(InnerattnError, RuntimeError):
+    """Worlds failed inside compiled code; all others have done the step.
+
+    Those named wait at the start of their episodes for a reset: `env.reset(mask=...)`.
+    """
+
+    def __init__(self, message: str, envs: Sequence[int] = ()) -> None:
+        super().__init__(message)
+        self.envs = tuple(envs)
+        """Indices of the worlds in the batch, in order."""

@@ -1,22 +1,28 @@
 //! Many worlds over flat buffers: threads, checks at the door, autoreset. Worlds never meet here: the
 //! split over threads changes when a world is stepped, never what happens in it.
 
+mod buffers;
+mod shard;
+
 use std::iter::zip;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use innerattn_pool::Pool;
 
 use crate::error::{Error, Result};
 use crate::fault::{Levels, NUM_KINDS, SPECS};
 use crate::geometry::Vec2;
-use crate::physics::Workspace;
-use crate::reward::NUM_COMPONENTS;
-use crate::robot::{Commands, NUM_ACTIONS};
+use crate::robot::{Commands, MAX_SET_SPEED_MPS, NUM_ACTIONS};
 use crate::rules::Rules;
 use crate::scenario::Actions;
 use crate::snapshot;
 use crate::task::Rescue;
 use crate::world::World;
+
+pub use buffers::StepBuffers;
+pub use shard::Poll;
+use shard::{Shard, Stepping, Watch};
 
 /// Most worlds in a batch.
 pub const MAX_ENVS: usize = 1 << 20;
@@ -24,6 +30,8 @@ pub const MAX_ENVS: usize = 1 << 20;
 pub const MAX_THREADS: usize = 256;
 /// Shards for each thread, so that a busy one does not keep the others waiting.
 const SHARDS_PER_THREAD: usize = 16;
+/// A step is polled, and the worlds before it kept, after one that took at least this long.
+const LONG_STEP: Duration = Duration::from_millis(100);
 
 /// What happens when an episode ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,74 +57,40 @@ pub struct Options {
     pub autoreset: Autoreset,
 }
 
-/// Where a step writes: one buffer for each array, C order.
-pub struct StepBuffers<'a> {
-    /// Observations after the step and any autoreset, E × R × D.
-    pub obs: &'a mut [f32],
-    /// Observations after the step, before any autoreset, E × R × D.
-    pub final_obs: &'a mut [f32],
-    /// Rewards, E × R.
-    pub reward: &'a mut [f32],
-    /// Rewards by component, E × R × C.
-    pub components: &'a mut [f32],
-    /// Whether the scenario's goal ended the episode, E.
-    pub terminated: &'a mut [bool],
-    /// Whether time ended the episode, E.
-    pub truncated: &'a mut [bool],
-}
-
-impl StepBuffers<'_> {
-    /// Splits off the first `envs` worlds' part.
-    fn split(self, envs: usize, robots: usize, width: usize) -> (Self, Self) {
-        let rows = envs * robots;
-        let (obs, obs_rest) = self.obs.split_at_mut(rows * width);
-        let (final_obs, final_obs_rest) = self.final_obs.split_at_mut(rows * width);
-        let (reward, reward_rest) = self.reward.split_at_mut(rows);
-        let (components, components_rest) = self.components.split_at_mut(rows * NUM_COMPONENTS);
-        let (terminated, terminated_rest) = self.terminated.split_at_mut(envs);
-        let (truncated, truncated_rest) = self.truncated.split_at_mut(envs);
-        (
-            Self { obs, final_obs, reward, components, terminated, truncated },
-            Self {
-                obs: obs_rest,
-                final_obs: final_obs_rest,
-                reward: reward_rest,
-                components: components_rest,
-                terminated: terminated_rest,
-                truncated: truncated_rest,
-            },
-        )
-    }
-}
-
-/// Neighbouring worlds that one thread steps at a time.
-struct Shard {
-    first: usize,
-    worlds: Vec<World>,
-    workspace: Workspace,
-    rescues: Vec<Rescue>,
-}
-
 /// A batch of worlds of one scenario.
 pub struct Batch {
     rules: Arc<Rules>,
     shards: Vec<Shard>,
     pool: Pool,
     options: Options,
+    /// Worlds that panicked and wait for a reset, in order.
+    broken: Vec<usize>,
+    /// Worlds that are to panic in the next step, for tests.
+    doomed: Vec<usize>,
+    /// What the last step took.
+    last_step: Duration,
 }
 
 impl Batch {
+    /// Refuses an option that is not allowed.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] that names it and its range.
+    pub fn check(options: &Options) -> Result<()> {
+        argument("num_envs", options.num_envs, MAX_ENVS)?;
+        options.num_threads.map_or(Ok(()), |threads| argument("num_threads", threads, MAX_THREADS))
+    }
+
     /// Makes the worlds, each at the start of its episode 0.
     ///
     /// # Errors
     /// [`Error::Argument`] for an option that is not allowed, and for more threads than the system gives.
     pub fn new(rules: impl Into<Arc<Rules>>, options: Options) -> Result<Self> {
         let rules = rules.into();
-        argument("num_envs", options.num_envs, MAX_ENVS)?;
+        Self::check(&options)?;
         let available = std::thread::available_parallelism().map_or(1, usize::from);
         let worth = options.num_envs / rules.physics.envs_worth_a_thread();
         let threads = options.num_threads.unwrap_or(available.min(worth).clamp(1, MAX_THREADS));
-        argument("num_threads", threads, MAX_THREADS)?;
         let pool = Pool::new(threads).map_err(|error| Error::Argument {
             name: "num_threads",
             value: threads.to_string(),
@@ -125,16 +99,14 @@ impl Batch {
         let shards = if threads == 1 { 1 } else { threads * SHARDS_PER_THREAD };
         let length = options.num_envs.div_ceil(shards);
         let starts = (0..options.num_envs).step_by(length);
-        let shard = |first: usize| Shard {
-            first,
-            worlds: (first..options.num_envs.min(first + length))
-                .map(|env| World::new(&rules, options.seed, options.first_env + env as u64))
-                .collect(),
-            workspace: Workspace::default(),
-            rescues: Vec::new(),
+        let shard = |first: usize| {
+            let envs = first..options.num_envs.min(first + length);
+            let world = |env| World::new(&rules, options.seed, options.first_env + env as u64);
+            Shard::new(first, envs.map(world).collect())
         };
         let shards = starts.map(shard).collect();
-        Ok(Self { rules, shards, pool, options })
+        let (broken, doomed) = (vec![], vec![]);
+        Ok(Self { rules, shards, pool, options, broken, doomed, last_step: Duration::MAX })
     }
 
     /// What the worlds share.
@@ -172,6 +144,7 @@ impl Batch {
             world.begin(rules, if seed.is_some() { 0 } else { next });
             world.fresh = false;
         }
+        self.broken.retain(|env| mask.is_some_and(|mask| !mask[*env]));
         self.observe(obs);
     }
 
@@ -187,11 +160,30 @@ impl Batch {
     /// rescues in order of env.
     ///
     /// # Errors
-    /// [`Error::Action`] or [`Error::EpisodeOver`], before anything has moved.
+    /// [`Error::Action`], [`Error::EpisodeOver`] or [`Error::Broken`], before anything has moved;
+    /// [`Error::Panicked`] for worlds that panicked, after all others have done the step.
     pub fn step(&mut self, commands: Commands, buffers: StepBuffers) -> Result<Vec<Rescue>> {
-        self.check(commands)?;
+        self.step_polled(commands, buffers, None)
+    }
+
+    /// As [`Self::step`]. If steps take long, calls `poll` now and then, from this thread, between
+    /// worlds; where it returns true, the step ends and nothing has moved. That takes a copy of the worlds.
+    ///
+    /// # Errors
+    /// As [`Self::step`]; [`Error::Interrupted`] if the poll ended it.
+    pub fn step_polled(
+        &mut self,
+        commands: Commands,
+        buffers: StepBuffers,
+        poll: Option<Poll>,
+    ) -> Result<Vec<Rescue>> {
+        self.check_commands(commands)?;
+        let began = Instant::now();
+        let watch = poll.filter(|_| self.last_step >= LONG_STEP).map(Watch::new);
+        let doomed = std::mem::take(&mut self.doomed);
         let (rules, autoreset) = (&*self.rules, self.options.autoreset);
         let (robots, width) = (rules.team.len(), rules.layout.width());
+        let stepping = Stepping { rules, autoreset, commands, watch: watch.as_ref(), doomed: &doomed };
         let mut rest = buffers;
         let mut jobs = Vec::with_capacity(self.shards.len());
         for shard in &mut self.shards {
@@ -203,13 +195,30 @@ impl Batch {
             // Each job is taken once, so its lock is always free.
             let mut job = jobs[index].lock().unwrap_or_else(PoisonError::into_inner);
             let (shard, part) = &mut *job;
-            shard.step(rules, autoreset, commands, part);
+            shard.step(&stepping, part);
         });
-        Ok(self.shards.iter().flat_map(|shard| &shard.rescues).copied().collect())
+        drop(jobs);
+        let interrupted = watch.is_some_and(|watch| watch.stopped());
+        self.shards.iter_mut().for_each(|shard| shard.settle(interrupted));
+        if interrupted {
+            return Err(Error::Interrupted);
+        }
+        self.last_step = began.elapsed();
+        self.broken = self.shards.iter().flat_map(|shard| &shard.failures).map(|(env, _)| *env).collect();
+        match self.shards.iter().flat_map(|shard| &shard.failures).next() {
+            None => Ok(self.shards.iter().flat_map(|shard| &shard.rescues).copied().collect()),
+            Some((_, said)) => Err(Error::Panicked { envs: self.broken.clone(), message: said.clone() }),
+        }
+    }
+
+    /// Lets these worlds panic in the next step, to test what happens then.
+    #[doc(hidden)]
+    pub fn panic_in_next_step(&mut self, envs: Vec<usize>) {
+        self.doomed = envs;
     }
 
     /// Refuses actions of the wrong kind or number, out of range, or for a world whose episode is over.
-    fn check(&self, commands: Commands) -> Result<()> {
+    fn check_commands(&self, commands: Commands) -> Result<()> {
         let robots = self.rules.team.len();
         let place = |index: usize| (index / robots, index % robots);
         match commands {
@@ -238,6 +247,9 @@ impl Batch {
                 rule: format!("must be {wanted} {:?} values", self.rules.scenario.actions),
             });
         }
+        if let Some(env) = self.broken.first() {
+            return Err(Error::Broken { env: *env });
+        }
         match self.worlds().position(|world| world.over) {
             Some(env) => Err(Error::EpisodeOver { env }),
             None => Ok(()),
@@ -247,7 +259,7 @@ impl Batch {
     /// An image of all worlds.
     #[must_use]
     pub fn snapshot(&self) -> Vec<u8> {
-        snapshot::save(&self.rules, self.worlds())
+        snapshot::save(&self.rules, self.num_envs(), self.worlds())
     }
 
     /// Puts all worlds back into the state of an image; nothing changes if it is refused.
@@ -266,6 +278,7 @@ impl Batch {
         for shard in &mut self.shards {
             shard.worlds = worlds.by_ref().take(shard.worlds.len()).collect();
         }
+        self.broken.clear();
         Ok(())
     }
 
@@ -273,29 +286,29 @@ impl Batch {
     /// motion; rules and victims are left alone.
     ///
     /// # Errors
-    /// [`Error::Argument`] for numbers that are not finite or too many or few, and for places outside the
-    /// arena; nothing has changed then.
+    /// [`Error::Argument`] for too many or too few numbers, places outside the arena, speeds past
+    /// [`MAX_SET_SPEED_MPS`], and what is not a number; nothing has changed then.
     pub fn set_motion(&mut self, positions: &[f32], velocities: &[f32]) -> Result<()> {
         let robots = self.rules.team.len();
         for (name, values) in [("positions", positions), ("velocities", velocities)] {
             let wanted = self.options.num_envs * robots * 2;
-            if values.len() != wanted || !values.iter().all(|value| value.is_finite()) {
+            if values.len() != wanted {
                 let value = format!("{} values", values.len());
-                return Err(Error::Argument {
-                    name,
-                    value,
-                    rule: format!("must be {wanted} finite numbers"),
-                });
+                return Err(Error::Argument { name, value, rule: format!("must be {wanted} numbers") });
             }
         }
         let half = self.rules.scenario.arena_half_width_m as f32;
-        if let Some(index) = positions.iter().position(|value| value.abs() > half) {
-            let (env, robot) = (index / (2 * robots), index / 2 % robots);
-            return Err(Error::Argument {
-                name: "positions",
-                value: format!("{} (env {env}, robot {robot})", positions[index]),
-                rule: format!("must be in -{half}..={half} m"),
-            });
+        for (name, values, most, unit) in
+            [("positions", positions, half, "m"), ("velocities", velocities, MAX_SET_SPEED_MPS, "m/s")]
+        {
+            if let Some(index) = values.iter().position(|value| !(-most..=most).contains(value)) {
+                let (env, robot) = (index / (2 * robots), index / 2 % robots);
+                return Err(Error::Argument {
+                    name,
+                    value: format!("{} (env {env}, robot {robot})", values[index]),
+                    rule: format!("must be in -{most}..={most} {unit}"),
+                });
+            }
         }
         let vector = |pair: &[f32]| Vec2::new(pair[0], pair[1]);
         let rows = zip(positions.chunks_exact(2 * robots), velocities.chunks_exact(2 * robots));
@@ -337,33 +350,6 @@ impl Batch {
     }
 }
 
-impl Shard {
-    fn step(&mut self, rules: &Rules, autoreset: Autoreset, commands: Commands, buffers: &mut StepBuffers) {
-        let robots = rules.team.len();
-        let row = robots * rules.layout.width();
-        self.rescues.clear();
-        for (index, world) in self.worlds.iter_mut().enumerate() {
-            let components =
-                &mut buffers.components[index * robots * NUM_COMPONENTS..][..robots * NUM_COMPONENTS];
-            let reward = &mut buffers.reward[index * robots..][..robots];
-            let env = self.first + index;
-            let ending =
-                world.step(rules, &mut self.workspace, commands, env, &mut self.rescues, components, reward);
-            buffers.terminated[index] = ending.terminated;
-            buffers.truncated[index] = ending.truncated;
-            let obs = &mut buffers.obs[index * row..][..row];
-            let final_obs = &mut buffers.final_obs[index * row..][..row];
-            world.observe(rules, final_obs);
-            if ending.over() && autoreset == Autoreset::SameStep {
-                world.begin(rules, world.episode + 1);
-                world.observe(rules, obs);
-            } else {
-                obs.copy_from_slice(final_obs);
-            }
-        }
-    }
-}
-
 /// Refuses levels of a fault that are out of range or not numbers.
 fn check_levels(levels: &Levels, env: usize, robot: usize) -> Result<()> {
     for (spec, value) in zip(SPECS, levels) {
@@ -383,5 +369,7 @@ fn argument(name: &'static str, value: usize, most: usize) -> Result<()> {
     Err(Error::Argument { name, value: value.to_string(), rule: format!("must be in 1..={most}") })
 }
 
+#[cfg(test)]
+mod forged;
 #[cfg(test)]
 mod tests;

@@ -59,9 +59,39 @@ pub enum Error {
         /// Index of the env in the batch.
         env: usize,
     },
+    /// Worlds panicked during a step. All others have done it; these stand at the start of their episodes
+    /// and wait for a reset.
+    #[error("env {}: it failed in this step ({}); all others have done the step", listed(.envs), .message)]
+    Panicked {
+        /// Indices of the envs in the batch, in order.
+        envs: Vec<usize>,
+        /// What the first of them said, in one line.
+        message: String,
+    },
+    /// A step was asked of a world that panicked in an earlier one.
+    #[error("env {env}: it failed in an earlier step; reset it, or restore a snapshot, before the next")]
+    Broken {
+        /// Index of the env in the batch.
+        env: usize,
+    },
+    /// The caller's poll ended a step; the worlds are as they were before it.
+    #[error("the step was interrupted; nothing has moved")]
+    Interrupted,
     /// A snapshot cannot be restored here.
     #[error("snapshot: {0}")]
     Snapshot(String),
+}
+
+/// Most numbers that a message lists.
+const MOST_LISTED: usize = 20;
+
+/// Numbers with commas between them, the first of them if there are many.
+fn listed(numbers: &[usize]) -> String {
+    let shown: Vec<String> = numbers.iter().take(MOST_LISTED).map(usize::to_string).collect();
+    match numbers.len().saturating_sub(MOST_LISTED) {
+        0 => shown.join(", "),
+        more => format!("{} and {more} more", shown.join(", ")),
+    }
 }
 
 /// Result with this crate's [`enum@Error`].

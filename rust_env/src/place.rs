@@ -6,7 +6,8 @@ use crate::rng::Stream;
 use crate::robot::Body;
 use crate::scenario::Scenario;
 
-const DRAWS: usize = 512;
+/// Most draws for one place.
+pub const DRAWS: usize = 512;
 /// Gap between robots, and between robots and solids, at an episode's start, m.
 const START_GAP_M: f32 = 1e-3;
 
@@ -63,6 +64,18 @@ impl Placing {
         draw(stream, (self.arena - solid.reach()).max(0.0), |at| {
             smallest(placed.iter().map(|(other, centre)| other.distance(at - centre) - solid.reach()))
         })
+    }
+
+    /// Whether an obstacle without a given place may be there.
+    #[must_use]
+    pub fn may_be_obstacle(&self, solid: &Solid, at: Vec2) -> bool {
+        at.amax() <= (self.arena - solid.reach()).max(0.0)
+    }
+
+    /// Whether a victim may be there.
+    #[must_use]
+    pub fn may_be_victim(&self, at: Vec2) -> bool {
+        at.amax() <= self.arena - self.wall_clearance
     }
 
     /// A place for a robot, without overlap with solids and the `others` already placed.

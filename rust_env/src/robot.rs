@@ -6,6 +6,10 @@ use crate::scenario::{Actions, Scenario};
 /// Number of discrete actions: stay, +x, −x, +y, −y.
 pub const NUM_ACTIONS: usize = 5;
 
+/// Fastest that anyone may be put into motion, on each axis, m/s: no contact makes one of the fastest and
+/// heaviest team of a scenario faster.
+pub const MAX_SET_SPEED_MPS: f32 = 1e4;
+
 /// One robot's constants, read off a valid scenario.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Body {

@@ -24,6 +24,10 @@ pub const MAX_NEEDS: usize = 8;
 /// Most that the heaviest robot may weigh, in weights of the lightest: contacts are true up to here.
 pub const MAX_MASS_RATIO: f64 = 100.0;
 
+/// Farthest that a robot may move in a substep of rapier, in smallest radii: up to here nothing
+/// overlaps by more than a tenth of a radius.
+pub const MAX_TRAVEL_RADII: f64 = 3.0;
+
 /// When and how many victims appear (paper, section III).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::fault::NUM_KINDS;
+use crate::geometry::Vec2;
+use crate::robot::MAX_SET_SPEED_MPS;
 use crate::rules::Rules;
 use crate::world::World;
 
@@ -14,11 +16,27 @@ const KINDS: usize = 9;
 const _: () = assert!(NUM_KINDS == KINDS, "images hold a value for each kind: raise VERSION, then KINDS");
 const CHECKSUM_BYTES: usize = 4;
 
+/// Most episodes of a world: far more than anyone plays, and the next still has a number.
+const MOST_EPISODES: u64 = 1 << 53;
+
+/// What comes before the worlds.
 #[derive(Serialize, Deserialize)]
-struct Image<W> {
+struct Head {
     version: u32,
     scenario: String,
-    worlds: W,
+    num_envs: usize,
+}
+
+/// Most bytes of an image of so many worlds of these rules.
+#[must_use]
+pub fn most_bytes(rules: &Rules, num_envs: usize) -> usize {
+    // Numbers of 64 bits take at most 10 bytes, of 32 bits 5, floats 4; a list names its length, too.
+    let (robots, slots, width) = (rules.team.len(), rules.scenario.num_victims(), rules.layout.width());
+    let counts = 16 * 10;
+    let places = 8 * (2 * robots + rules.solids.len()) + (1 + 3 * 5 + 8) * slots;
+    let faults = 2 * 5 * rules.faults.len() + NUM_KINDS * (10 + 4 * robots) + robots * (11 + 4 * width);
+    let head = MAGIC.len() + 2 * 10 + rules.scenario.to_json().len() + CHECKSUM_BYTES;
+    head + num_envs * (counts + places + faults)
 }
 
 /// The image of `worlds`, which were made by `rules`.
@@ -26,10 +44,15 @@ struct Image<W> {
 /// # Panics
 /// Never: plain data always serialises.
 #[must_use]
-pub fn save<'a>(rules: &Rules, worlds: impl Iterator<Item = &'a World>) -> Vec<u8> {
-    let worlds: Vec<&World> = worlds.collect();
-    let image = Image { version: VERSION, scenario: rules.scenario.to_json(), worlds };
-    let mut bytes = postcard::to_extend(&image, MAGIC.to_vec()).expect("plain data serialises");
+pub fn save<'a>(rules: &Rules, num_envs: usize, worlds: impl Iterator<Item = &'a World>) -> Vec<u8> {
+    let head = Head { version: VERSION, scenario: rules.scenario.to_json(), num_envs };
+    let bytes = postcard::to_extend(&head, MAGIC.to_vec()).expect("plain data serialises");
+    let add = |bytes, world| postcard::to_extend(world, bytes).expect("plain data serialises");
+    sealed(worlds.fold(bytes, add))
+}
+
+/// Bytes with their checksum.
+fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let checksum = crc32fast::hash(&bytes);
     bytes.extend(checksum.to_le_bytes());
     bytes
@@ -37,10 +60,15 @@ pub fn save<'a>(rules: &Rules, worlds: impl Iterator<Item = &'a World>) -> Vec<u
 
 /// The worlds in `bytes`, if it is a whole image of `num_envs` worlds of the same scenario.
 ///
+/// The checksum finds damage. An image that was forged has a right one: every number is checked, too, so
+/// that what is accepted is a state that a world of this scenario may have.
+///
 /// # Errors
 /// [`Error::Snapshot`] that says what is wrong.
 pub fn load(rules: &Rules, num_envs: usize, bytes: &[u8]) -> Result<Vec<World>> {
     let refuse = |why: String| Err(Error::Snapshot(why));
+    let unread =
+        || Error::Snapshot(format!("the image cannot be read; this version reads version {VERSION}"));
     let Some((body, checksum)) = bytes.split_last_chunk::<CHECKSUM_BYTES>() else {
         return refuse(format!("{} bytes are too few", bytes.len()));
     };
@@ -50,79 +78,59 @@ pub fn load(rules: &Rules, num_envs: usize, bytes: &[u8]) -> Result<Vec<World>> 
     if crc32fast::hash(body).to_le_bytes() != *checksum {
         return refuse("the checksum does not match: bytes are missing or altered".into());
     }
-    let Ok(image) = postcard::from_bytes::<Image<Vec<World>>>(image) else {
-        return refuse(format!("the image cannot be read; this version reads version {VERSION}"));
-    };
-    if image.version != VERSION {
-        return refuse(format!("version {} was found; this version reads {VERSION}", image.version));
+    let (version, _) = postcard::take_from_bytes::<u32>(image).map_err(|_| unread())?;
+    if version != VERSION {
+        return refuse(format!("version {version} was found; this version reads {VERSION}"));
     }
-    if image.scenario != rules.scenario.to_json() {
+    let (head, mut rest) = postcard::take_from_bytes::<Head>(image).map_err(|_| unread())?;
+    if head.scenario != rules.scenario.to_json() {
         return refuse("it was made with another scenario".into());
     }
-    if image.worlds.len() != num_envs {
-        return refuse(format!("it holds {} envs; this batch has {num_envs}", image.worlds.len()));
+    if head.num_envs != num_envs {
+        return refuse(format!("it holds {} envs; this batch has {num_envs}", head.num_envs));
     }
-    match image.worlds.iter().position(|world| !fits(rules, world)) {
-        Some(env) => refuse(format!("env {env} does not fit the scenario")),
-        None => Ok(image.worlds),
+    let mut worlds = Vec::with_capacity(num_envs);
+    for env in 0..num_envs {
+        let (world, later) = postcard::take_from_bytes::<World>(rest).map_err(|_| unread())?;
+        if let Some(what) = misfit(rules, &world) {
+            return refuse(format!("env {env} does not fit the scenario: its {what}"));
+        }
+        worlds.push(world);
+        rest = later;
     }
+    if !rest.is_empty() {
+        return refuse(format!("{} bytes are left over after the last env", rest.len()));
+    }
+    Ok(worlds)
 }
 
-/// Whether a world's numbers are of the scenario's sizes and finite.
-fn fits(rules: &Rules, world: &World) -> bool {
-    let places = world.positions.iter().chain(&world.velocities).chain(&world.obstacles);
-    let victims = || world.victims.iter().flatten();
-    world.positions.len() == rules.team.len()
-        && world.velocities.len() == rules.team.len()
-        && world.obstacles.len() == rules.solids.len()
-        && world.victims.len() == rules.scenario.num_victims()
-        && world.faults.fits(rules)
-        && victims().all(|victim| (victim.task as usize) < rules.tasks.len())
-        && places
-            .copied()
-            .chain(victims().map(|victim| victim.position))
-            .all(|at| at.iter().all(|x| x.is_finite()))
+/// The first field of a world that no world of these rules may have. Every seed and stream is possible.
+fn misfit(rules: &Rules, world: &World) -> Option<&'static str> {
+    let (scenario, slots) = (&rules.scenario, rules.scenario.num_victims() as u64);
+    let turns = u64::from(world.step) + 1;
+    let time_is_up = world.step >= scenario.episode_steps;
+    let goal_is_reached = scenario.end_when_rescued.is_some_and(|goal| world.rescued >= goal);
+    let present = world.victims.iter().flatten().count() as u64;
+    let (arena, robots) = (scenario.arena_half_width_m as f32, rules.team.len());
+    let within = |vectors: &[Vec2], most: f32| {
+        vectors.iter().flat_map(Vec2::iter).all(|number| (-most..=most).contains(number))
+    };
+    let checks = [
+        ("episode", world.episode < MOST_EPISODES),
+        ("step", world.step <= scenario.episode_steps),
+        ("over", world.over == (time_is_up || goal_is_reached)),
+        ("fresh", !world.fresh || (world.episode == 0 && world.step == 0)),
+        ("rescued", u64::from(world.rescued) <= slots * u64::from(world.step)),
+        ("appeared", u64::from(world.appeared) == u64::from(world.rescued) + present),
+        ("victim_words", world.victim_words <= turns * rules.spawn.most_words()),
+        ("positions", world.positions.len() == robots && within(&world.positions, arena)),
+        ("velocities", world.velocities.len() == robots && within(&world.velocities, MAX_SET_SPEED_MPS)),
+        ("obstacles", rules.spawn.may_be_obstacles(&world.obstacles)),
+        ("victims", rules.spawn.may_be_victims(&world.victims, world.step, world.appeared)),
+        ("faults", world.faults.fits(rules, world.now())),
+    ];
+    checks.into_iter().find(|(_, fits)| !fits).map(|(what, _)| what)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::Vec2;
-    use crate::scenario::Scenario;
-
-    fn rules() -> Rules {
-        Rules::new(Scenario::default()).expect("a valid scenario")
-    }
-
-    /// Why worlds are refused that are no worlds of these rules, though the checksum is right.
-    fn refusal(change: impl Fn(&mut World)) -> String {
-        let rules = rules();
-        let mut worlds = [World::new(&rules, 0, 0), World::new(&rules, 0, 1)];
-        assert_eq!(load(&rules, 2, &save(&rules, worlds.iter())), Ok(worlds.to_vec()));
-        change(&mut worlds[1]);
-        load(&rules, 2, &save(&rules, worlds.iter())).expect_err("a forged image").to_string()
-    }
-
-    #[test]
-    fn worlds_that_do_not_fit_are_refused() {
-        let wanted = "snapshot: env 1 does not fit the scenario";
-        assert_eq!(refusal(|world| world.positions[2].x = f32::NAN), wanted);
-        assert_eq!(refusal(|world| world.velocities[0].y = f32::INFINITY), wanted);
-        assert_eq!(refusal(|world| world.positions.push(Vec2::zeros())), wanted);
-        assert_eq!(refusal(|world| world.velocities.clear()), wanted);
-        assert_eq!(refusal(|world| world.obstacles.push(Vec2::zeros())), wanted);
-        assert_eq!(refusal(|world| world.victims.clear()), wanted);
-        assert_eq!(refusal(|world| world.victims[0].as_mut().expect("one is present").task = 2), wanted);
-    }
-
-    #[test]
-    fn another_version_is_refused() {
-        let rules = rules();
-        let worlds: Vec<World> = vec![];
-        let image = Image { version: VERSION + 1, scenario: rules.scenario.to_json(), worlds };
-        let mut bytes = postcard::to_extend(&image, MAGIC.to_vec()).expect("plain data serialises");
-        bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
-        let error = load(&rules, 0, &bytes).expect_err("another version").to_string();
-        assert_eq!(error, "snapshot: version 3 was found; this version reads 2");
-    }
-}
+mod tests;

@@ -2,7 +2,7 @@
 //! Everything is drawn from the streams given, in a fixed order.
 
 use crate::geometry::{Solid, Vec2};
-use crate::place::{Placed, Placing};
+use crate::place::{DRAWS, Placed, Placing};
 use crate::rng::{Purpose, Stream};
 use crate::robot::Body;
 use crate::scenario::{Scenario, Situation};
@@ -89,6 +89,39 @@ impl Spawn {
             Situation::Single | Situation::Double => slots.iter().any(Option::is_none),
             Situation::Mixed => slots.iter().all(Option::is_none),
         }
+    }
+
+    /// Most words that are drawn from the victims' stream when it is their turn to appear.
+    #[must_use]
+    pub fn most_words(&self) -> u64 {
+        (1 + self.num_slots * (1 + 2 * DRAWS)) as u64
+    }
+
+    /// Whether obstacles may be at these places, as many as there are.
+    #[must_use]
+    pub fn may_be_obstacles(&self, obstacles: &[Vec2]) -> bool {
+        obstacles.len() == self.solids.len()
+            && self.solids.iter().zip(&self.given).zip(obstacles).all(|((solid, given), at)| match given {
+                Some(given) => given == at,
+                None => self.placing.may_be_obstacle(solid, *at),
+            })
+    }
+
+    /// Whether these victims may be present after `step` steps of an episode in which `appeared` have come.
+    #[must_use]
+    pub fn may_be_victims(&self, slots: &[Option<Victim>], step: u32, appeared: u32) -> bool {
+        let known = |slot: usize, victim: &Victim| {
+            let task = victim.task as usize;
+            let fits = if self.situation == Situation::Double { task == slot } else { task < self.num_tasks };
+            let earlier = slots[..slot].iter().flatten();
+            fits && victim.id < appeared
+                && victim.appeared_step <= step
+                && earlier.clone().all(|other| other.id != victim.id)
+                && self.placing.may_be_victim(victim.position)
+        };
+        slots.len() == self.num_slots
+            && !self.wants_victims(slots)
+            && slots.iter().enumerate().all(|(slot, victim)| victim.is_none_or(|victim| known(slot, &victim)))
     }
 
     /// Lets victims appear at `step` in the empty slots that the situation wants to be filled, and counts

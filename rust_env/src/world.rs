@@ -88,6 +88,17 @@ impl World {
         world
     }
 
+    /// About the most memory that a world takes, bytes; its faults only if the scenario has some.
+    #[must_use]
+    pub fn most_bytes(rules: &Rules) -> usize {
+        let (robots, faults) = (rules.team.len(), rules.faults.len());
+        let places = (2 * robots + rules.solids.len()) * size_of::<Vec2>();
+        let victims = rules.scenario.num_victims() * size_of::<Option<Victim>>();
+        let struck = if faults == 0 { 0 } else { FaultState::most_bytes(robots, rules.layout.width()) };
+        // Allocators round up, and keep a little beside each list.
+        size_of::<Self>() + (places + victims + struck + 8 * faults) * 9 / 8 + 8 * 16
+    }
+
     /// Starts `episode`: places everything anew from that episode's streams.
     pub fn begin(&mut self, rules: &Rules, episode: u64) {
         self.episode = episode;
@@ -252,7 +263,9 @@ impl World {
         }
     }
 
-    fn now(&self) -> Moment {
+    /// The moment that its strikes and noise are drawn for.
+    #[must_use]
+    pub fn now(&self) -> Moment {
         Moment { seed: self.seed, stream: self.stream, episode: self.episode, step: self.step }
     }
 }

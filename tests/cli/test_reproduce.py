@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from in_turn import do_in_turn
+from reseal import reseal
 
 from innerattn.cli.main import main
 from innerattn.errors import RunError
@@ -127,6 +128,7 @@ def test_another_configuration_is_named_and_neither_used_nor_changed(
     foreign = study / "runs" / NAMES[0]
     config = foreign / "config.toml"
     config.write_text(config.read_text().replace("polyak = 0.02\n", "polyak = 0.03\n"))
+    reseal(foreign)
     before = times(foreign)
     assert command("fig4", study, "td-inner,td-uniform", "--seeds", "2") == 1
     out, err = capsys.readouterr()
@@ -313,6 +315,7 @@ def test_an_unfinished_run_is_trained_again(study: Path, command: Command) -> No
     left, kept = (study / "runs" / name for name in NAMES)
     info = json.loads((left / "run.json").read_text())
     (left / "run.json").write_text(json.dumps(info | {"state": "interrupted"}))
+    reseal(left)
     (left / "of an earlier try").touch()
     before_it = weights(left)
     before = times(kept)
@@ -390,6 +393,7 @@ def test_a_killed_study_goes_on(
     shutil.rmtree(left)
     config = kept / "config.toml"  # as if it had been trained for as long as the one that is killed
     config.write_text(config.read_text().replace("env_steps = 96\n", "env_steps = 10000000\n"))
+    reseal(kept)
     before = times(kept)
     script = study.parent / "killed.py"
     script.write_text(KILLED.format(overrides={**small, "train.env_steps": 10_000_000}))

@@ -157,6 +157,7 @@ def test_unknown_keys_are_named() -> None:
         ({"num_threads": 257}, ValueError, "num_threads = 257: must be in 1..=256"),
         ({"first_env": -1}, ValueError, "first_env = -1: must be in 0..="),
         ({"autoreset": "next_step"}, ValueError, "autoreset = 'next_step': must be"),
+        ({"copy": "no"}, TypeError, "copy = 'no': must be True or False"),
     ],
 )
 def test_bad_options_are_refused(options: dict, error: type[Exception], message: str) -> None:
@@ -174,7 +175,7 @@ def test_bad_resets_and_motions_change_nothing() -> None:
     outside[2, 1, 0] = -0.61
     for error, message, attempt in [
         (TypeError, "mask has dtype int64", lambda: env.reset(mask=[1, 0, 1])),
-        (TypeError, "mask has dtype", lambda: env.reset(mask=[[True, False, True]])),
+        (ValueError, "mask has shape", lambda: env.reset(mask=[[True, False, True]])),
         (ValueError, "mask has shape", lambda: env.reset(mask=[True, False])),
         (ValueError, "seed = -1", lambda: env.reset(seed=-1)),
         (TypeError, "seed = 0.5", lambda: env.reset(seed=0.5)),
@@ -185,6 +186,11 @@ def test_bad_resets_and_motions_change_nothing() -> None:
             lambda: env.set_motion(outside, places),
         ),
         (ValueError, "velocities", lambda: env.set_motion(places, spoilt)),
+        (
+            ValueError,
+            r"velocities = 10001 \(env 0, robot 0\): must be in -10000\.\.=10000 m/s",
+            lambda: env.set_motion(places, np.full_like(places, 10001.0)),
+        ),
         (ValueError, r"positions has shape .*must be", lambda: env.set_motion(places[:2], places)),
         (ValueError, r"positions has shape \(4, 2\)", lambda: env.set_motion(places[0], places)),
     ]:

@@ -1,7 +1,9 @@
 """Snapshots of a batch continue bit for bit, or are refused."""
 
+import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from innerattn.config import Scenario
 
 CONTINUE = """
 import sys
+import zlib
 from pathlib import Path
 import numpy as np
 from innerattn.config import Scenario
@@ -87,3 +90,65 @@ def test_foreign_snapshots_are_refused(other, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         env.restore(other().snapshot())
     assert env.snapshot() == before
+
+
+def sealed(body: bytes) -> bytes:
+    """Bytes with the checksum that a forger would give them."""
+    return body + zlib.crc32(body).to_bytes(4, "little")
+
+
+@pytest.mark.parametrize("engine", ["discs", "rapier"])
+@pytest.mark.parametrize(
+    ("kind", "forged"),
+    [("speed_limit", -1.0), ("speed_limit", np.nan), ("motor_gain", 1e30), ("heading_bias", 9.0)],
+)
+def test_a_forged_fault_is_refused(engine: str, kind: str, forged: float) -> None:
+    env = batch(2, CROWDED.replace(engine=engine))
+    before, faults = env.snapshot(), env.fault_state()
+    faults[kind] = 0.4375
+    env.set_faults(faults)
+    body = env.snapshot()[:-4]
+    level = struct.pack("<f", 0.4375)
+    assert body.count(level) == 8
+    env.restore(before)
+    with pytest.raises(ValueError, match=r"^snapshot: env 0 does not fit the scenario: its faults"):
+        env.restore(sealed(body.replace(level, struct.pack("<f", forged))))
+    assert env.snapshot() == before
+
+
+def test_robots_outside_the_arena_are_refused() -> None:
+    env = batch(2)
+    places = env.positions()
+    places[1, 2] = 0.4375, -0.3125
+    env.set_motion(places, env.velocities())
+    body, inside = env.snapshot()[:-4], struct.pack("<ff", 0.4375, -0.3125)
+    assert body.count(inside) == 1
+    with pytest.raises(ValueError, match=r"^snapshot: env 1 does not fit .*: its positions"):
+        env.restore(sealed(body.replace(inside, struct.pack("<ff", 0.4375, -0.75))))
+
+
+@pytest.mark.parametrize("engine", ["discs", "rapier"])
+def test_forged_snapshots_are_refused_or_go_on(engine: str) -> None:
+    """What a forger gets accepted is a state that the scenario allows: worlds go on from it."""
+    env = batch(2, CROWDED.replace(engine=engine))
+    for action in plan(20, 2):
+        env.step(action)
+    body = env.snapshot()[:-4]
+    chance = np.random.default_rng(0)
+    start = len(body) - 500
+    accepted = refused = 0
+    for action in plan(3000, 2):
+        forged = bytearray(body)
+        for _ in range(chance.integers(1, 4)):
+            forged[chance.integers(start, len(body))] = chance.integers(256)
+        try:
+            env.restore(sealed(bytes(forged)))
+        except ValueError:
+            refused += 1
+            continue
+        accepted += 1
+        env.step(action)
+        assert np.isfinite(env.observe()).all()
+        assert (abs(env.positions()) <= CROWDED.arena_half_width_m).all()
+    assert accepted > 50
+    assert refused > 500

@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from reseal import reseal
 
 from innerattn.errors import RunError
 from innerattn.experiments.archive import FILE, FORMAT, read_archive, write_archive
@@ -139,6 +140,7 @@ def test_records_without_a_label_of_their_length_are_told_apart(
             assert record.pop("length") in ("standard", "long")
         metadata = {"innerattn.records": json.dumps(head)}
         pq.write_table(table.replace_schema_metadata(metadata), target)
+    reseal(folder)
     older = read_run(runs[0].case, folder)
     assert [record.num_episodes for record in older.scored] == [
         record.num_episodes for record in runs[0].scored

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from reseal import reseal
 
 from innerattn.errors import RunError
 from innerattn.experiments.failures import forget_failures, note_failure
@@ -30,6 +31,7 @@ def edit(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
     document = json.loads(path.read_text())
     change(document)
     path.write_text(json.dumps(document))
+    reseal(path.parent if path.name == "run.json" else path.parents[1])
 
 
 def test_finished_and_missing(study: Path, planned: list[PlannedRun]) -> None:
@@ -84,6 +86,7 @@ def test_an_evaluation_of_another_version_is_left_alone(
 ) -> None:
     path = planned[0].folder / "evaluation" / "summary.json"
     path.write_text('{"schema_version": 2, "what comes then": []}')
+    reseal(path.parents[1])
     found = find(planned, study)
     assert (found.state, found.why) == ("unreadable", f"{path}: schema_version = 2: must be 1")
 
@@ -93,6 +96,7 @@ def test_another_configuration_is_named_with_both_values(
 ) -> None:
     file = planned[0].folder / "config.toml"
     file.write_text(file.read_text().replace("polyak = 0.02\n", "polyak = 0.03\n"))
+    reseal(file.parent)
     expected = "td.polyak = 0.03, planned 0.02"
     assert find(planned, study) == RunStatus(planned[0], "other_configuration", expected)
 
@@ -128,6 +132,7 @@ def test_a_key_that_came_later_has_its_default(study: Path, planned: list[Planne
     text = file.read_text()
     assert "polyak = 0.02\n" in text
     file.write_text(text.replace("polyak = 0.02\n", ""))
+    reseal(file.parent)
     assert find(planned, study).state == "finished"
 
 

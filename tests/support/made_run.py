@@ -16,6 +16,7 @@ from innerattn.measures.registry import needed_fields
 from innerattn.measures.summary import summarise
 from innerattn.policies import SCRIPTED, scripted_policy
 from innerattn.records.record import Record
+from innerattn.records.run_files import RunFiles, seal
 
 RECORDED, SCORED, LONG, LONG_STEPS, HEADS, ROBOTS = 40, 60, 2, 30, 2, 4
 LOGGED = 12
@@ -64,6 +65,7 @@ def made_run(
     summary = summarise(path.name, recorded, standard, longer)
     parts = [record for group in (standard, longer) for all_ in group.values() for record in all_]
     Evaluation(summary, tuple(parts)).write(path / "evaluation")
+    seal(path, RunFiles(path).info)
     return read_run(Case(situation, method, seed), path)
 
 

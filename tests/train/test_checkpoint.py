@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from reseal import reseal
 
 from innerattn.config import RunConfig, read_toml
 from innerattn.envs import BatchEnv
@@ -97,6 +98,7 @@ def test_a_newer_checkpoint_is_the_one_loaded(run: Path) -> None:
     folder = RunFolder(run, read_info(run))
     state = {name: tensor + 1 for name, tensor in learner.state().items()}
     folder.save_weights(state, 10_000)
+    folder.mark("done", 10_000, 1, 1.0)
     _, newer = load_policy(run)
     assert all(torch.equal(tensor, state[name]) for name, tensor in newer.state().items())
 
@@ -181,6 +183,7 @@ def test_weights_of_other_networks_are_refused(run: Path) -> None:
     text = (run / "config.toml").read_text()
     assert "hidden_width = 16" in text
     (run / "config.toml").write_text(text.replace("hidden_width = 16", "hidden_width = 32"))
+    reseal(run)
     assert "weights.safetensors" in refusal(run)
 
 
@@ -200,6 +203,7 @@ def test_a_folder_from_before_networks_were_a_choice_is_read(
     text = (run / "config.toml").read_text()
     assert text.count(line) == 1
     (run / "config.toml").write_text(text.replace(line, ""))
+    reseal(run)
     assert load_policy(run)[0] == small_config()
 
 
@@ -220,6 +224,7 @@ def test_robots_of_a_kind_share_what_comes_back(
     assert len(hidden) == (2 if method == "td-inner" else 0)
     text = (run / "config.toml").read_text()
     (run / "config.toml").write_text(text.replace('sharing = "kind"', 'sharing = "none"'))
+    reseal(run)
     assert "weights.safetensors" in refusal(run)
 
 
@@ -234,4 +239,5 @@ def test_networks_by_entities_come_back(
     assert "actor.first.victim.weight" in learner.state()
     text = (run / "config.toml").read_text()
     (run / "config.toml").write_text(text.replace('"entities"', '"flat"'))
+    reseal(run)
     assert "weights.safetensors" in refusal(run)

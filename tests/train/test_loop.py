@@ -27,6 +27,7 @@ def test_a_finished_run_holds_what_is_promised(finished_run: Path) -> None:
     assert files(finished_run) == {
         "config.toml",
         "run.json",
+        "manifest.json",
         "metrics.jsonl",
         "checkpoints/latest",
         "checkpoints/600/weights.safetensors",

@@ -1,6 +1,8 @@
 """Weights come back as they were written, or not at all."""
 
+import json
 import pickle
+import time
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from innerattn.train.weights import (
     SCHEMA_VERSION,
     digest_of,
     read_weights,
+    weights_in,
     write_weights,
 )
 
@@ -138,3 +141,48 @@ def test_a_link_is_refused(file: Path) -> None:
     link = file.with_name("link.safetensors")
     link.symlink_to(file)
     assert "plain file" in refusal(link)
+
+
+def header(length: int | None = None, **tensors: object) -> bytes:
+    own = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "sha256": 64 * "0"}
+    text = json.dumps({"__metadata__": own} | tensors).encode()
+    return (len(text) if length is None else length).to_bytes(8, "little") + text
+
+
+HOSTILE = {
+    "nothing": b"",
+    "a header of all memory": header(2**62),
+    "a header longer than the file": header(2**20),
+    "a million tensors": header(
+        **{f"t{i}": {"dtype": "F32", "shape": [0], "data_offsets": [0, 0]} for i in range(10**6)}
+    ),
+    "a tensor of all memory": header(
+        t={"dtype": "F32", "shape": [2**40], "data_offsets": [0, 2**42]}
+    ),
+    "a tensor past all numbers": header(
+        t={"dtype": "F32", "shape": [2**62, 2**62], "data_offsets": [0, 0]}
+    ),
+    "tensors in one place": header(
+        a={"dtype": "F32", "shape": [0], "data_offsets": [0, 0]},
+        b={"dtype": "F32", "shape": [1], "data_offsets": [0, 4]},
+    ),
+    "deep": header(a=json.loads(60 * "[" + 60 * "]"), data_offsets=[]),
+    "metadata of numbers": header(__metadata__=[1]),
+}
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+def test_hostile_headers_are_refused_at_once(tmp_path: Path, what: str) -> None:
+    file = tmp_path / "weights.safetensors"
+    file.write_bytes(HOSTILE[what])
+    began = time.monotonic()
+    with pytest.raises(RunError, match=r"weights\.safetensors: not"):
+        read_weights(file)
+    assert time.monotonic() - began < 2.0
+
+
+def test_weights_of_a_policy_are_finite(tmp_path: Path) -> None:
+    file = tmp_path / "weights.safetensors"
+    write_weights(file, {"a": torch.ones(2), "b": torch.tensor([1.0, float("nan")])})
+    with pytest.raises(RunError, match=r"weights\.safetensors: a value of b is not finite"):
+        weights_in(file.read_bytes(), file)

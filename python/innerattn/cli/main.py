@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated, Any
@@ -27,7 +28,7 @@ from innerattn.cli.robustness import Robustness
 from innerattn.cli.train import command_type
 from innerattn.cli.watch import Watch
 from innerattn.cores import let_waiting_threads_sleep
-from innerattn.errors import needs_no_traceback, one_line
+from innerattn.errors import UnsealedRunWarning, needs_no_traceback, one_line
 
 _DESCRIPTION = "Train teams of unlike robots to rescue together, and measure how they do it."
 
@@ -50,7 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # better a "?" than no table at all
     let_waiting_threads_sleep()
     try:
-        with _stopped_like_by_hand():
+        with _stopped_like_by_hand(), _plain_warnings():
             return int(_parse(argv).run())
     except KeyboardInterrupt:
         print("innerattn: interrupted", file=sys.stderr)
@@ -79,6 +80,24 @@ def _stopped_like_by_hand() -> Iterator[None]:
     finally:
         for one in changed:
             signal.signal(one, signal.SIG_DFL)
+
+
+@contextmanager
+def _plain_warnings() -> Iterator[None]:
+    """Show what we warn of in one line, as errors are."""
+    shown = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+        if issubclass(category, UnsealedRunWarning):
+            print(f"innerattn: warning: {message}", file=sys.stderr)
+        else:
+            shown(message, category, *rest, **more)
+
+    warnings.showwarning = show
+    try:
+        yield
+    finally:
+        warnings.showwarning = shown
 
 
 def _parse(argv: list[str]) -> Any:

@@ -5,14 +5,17 @@ It knows no key of any model.
 
 from __future__ import annotations
 
+import errno
 import os
+import secrets
 import tomllib
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from innerattn.errors import ConfigError
+from innerattn.config.untrusted import MOST_TOML_BYTES, parse_toml, read_plain
+from innerattn.errors import ConfigError, RunError
 
 PRESETS = files("innerattn.config") / "presets"
 """Folder of the built-in presets."""
@@ -47,13 +50,28 @@ def toml_table(path: str | Path) -> dict[str, Any]:
     """The table in the TOML file at ``path``.
 
     Raises:
-        ConfigError: the file cannot be read, or is not TOML.
+        ConfigError: the file cannot be read, is no plain file, or is not TOML.
     """
     try:
-        return tomllib.loads(Path(path).read_text("utf-8"))
+        if not os.path.exists(path):
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
+        data = read_plain(Path(path), MOST_TOML_BYTES, follow_link=True)
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except RunError as error:
+        raise ConfigError(str(error)) from error
+    return toml_table_in(data, path)
+
+
+def toml_table_in(data: bytes, path: str | Path) -> dict[str, Any]:
+    """The table in the bytes of the TOML file at ``path``.
+
+    Raises:
+        ConfigError: they are not TOML.
+    """
+    try:
+        return parse_toml(data.decode("utf-8"))
+    except ValueError as error:
         raise ConfigError(f"{path} is not a TOML file: {error}") from error
 
 
@@ -63,9 +81,10 @@ def write_whole(path: Path, data: bytes) -> None:
     Raises:
         OSError: the file cannot be written; no partial file is left.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    partial = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(8)}")
     try:
-        with partial.open("wb") as file:
+        # "x": a file or link that somebody planted there is never written to.
+        with partial.open("xb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

@@ -13,7 +13,13 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
-from innerattn.config.files import budget_table, preset_table, toml_table, write_whole
+from innerattn.config.files import (
+    budget_table,
+    preset_table,
+    toml_table,
+    toml_table_in,
+    write_whole,
+)
 from innerattn.config.model import config_error
 from innerattn.config.registry import methods
 from innerattn.config.run import RunConfig
@@ -93,6 +99,15 @@ def read_toml(path: str | Path) -> RunConfig:
         ConfigError: the file cannot be read, is not TOML, or holds no valid configuration.
     """
     return _validated(toml_table(path), str(path))
+
+
+def config_in(data: bytes, path: str | Path) -> RunConfig:
+    """The configuration in the bytes of the file at ``path``.
+
+    Raises:
+        ConfigError: as of `read_toml`.
+    """
+    return _validated(toml_table_in(data, path), str(path))
 
 
 def _validated(table: dict[str, Any], source: str = "") -> RunConfig:

@@ -54,11 +54,15 @@ class BatchEnv(Shown):
     """E rescue worlds of one scenario, stepped together by compiled code on several threads.
 
     Autoreset is Gymnasium's SAME_STEP: on an episode's last step `obs` is the next episode's
-    first already and `final_obs` holds the last of the old one. What a step gives are C-contiguous
-    read-only views of buffers owned by the environment, valid until the step after next, which
-    gives the same array objects again: change neither their shape nor their dtype in place, and
-    let no thread read them while another steps. `copy=True` gives fresh arrays, as `reset` and
-    `observe` always do.
+    first already and `final_obs` holds the last of the old one. A step gives arrays of your own,
+    as `reset` and `observe` do. With `copy=False` it lends C-contiguous read-only views of buffers
+    owned by the environment. They are valid until the step after next, which gives the same array
+    objects again: change neither their shape nor their dtype in place, and let no thread read them
+    while another steps. That saves time in loops that copy what they keep.
+
+    A step that takes long looks for Ctrl-C on the way; if that raises, nothing has moved. Worlds
+    that fail inside compiled code are named by a `WorldError`; all others have done the step.
+
     World i depends on scenario, seed, `first_env + i` and its actions alone, whatever the number of
     threads or worlds. The scenario was checked when it was made; what it does not say (sizes, seed,
     memory) is checked here.
@@ -69,7 +73,7 @@ class BatchEnv(Shown):
         seed: seed of all random streams, 0 to 2**64 - 1.
         num_threads: 1 to 256; as many cores as are worth it if None.
         autoreset: "same_step", or "disabled" to leave ended worlds until `reset(mask=...)`.
-        copy: let steps return fresh arrays instead of views.
+        copy: let steps return arrays of your own; views if False.
         first_env: number of the first world's random streams, for batches split over processes.
 
     Raises:
@@ -90,7 +94,7 @@ class BatchEnv(Shown):
         num_threads: int | None = None,
         *,
         autoreset: Autoreset = "same_step",
-        copy: bool = False,
+        copy: bool = True,
         first_env: int = 0,
     ) -> None:
         if not isinstance(scenario, (Scenario, str)):
@@ -99,6 +103,8 @@ class BatchEnv(Shown):
                 "Scenario.from_toml reads a file"
             )
         self.scenario = Scenario.preset(scenario) if isinstance(scenario, str) else scenario
+        if not isinstance(copy, bool):
+            raise TypeError(f"copy = {copy!r}: must be True or False")
         if autoreset not in ("same_step", "disabled"):
             raise ValueError(f"autoreset = {autoreset!r}: must be 'same_step' or 'disabled'")
         self._batch: _core.Batch | None = _core.Batch(
@@ -134,7 +140,7 @@ class BatchEnv(Shown):
         """
         if seed is not None:
             seed = _whole("seed", seed, 0, 2**64 - 1)
-        return self._core.reset(seed, self._mask(mask))
+        return self._core.reset(seed, mask)
 
     def step(self, actions: ArrayLike) -> Step:
         """Do one control step in every world.
@@ -143,13 +149,17 @@ class BatchEnv(Shown):
             actions: (E, R) integers (0 stay, 1 +x, 2 -x, 3 +y, 4 -y), or (E, R, 2) floats in
                 [-1, 1] when the scenario's actions are continuous.
 
+        The actions are copied before they are checked: no other thread can change them on the way.
+
         Raises:
-            TypeError: wrong dtype.
+            TypeError: wrong dtype, a masked array, or no array at all.
             ValueError: wrong shape, an action out of range or not a number (env and robot are
-                named), or a world whose episode is over (autoreset disabled). Nothing has moved
-                then.
+                named), or a world that waits for a reset: its episode is over (autoreset
+                disabled), or it failed. Nothing has moved then.
+            WorldError: worlds failed in this step; `envs` names them. All others have done it.
+            KeyboardInterrupt: Ctrl-C during a long step; nothing has moved.
         """
-        step = Step._make(self._core.step(np.asarray(actions)))
+        step = Step._make(self._core.step(actions))
         return Step._make(array.copy() for array in step) if self._copy else step
 
     def observation_names(self) -> list[str]:
@@ -212,41 +222,40 @@ class BatchEnv(Shown):
             mask: (E,) bool, the worlds to change; all if None.
 
         Raises:
-            TypeError: other fields, or a mask that is not bool.
+            TypeError: other fields, fields that are no numbers, a masked array, or a mask that is
+                not bool.
             ValueError: wrong shape, or a value out of range or not a number in a world of the mask
                 (kind, env and robot are named). Nothing has changed then.
         """
-        table = np.asarray(faults)
-        if table.dtype.names != FAULT_KINDS:
-            raise TypeError(
-                f"faults has dtype {table.dtype}: must have the fields {', '.join(FAULT_KINDS)}"
-            )
-        if table.ndim != 2:
-            raise ValueError(
-                f"faults has shape {table.shape}: must be ({self.num_envs}, {self.num_robots})"
-            )
-        levels = np.stack([table[kind].astype(np.float32) for kind in FAULT_KINDS], axis=-1)
-        self._core.set_faults(levels, self._mask(mask))
+        wanted = f"must have shape ({self.num_envs}, {self.num_robots}) and a number in each field"
+        if isinstance(faults, np.ma.MaskedArray):
+            raise TypeError(f"faults is a masked array, whose mask would be lost: it {wanted}")
+        if not isinstance(faults, np.ndarray) or faults.dtype.names != FAULT_KINDS:
+            found = f"has dtype {faults.dtype}" if isinstance(faults, np.ndarray) else "is no array"
+            raise TypeError(f"faults {found}: must have the fields {', '.join(FAULT_KINDS)}")
+        if faults.shape != (self.num_envs, self.num_robots):
+            raise ValueError(f"faults has shape {faults.shape}: {wanted}")
+        levels = np.empty((*faults.shape, len(FAULT_KINDS)))
+        for column, kind in enumerate(FAULT_KINDS):
+            field = np.asarray(faults[kind])
+            if field.dtype.kind not in "iuf" or field.dtype.itemsize > 8 or field.ndim != 2:
+                raise TypeError(f"faults[{kind!r}] has dtype {faults.dtype[kind]}: {wanted}")
+            levels[..., column] = field
+        self._core.set_faults(levels, mask)
 
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
         """Put the robots somewhere else, for studies of motion; rules and victims are left alone.
 
         Args:
-            positions: (E, R, 2), m.
-            velocities: (E, R, 2), m/s.
+            positions: (E, R, 2) integers or floats, m, inside the arena.
+            velocities: (E, R, 2) integers or floats, m/s, at most 10,000 on each axis.
 
         Raises:
-            ValueError: wrong shape, numbers that are not finite, or places outside the arena.
+            TypeError: wrong dtype, a masked array, or no array at all.
+            ValueError: wrong shape, or a number out of range (env and robot are named). Nothing has
+                changed then.
         """
-        given = {"positions": positions, "velocities": velocities}
-        arrays = {
-            name: np.require(values, np.float32, ("C", "A")) for name, values in given.items()
-        }
-        for name, array in arrays.items():
-            if array.ndim != 3:
-                wanted = (self.num_envs, self.num_robots, 2)
-                raise ValueError(f"{name} has shape {array.shape}: must be {wanted}")
-        self._core.set_motion(**arrays)
+        self._core.set_motion(positions, velocities)
 
     def snapshot(self) -> bytes:
         """Image of all worlds, with a checksum; `restore` continues from it bit for bit."""
@@ -256,7 +265,8 @@ class BatchEnv(Shown):
         """Put all worlds back into an image's state, made by any batch of this size and scenario.
 
         Raises:
-            ValueError: truncated, altered or foreign bytes; nothing has changed then.
+            TypeError: no bytes.
+            ValueError: truncated, altered, forged or foreign bytes; nothing has changed then.
         """
         self._core.restore(image)
 
@@ -280,15 +290,6 @@ class BatchEnv(Shown):
         if self._batch is None:
             raise RuntimeError("this environment is closed")
         return self._batch
-
-    def _mask(self, mask: ArrayLike | None) -> NDArray[np.bool_] | None:
-        chosen = None if mask is None else np.asarray(mask)
-        if chosen is not None and (chosen.dtype != np.bool_ or chosen.ndim != 1):
-            raise TypeError(
-                f"mask has dtype {chosen.dtype} and shape {chosen.shape}: "
-                f"must be bool of shape ({self.num_envs},)"
-            )
-        return chosen
 
     def _lend(self, array: Array) -> Array:
         return array.copy() if self._copy else array

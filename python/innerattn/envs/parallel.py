@@ -88,7 +88,7 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         self.scenario = scenario
         self.render_mode = render_mode
         self.max_cycles = scenario.episode_steps
-        self._env = BatchEnv(scenario, 1, seed, num_threads=1, autoreset="disabled")
+        self._env = BatchEnv(scenario, 1, seed, num_threads=1, autoreset="disabled", copy=False)
         self.possible_agents = list(self._env.robot_names)
         self.agents: list[str] = []
         self._started = False

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from innerattn.config import EvaluateConfig, Scenario, refuse_late_faults
 from innerattn.config.files import write_whole
+from innerattn.errors import RunError
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
 from innerattn.measures.registry import needed_fields
@@ -19,6 +20,7 @@ from innerattn.measures.summary import Summary, summarise
 from innerattn.policies import SCRIPTED, Policy, scripted_policy
 from innerattn.records.parquet import write_records
 from innerattn.records.record import FIELDS, Record
+from innerattn.records.run_files import amend
 from innerattn.shown import Shown
 from innerattn.train.build import thread_count, torch_threads
 
@@ -36,12 +38,18 @@ class Evaluation(Shown):
     def write(self, folder: str | Path) -> None:
         """Write ``summary.json`` and the records into ``folder``, which is made if needed.
 
+        In a run that is sealed, they take their place in its manifest.
+
         Raises:
             OSError: the files cannot be written.
+            RunError: ``folder`` is a link, or the run's manifest is damaged.
         """
+        if Path(folder).is_symlink():
+            raise RunError(f"{folder}: is a link; nothing is written through it")
         write_records(self.records, Path(folder))
         text = json.dumps(self.summary.to_json(), indent=1, allow_nan=False)
         write_whole(Path(folder) / "summary.json", f"{text}\n".encode())
+        amend(Path(folder).parent, Path(folder).name)
 
 
 def evaluate_policy(

@@ -69,7 +69,9 @@ def run_episodes(
     parts = []
     for start in range(first_episode, first_episode + episodes, _WORLDS_AT_ONCE):
         count = min(_WORLDS_AT_ONCE, first_episode + episodes - start)
-        env = BatchEnv(scenario, count, seed=seed, num_threads=num_threads, first_env=start)
+        env = BatchEnv(
+            scenario, count, seed=seed, num_threads=num_threads, first_env=start, copy=False
+        )
         with closing(env):
             parts.append(_run_batch(policy, env, seed, start, record))
         if progress is not None:

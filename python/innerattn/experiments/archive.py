@@ -16,16 +16,18 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from innerattn.config import RunConfig
 from innerattn.config.files import write_whole
+from innerattn.config.untrusted import parse_json, read_plain
 from innerattn.errors import RunError
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import FinishedRun, check_summary
 from innerattn.records.record import Record, rescue_dtype
-from innerattn.records.run_folder import plain_file, run_info
+from innerattn.records.run_folder import run_info
+from innerattn.records.tables import MOST_FILE_BYTES, read_table, table_bytes
+from innerattn.records.validity import refuse_impossible
 
 FORMAT = "innerattn.archive"
 SCHEMA_VERSION = 1
@@ -56,10 +58,8 @@ def write_archive(runs: Iterable[FinishedRun], path: Path) -> None:
         "reward_names": list(names.pop()) if names else [],
     }
     table = pa.table(columns).replace_schema_metadata({FORMAT: json.dumps(head)})
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd", compression_level=_COMPRESSION_LEVEL)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, sink.getvalue().to_pybytes())
+    write_whole(path, table_bytes(table, _COMPRESSION_LEVEL))
 
 
 def read_archive(path: Path) -> list[FinishedRun]:
@@ -71,17 +71,10 @@ def read_archive(path: Path) -> list[FinishedRun]:
         RunError: the file is missing, a link, damaged, of another format or version, or a run's
             summary does not fit its configuration.
     """
-    plain_file(path)
+    data = read_plain(path, MOST_FILE_BYTES)
+    table, head = read_table(data, path, FORMAT, SCHEMA_VERSION)
     try:
-        with pq.ParquetFile(path) as file:
-            table = file.read()
-        head = json.loads((table.schema.metadata or {})[FORMAT.encode()])
-        version, reward_names = head["schema_version"], tuple(head["reward_names"])
-    except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
-        raise RunError(f"{path}: not a file of {FORMAT}") from error
-    if version != SCHEMA_VERSION:
-        raise RunError(f"{path}: schema version {version}, only {SCHEMA_VERSION} is known")
-    try:
+        reward_names = tuple(head["reward_names"])
         texts = table.select([*_TEXTS, "seed"]).to_pylist()
         return [_run(path, table, i, row, reward_names) for i, row in enumerate(texts)]
     except (LookupError, ValueError, TypeError, AttributeError, pa.ArrowException) as error:
@@ -129,21 +122,26 @@ def _run(
     path: Path, table: pa.Table, index: int, row: dict[str, Any], reward_names: tuple[str, ...]
 ) -> FinishedRun:
     case = Case(row["situation"], row["method"], row["seed"], row["variant"])
-    config = RunConfig.model_validate(json.loads(row["config"]))
+    config = RunConfig.model_validate(parse_json(row["config"]))
     where = Path(f"{path}: {row['name']}")
     return FinishedRun(
         case=case,
         folder=path.parent / "runs" / row["name"],
         config=config,
-        info=run_info(json.loads(row["info"])),
-        summary=check_summary(where, json.loads(row["summary"]), config),
-        read=lambda: _records(case, config, table, index, reward_names),
+        info=run_info(parse_json(row["info"])),
+        summary=check_summary(where, parse_json(row["summary"]), config),
+        read=lambda: _records(path, case, config, table, index, reward_names),
         archived=True,
     )
 
 
 def _records(
-    case: Case, config: RunConfig, table: pa.Table, index: int, reward_names: tuple[str, ...]
+    path: Path,
+    case: Case,
+    config: RunConfig,
+    table: pa.Table,
+    index: int,
+    reward_names: tuple[str, ...],
 ) -> list[Record]:
     """The episodes that were recorded step by step, now without their steps, and the others."""
 
@@ -159,7 +157,7 @@ def _records(
     rewards = rewards.reshape(len(lengths), scenario.num_robots, len(reward_names))
     recorded = int(values("recorded")[0])
     parts = [slice(0, recorded), slice(recorded, len(lengths))]
-    return [
+    records = [
         Record(
             policy=case.method,
             scenario=scenario,
@@ -174,3 +172,9 @@ def _records(
         for part in parts
         if part.start < part.stop
     ]
+    try:
+        for record in records:
+            refuse_impossible(record)
+    except (ValueError, IndexError) as error:
+        raise RunError(f"{path}: runs do not fit their description ({error})") from error
+    return records

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 
 from innerattn.config.files import write_whole
+from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json, read_plain
 from innerattn.errors import RunError
 from innerattn.experiments.plan import PlannedRun
-from innerattn.records.run_folder import plain_file
 
 SCHEMA_VERSION = 1
 
@@ -23,7 +23,7 @@ def read_failures(out: Path) -> dict[str, str]:
     if not path.exists() and not path.is_symlink():
         return {}
     try:
-        document = json.loads(plain_file(path).read_text("utf-8"))
+        document = parse_json(read_plain(path, MOST_JSON_BYTES))
         if document["schema_version"] != SCHEMA_VERSION:
             raise ValueError
         return {str(one["folder"]): str(one["reason"]) for one in document["failures"]}

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-import json
+import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,17 +14,19 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
-from innerattn.config import RunConfig, read_toml
+from innerattn.config import RunConfig, Scenario
+from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json
 from innerattn.errors import RunError
 from innerattn.experiments.plan import Case
 from innerattn.measures.summary import SCHEMA_VERSION
 from innerattn.records.parquet import RECORD_FILES, read_records
 from innerattn.records.record import Record
-from innerattn.records.run_folder import RunInfo, plain_file, read_info
+from innerattn.records.run_files import AlteredFileError, RunFiles
+from innerattn.records.run_folder import RunInfo, config_of
+from innerattn.records.tables import MOST_FILE_BYTES, refuse_damaged
 from innerattn.shown import Shown
+
+_MOST_METRICS_BYTES = 1 << 30
 
 
 class NotMeasuredError(RunError):
@@ -129,28 +131,25 @@ def read_run(case: Case, folder: Path, *, steps: bool = True) -> FinishedRun:
         ConfigError: its configuration is not valid.
         OSError: a file cannot be read.
     """
-    info = read_info(folder)
-    if info.state != "done":
-        raise RunError(f"{folder}: its state is {info.state!r}: must be 'done'")
-    config = read_toml(plain_file(folder / "config.toml"))
-    return measured_run(case, folder, config, info, steps=steps)
+    files = RunFiles(folder)
+    if files.info.state != "done":
+        raise RunError(f"{folder}: its state is {files.info.state!r}: must be 'done'")
+    return measured_run(case, files, config_of(files), steps=steps)
 
 
-def measured_run(
-    case: Case, folder: Path, config: RunConfig, info: RunInfo, *, steps: bool
-) -> FinishedRun:
-    """The finished run in ``folder``, of which configuration and ``run.json`` were read already.
+def measured_run(case: Case, files: RunFiles, config: RunConfig, *, steps: bool) -> FinishedRun:
+    """The finished run of which configuration and ``run.json`` were read already.
 
     Raises:
         NotMeasuredError, RunError, OSError: as of `read_run`.
     """
-    evaluation = folder / "evaluation"
-    summary = _read_summary(evaluation, config)
+    evaluation = files.path / "evaluation"
+    summary = _read_summary(files, config)
 
     def read() -> list[Record]:
         return read_records(evaluation, policy=config.train.method, steps=steps)
 
-    return FinishedRun(case, folder, config, info, summary, read)
+    return FinishedRun(case, files.path, config, files.info, summary, read)
 
 
 def read_metrics(run: FinishedRun, *names: str) -> list[tuple[Any, ...]]:
@@ -161,9 +160,12 @@ def read_metrics(run: FinishedRun, *names: str) -> list[tuple[Any, ...]]:
     """
     path = run.folder / "metrics.jsonl"
     try:
-        lines = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
+        text = RunFiles(run.folder).read(path.name, _MOST_METRICS_BYTES).decode("utf-8")
+        lines = [parse_json(line) for line in text.splitlines()]
         found = [tuple(line[name] for name in names) for line in lines]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except AlteredFileError:
+        raise
+    except (RunError, ValueError, KeyError, TypeError) as error:
         raise RunError(f"{path}: not the metrics of a run") from error
     if not found:
         raise RunError(f"{path}: holds no line")
@@ -263,27 +265,39 @@ def check_summary(path: Path, found: dict[str, Any], config: RunConfig) -> dict[
         if found["schema_version"] != SCHEMA_VERSION:
             version = found["schema_version"]
             raise RunError(f"{path}: schema_version = {version!r}: must be {SCHEMA_VERSION}")
-        for part in (found, found["long"]):
-            _scores(part)
         _refuse_other_measures(path, found, config)
+        for part in (found, found["long"]):
+            _refuse_impossible(part, config.scenario)
     except (ValueError, KeyError, TypeError) as error:
         raise NotMeasuredError(f"{path}: not a whole evaluation") from error
     return found
 
 
-def _read_summary(evaluation: Path, config: RunConfig) -> dict[str, Any]:
+def _read_summary(files: RunFiles, config: RunConfig) -> dict[str, Any]:
+    evaluation = files.path / "evaluation"
     path = evaluation / "summary.json"
-    records = [evaluation / name for name in RECORD_FILES]
-    for file in (path, *records):
-        if not os.path.lexists(file):
-            raise NotMeasuredError(f"{file}: missing")
-    for file in records:
-        _refuse_damaged(plain_file(file))
+    for name in (path.name, *RECORD_FILES):
+        if not os.path.lexists(evaluation / name):
+            raise NotMeasuredError(f"{evaluation / name}: missing")
+    for name in RECORD_FILES:
+        data = _read(files, name, MOST_FILE_BYTES)
+        try:
+            refuse_damaged(data, evaluation / name)
+        except RunError as error:
+            raise NotMeasuredError(str(error)) from error
     try:
-        found = json.loads(plain_file(path).read_text("utf-8"))
+        found = parse_json(_read(files, path.name, MOST_JSON_BYTES))
     except ValueError as error:
         raise NotMeasuredError(f"{path}: not a whole evaluation") from error
     return check_summary(path, found, config)
+
+
+def _read(files: RunFiles, name: str, most_bytes: int) -> bytes:
+    """A file of the evaluation; one that was altered counts as not measured."""
+    try:
+        return files.read(f"evaluation/{name}", most_bytes)
+    except AlteredFileError as error:
+        raise NotMeasuredError(str(error)) from error
 
 
 def _scores(part: dict[str, Any]) -> Scores:
@@ -294,12 +308,21 @@ def _scores(part: dict[str, Any]) -> Scores:
     )
 
 
-def _refuse_damaged(file: Path) -> None:
-    file.open("rb").close()  # what cannot be read is an OSError, as is what arrow cannot decode
-    try:
-        pq.read_metadata(file)
-    except (OSError, pa.ArrowException) as error:
-        raise NotMeasuredError(f"{file}: not a whole Parquet file") from error
+def _refuse_impossible(part: dict[str, Any], scenario: Scenario) -> None:
+    """Refuse means that no play gives.
+
+    Raises:
+        ValueError: a mean is out of range, or its interval does not hold it.
+    """
+    scores = _scores(part)
+    most = scenario.num_victims * scores.episode_steps
+    estimates = {"rescues_per_episode": part["rescues_per_episode"], **part["scripted"]}
+    for name, estimate in estimates.items():
+        low, mean, high = (float(estimate[key]) for key in ("low", "mean", "high"))
+        if not 0.0 <= low <= mean <= high <= most:
+            raise ValueError(f"{name} = {mean}: must be in 0..={most}, and in its interval")
+    if scores.score is not None and not math.isfinite(scores.score):
+        raise ValueError(f"score = {scores.score}: must be finite")
 
 
 def _refuse_other_measures(path: Path, found: dict[str, Any], config: RunConfig) -> None:

@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from innerattn.config import RunConfig, read_toml
+from innerattn.config import RunConfig
 from innerattn.errors import InnerattnError
 from innerattn.experiments import archive
 from innerattn.experiments.failures import read_failures
 from innerattn.experiments.plan import PlannedRun
 from innerattn.experiments.run import FinishedRun, NotMeasuredError, measured_run
-from innerattn.records.run_folder import plain_file, read_info
+from innerattn.records.run_files import AlteredFileError, RunFiles
+from innerattn.records.run_folder import config_of
 
 State = Literal[
     "missing",
@@ -112,18 +113,20 @@ def _scan(planned: PlannedRun, archived: FinishedRun | None, whole: bool) -> Run
 def _scan_folder(planned: PlannedRun, whole: bool) -> RunStatus:
     folder = planned.folder
     try:
-        info = read_info(folder)
-        config = read_toml(plain_file(folder / "config.toml"))
+        files = RunFiles(folder)
+        info, config = files.info, config_of(files)
         differing = differences(config, planned.config)
         if differing:
             return RunStatus(planned, "other_configuration", _some(differing))
         if info.state != "done":
             return RunStatus(planned, "unfinished", f"its state is {info.state!r}")
-        run = measured_run(planned.case, folder, config, info, steps=whole)
+        run = measured_run(planned.case, files, config, steps=whole)
     except NotMeasuredError as error:
         if not os.path.lexists(folder / "checkpoints"):
             return RunStatus(planned, "unreadable", f"it has no weights to measure, and {error}")
-        return RunStatus(planned, "unmeasured", "trained, but not measured as a whole")
+        altered = isinstance(error.__cause__, AlteredFileError)
+        reason = str(error) if altered else "trained, but not measured as a whole"
+        return RunStatus(planned, "unmeasured", reason)
     except (InnerattnError, OSError) as error:
         return RunStatus(planned, "unreadable", " ".join(str(error).split()))
     return RunStatus(planned, "finished", run=run)

@@ -6,20 +6,23 @@ One file has a row per episode, the other a row per rescue. It computes no figur
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 from innerattn.config.files import write_whole
+from innerattn.config.untrusted import read_plain
 from innerattn.errors import RunError
 from innerattn.records.record import FIELDS, Length, Record, rescue_dtype
-from innerattn.records.run_folder import plain_file
+from innerattn.records.run_files import RunFiles
+from innerattn.records.tables import MOST_FILE_BYTES, read_table, table_bytes
+from innerattn.records.validity import refuse_impossible, step_dtype, step_shape
 
 FORMAT = "innerattn.records"
 SCHEMA_VERSION = 1
@@ -50,7 +53,10 @@ def write_records(records: Sequence[Record], folder: Path) -> None:
 
 
 def read_records(
-    folder: str | Path, *, policy: str | None = None, steps: bool = True
+    folder: str | Path,
+    *,
+    policy: str | None = None,
+    steps: bool = True,
 ) -> list[Record]:
     """The records that `write_records` wrote, in their order.
 
@@ -60,12 +66,15 @@ def read_records(
         steps: whether to read what was recorded step by step, which is most of the file.
 
     Raises:
-        RunError: a file is missing, a link, not Parquet, or not of this format and version, or the
-            two do not belong together.
+        RunError: a file is missing, a link, not Parquet, not of this format and version, too large
+            when it is unpacked, or not the one that its run was sealed with; the two do not belong
+            together, or hold what no play leaves behind.
     """
     folder = Path(folder)
-    episodes, heads = _read(folder / _EPISODES, None if steps else _SUMS)
-    rescues, others = _read(folder / _RESCUES)
+    in_run = (folder.parent / "run.json").is_file()
+    files = RunFiles(folder.parent) if in_run else None
+    episodes, heads = _read(folder / _EPISODES, files, None if steps else _SUMS)
+    rescues, others = _read(folder / _RESCUES, files)
     if heads != others:
         raise RunError(f"{folder}: {_EPISODES} and {_RESCUES} are of different episodes")
     try:
@@ -76,7 +85,10 @@ def read_records(
             for i, head in enumerate(heads)
             if policy in (None, head["policy"])
         ]
-    except (LookupError, ValueError, TypeError, AttributeError, pa.ArrowException) as error:
+    except (
+        *(LookupError, ValueError, TypeError, AttributeError, OverflowError),
+        pa.ArrowException,
+    ) as error:
         raise RunError(f"{folder}: records do not fit their description ({error})") from error
 
 
@@ -99,10 +111,6 @@ def _head(record: Record) -> dict[str, Any]:
 def _dtype_text(dtype: np.dtype[Any]) -> Any:
     """A dtype as JSON: a string, or a list of [field, string] pairs."""
     return [[n, dtype[n].str] for n in dtype.names] if dtype.names else dtype.str
-
-
-def _dtype_of(text: Any) -> np.dtype[Any]:
-    return np.dtype(text if isinstance(text, str) else [(name, kind) for name, kind in text])
 
 
 def _episode_table(index: int, record: Record) -> pa.Table:
@@ -163,27 +171,23 @@ def _write(tables: list[pa.Table], records: Sequence[Record], path: Path) -> Non
         "records": [_head(record) for record in records],
     }
     table = table.replace_schema_metadata({FORMAT: json.dumps(heads)})
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd")
-    write_whole(path, sink.getvalue().to_pybytes())
+    write_whole(path, table_bytes(table))
 
 
 def _read(
-    path: Path, columns: Sequence[str] | None = None
+    path: Path, files: RunFiles | None, columns: Sequence[str] | None = None
 ) -> tuple[pa.Table, list[dict[str, Any]]]:
     """Some columns of a file, or all, and what it says of its records."""
-    if not path.exists():
+    if not os.path.lexists(path):
         raise RunError(f"{path}: no such file")
-    plain_file(path)
-    try:
-        with pq.ParquetFile(path) as file:
-            head = json.loads((file.schema_arrow.metadata or {})[FORMAT.encode()])
-            version, records = head["schema_version"], list(head["records"])
-            table = file.read(columns)
-    except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
-        raise RunError(f"{path}: not a file of {FORMAT}") from error
-    if version != SCHEMA_VERSION:
-        raise RunError(f"{path}: schema version {version}, only {SCHEMA_VERSION} is known")
+    if files is None:
+        data = read_plain(path, MOST_FILE_BYTES)
+    else:
+        data = files.read(f"{path.parent.name}/{path.name}", MOST_FILE_BYTES)
+    table, head = read_table(data, path, FORMAT, SCHEMA_VERSION, columns)
+    records = head.get("records")
+    if not isinstance(records, list) or not all(isinstance(one, dict) for one in records):
+        raise RunError(f"{path}: not a file of {FORMAT}")
     return table, records
 
 
@@ -238,24 +242,31 @@ def _record(
         rewards_total=_arrays(rows["reward"]).reshape(len(rows), len(names), len(reward_names)),
         length=length,
         steps={
-            name: _steps(name, head["steps"][name], rows)
+            name: _steps(name, head["steps"][name], rows, scenario.episode_steps)
             for name in FIELDS
             if steps and name in head["steps"]
         },
     )
+    refuse_impossible(record)
     listed, counted = record.rescue_counts(), _numbers(rows["rescues"])
     if not np.array_equal(listed, counted):
         raise ValueError(f"{listed.sum()} rescues are listed, {counted.sum()} were counted")
     return record
 
 
-def _steps(name: str, layout: dict[str, Any], rows: pa.Table) -> NDArray[Any]:
-    dtype, shape = _dtype_of(layout["dtype"]), (len(rows), *layout["shape"])
+def _steps(name: str, layout: dict[str, Any], rows: pa.Table, length: int) -> NDArray[Any]:
+    dtype = step_dtype(layout["dtype"])
+
+    def part_of(column: str) -> NDArray[Any]:
+        values = _arrays(rows[column])
+        return values.reshape(step_shape(len(rows), layout["shape"], length, values.size))
+
     if dtype.names is None:
-        return _arrays(rows[name]).reshape(shape).astype(dtype, copy=False)
-    values = np.empty(shape, dtype)
-    for part in dtype.names:
-        values[part] = _arrays(rows[f"{name}.{part}"]).reshape(shape)
+        return part_of(name).astype(dtype, copy=False)
+    parts = {part: part_of(f"{name}.{part}") for part in dtype.names}
+    values = np.empty(next(iter(parts.values())).shape, dtype)
+    for part, numbers in parts.items():
+        values[part] = numbers
     return values
 
 

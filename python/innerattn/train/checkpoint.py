@@ -6,14 +6,13 @@ paths that lead out of it are refused, and no file is unpickled.
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import shutil
 import subprocess
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import asdict, replace
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -24,9 +23,10 @@ from innerattn.config.files import write_whole
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.learn.types import Learner
-from innerattn.records.run_folder import SCHEMA_VERSION, RunInfo, State, newest_weights, read_config
+from innerattn.records.run_files import RunFiles, info_text, seal
+from innerattn.records.run_folder import SCHEMA_VERSION, RunInfo, State, config_of, weights_name
 from innerattn.train.build import build_learner
-from innerattn.train.weights import digest_of, read_weights, write_weights
+from innerattn.train.weights import MOST_BYTES, digest_of, weights_in, write_weights
 
 _PACKAGES = ("innerattn", "torch", "numpy")
 
@@ -109,15 +109,19 @@ class RunFolder:
         self.info = replace(self.info, weights_sha256=digest_of(weights))
 
     def mark(self, state: State, env_steps: int, updates: int, seconds: float) -> None:
-        """Write down how far the run has come."""
+        """Write down how far the run has come; at its end, seal it with a manifest."""
         self.info = replace(
             self.info,
             state=state,
             env_steps=env_steps,
             updates=updates,
             seconds=round(seconds, 3),
+            sealed=False,
         )
-        _write_info(self.path, self.info)
+        if state == "running":
+            _write_info(self.path, self.info)
+        else:
+            self.info = seal(self.path, self.info)
 
 
 def refuse_existing(path: Path) -> None:
@@ -148,20 +152,24 @@ def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learne
         ConfigError: its ``config.toml`` is not valid.
     """
     path = Path(run)
-    config = read_config(path)
+    files = RunFiles(path)
+    config = config_of(files)
     train = config.train.model_copy(update={"device": device})
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         learner = build_learner(config.model_copy(update={"train": train}), env)
-    weights = newest_weights(path)
+    name = weights_name(files)
+    weights = path / name
+    known = files.info.weights_sha256 if files.info.state != "running" else None
+    tensors = weights_in(files.read(name, MOST_BYTES), weights, known)
     try:
-        learner.load(read_weights(weights))
+        learner.load(tensors)
     except ValueError as error:
         raise RunError(f"{weights}: {error}") from error
     return config, learner
 
 
 def _write_info(folder: Path, info: RunInfo) -> None:
-    write_whole(folder / "run.json", (json.dumps(asdict(info), indent=1) + "\n").encode())
+    write_whole(folder / "run.json", info_text(info))
 
 
 def _not_finite(tensor: Tensor) -> float:

@@ -92,6 +92,7 @@ def train(
             config.train.num_envs,
             seed=config.train.seed,
             num_threads=config.train.threads,
+            copy=False,
         )
         with closing(env):
             learner = build_learner(config, env, training=True)

@@ -12,15 +12,20 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
+from safetensors import SafetensorError
+from safetensors.torch import load, save
 from torch import Tensor
 
 from innerattn.config.files import write_whole
+from innerattn.config.untrusted import parse_json, read_plain
 from innerattn.errors import RunError
 
 FORMAT = "innerattn.weights"
 SCHEMA_VERSION = "1"
+MOST_BYTES = 4 << 30
+"""Longest file that is read."""
+_MOST_HEADER_BYTES = 8 << 20
+_MOST_TENSORS = 20_000
 
 
 def write_weights(path: Path, tensors: Mapping[str, Tensor]) -> None:
@@ -43,7 +48,7 @@ def read_weights(path: Path) -> dict[str, Tensor]:
 
     Raises:
         RunError: the file is missing, a link, truncated, altered, of another format or of another
-            version; the message names the file.
+            version, or too large; the message names the file.
     """
     return _read(path)[0]
 
@@ -60,25 +65,73 @@ def digest_of(path: Path) -> str:
     return _read(path)[1]
 
 
+def weights_in(data: bytes, path: Path, sha256: str | None = None) -> dict[str, Tensor]:
+    """The named tensors of a policy in the bytes of the file at ``path``.
+
+    Args:
+        data: the file.
+        path: where it lies.
+        sha256: the digest that they must have, as of `digest_of`; None: any.
+
+    Raises:
+        RunError: as of `read_weights`; or they are others, or hold a value that is not finite.
+    """
+    tensors, digest = _parse(data, path)
+    if sha256 not in (None, digest):
+        raise RunError(f"{path}: is not of this run: run.json names other weights")
+    for name, tensor in tensors.items():
+        if not bool(tensor.isfinite().all()):
+            raise RunError(f"{path}: a value of {name} is not finite")
+    return tensors
+
+
 def _read(path: Path) -> tuple[dict[str, Tensor], str]:
     """Tensors and their digest."""
-    if path.is_symlink() or not path.is_file():
-        raise RunError(f"{path}: no weights here (a plain file is needed)")
     try:
-        with safe_open(path, framework="pt", device="cpu") as file:
-            metadata = file.metadata() or {}
-            if metadata.get("format") != FORMAT:
-                raise RunError(f"{path}: not a file of {FORMAT}")
-            if metadata.get("schema_version") != SCHEMA_VERSION:
-                found = metadata.get("schema_version")
-                raise RunError(f"{path}: schema version {found}, only {SCHEMA_VERSION} is known")
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except (SafetensorError, OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        data = read_plain(path, MOST_BYTES)
+    except OSError as error:
+        raise RunError(f"{path}: cannot be read ({error.strerror})") from error
+    return _parse(data, path)
+
+
+def _parse(data: bytes, path: Path) -> tuple[dict[str, Tensor], str]:
+    try:
+        metadata = _metadata(data)
+    except (ValueError, LookupError, TypeError, AttributeError) as error:
+        raise RunError(f"{path}: not readable as safetensors ({error})") from error
+    if metadata.get("format") != FORMAT:
+        raise RunError(f"{path}: not a file of {FORMAT}")
+    if metadata.get("schema_version") != SCHEMA_VERSION:
+        found = metadata.get("schema_version")
+        raise RunError(f"{path}: schema version {found}, only {SCHEMA_VERSION} is known")
+    try:
+        tensors = load(data)
+    except (SafetensorError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not readable as safetensors ({error})") from error
     digest = _digest(tensors)
     if metadata.get("sha256") != digest:
         raise RunError(f"{path}: contents do not match their digest; the file was altered")
     return tensors, digest
+
+
+def _metadata(data: bytes) -> dict[str, str]:
+    """What a safetensors file says of itself, from a header of a bearable size.
+
+    Raises:
+        ValueError: the header is not of that form, or names too many tensors.
+    """
+    length = int.from_bytes(data[:8], "little")
+    if len(data) < 8 or length > min(len(data) - 8, _MOST_HEADER_BYTES):
+        raise ValueError(f"a header of {length} bytes: must be whole, at most {_MOST_HEADER_BYTES}")
+    # Each tensor has one pair of offsets: counted before anything is made of them.
+    count = data.count(b"data_offsets", 8, 8 + length)
+    if count > _MOST_TENSORS:
+        raise ValueError(f"{count} tensors: must be at most {_MOST_TENSORS}")
+    header = parse_json(data[8 : 8 + length])
+    metadata: dict[str, str] = header.get("__metadata__", {})
+    if not isinstance(metadata, dict):
+        raise ValueError("metadata is no object")
+    return metadata
 
 
 def _digest(tensors: Mapping[str, Tensor]) -> str:

@@ -1,24 +1,25 @@
 //! `_core.Batch`: the batch of worlds as a Python class. Every array is checked here once.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use innerattn_env::batch::{Autoreset, Batch as Worlds, Options};
+use innerattn_env::error::Error;
 use innerattn_env::fault::NUM_KINDS;
+use innerattn_env::fault_state::FaultState;
 use innerattn_env::robot::Commands;
 use innerattn_env::scenario::Actions;
+use innerattn_env::snapshot::most_bytes;
 use innerattn_env::task::Rescue;
 use innerattn_env::world::World;
-use numpy::{
-    IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2,
-    PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
-};
-use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
+use numpy::{IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray3, PyArrayMethods};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::arrays::Arrays;
+use crate::door::{Door, gather, probe, reserve, zeros};
+use crate::raised;
 use crate::rules::Rules;
-use crate::value_error;
 
 type Stepped = (
     Py<PyArray<f32, Ix3>>,
@@ -32,10 +33,17 @@ type Stepped = (
 /// Columns of a rescue, before those of its helpers.
 const RESCUE_FIELDS: [&str; 6] = ["env", "episode", "step", "slot", "victim", "task"];
 
+/// Memory for what a batch has beside its arrays and worlds, and for each thread, bytes.
+const SLACK_BYTES: usize = 64 << 20;
+const THREAD_BYTES: usize = 4 << 20;
+
 /// Many rescue worlds of one scenario.
 #[pyclass(module = "innerattn._core")]
 pub struct Batch {
     worlds: Worlds,
+    /// The actions of a step, in one of the two.
+    discrete: Vec<i64>,
+    continuous: Vec<f32>,
     /// What steps write, in turn.
     sets: [Arrays; 2],
     latest: usize,
@@ -61,14 +69,20 @@ impl Batch {
         let autoreset = if autoreset { Autoreset::SameStep } else { Autoreset::Disabled };
         let options = Options { num_envs, seed, num_threads, first_env, autoreset };
         let rules = Arc::clone(&rules.0);
-        let worlds = py.detach(|| Worlds::new(rules, options)).map_err(|error| value_error(&error))?;
-        let (robots, width) = (worlds.rules().team.len(), worlds.rules().layout.width());
+        Worlds::check(&options).map_err(|error| raised(py, &error))?;
+        let (robots, width) = (rules.team.len(), rules.layout.width());
         let set = || Arrays::new(py, num_envs, robots, width);
-        let rescue_dtype = rescue_dtype(py, worlds.rules().scenario.max_needs())?;
+        let sets = [set()?, set()?];
+        let rescue_dtype = rescue_dtype(py, rules.scenario.max_needs())?;
+        let threads = num_threads.unwrap_or(1) * THREAD_BYTES;
+        probe(py, num_envs * World::most_bytes(&rules) + SLACK_BYTES + threads)?;
+        let worlds = py.detach(|| Worlds::new(rules, options)).map_err(|error| raised(py, &error))?;
         Ok(Self {
             no_rescues: py.import("numpy")?.call_method1("empty", (0, &rescue_dtype))?.unbind(),
             rescue_dtype: rescue_dtype.unbind(),
-            sets: [set()?, set()?],
+            discrete: vec![],
+            continuous: vec![],
+            sets,
             worlds,
             latest: 0,
             process: std::process::id(),
@@ -94,29 +108,30 @@ impl Batch {
         &mut self,
         py: Python<'py>,
         seed: Option<u64>,
-        mask: Option<Bound<PyArray1<bool>>>,
+        mask: Option<Bound<PyAny>>,
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
         self.check_process()?;
         let mask = self.mask(mask)?;
         let shape = self.obs_shape();
-        let mut obs = vec![0.0; shape.iter().product()];
+        let mut obs = zeros(shape.iter().product())?;
         let worlds = &mut self.worlds;
         py.detach(|| worlds.reset(seed, mask.as_deref(), &mut obs));
         shaped(py, obs, shape)
     }
 
-    fn step(&mut self, py: Python, actions: &Bound<PyUntypedArray>) -> PyResult<Stepped> {
+    fn step(&mut self, py: Python, actions: &Bound<PyAny>) -> PyResult<Stepped> {
         self.check_process()?;
+        let [envs, robots, _] = self.obs_shape();
         let rescues = match self.worlds.rules().scenario.actions {
             Actions::Discrete => {
-                let array = self.discrete(actions)?;
-                let values = contiguous(&array.as_array());
-                self.advance(py, Commands::Discrete(&values))?
+                Door::integers("actions", &[envs, robots]).read_i64(actions, &mut self.discrete)?;
+                let commands = Commands::Discrete(&self.discrete);
+                advance(py, &mut self.worlds, &mut self.sets, &mut self.latest, commands)?
             }
             Actions::Continuous => {
-                let array = self.continuous(actions)?;
-                let values = contiguous(&array.as_array());
-                self.advance(py, Commands::Continuous(&values))?
+                Door::floats("actions", &[envs, robots, 2]).read_f32(actions, &mut self.continuous)?;
+                let commands = Commands::Continuous(&self.continuous);
+                advance(py, &mut self.worlds, &mut self.sets, &mut self.latest, commands)?
             }
         };
         let set = &self.sets[self.latest];
@@ -130,6 +145,11 @@ impl Batch {
         ))
     }
 
+    /// For tests: lets these worlds panic in the next step.
+    fn _panic_in_next_step(&mut self, envs: Vec<usize>) {
+        self.worlds.panic_in_next_step(envs);
+    }
+
     fn reward_components(&self, py: Python) -> Py<PyArray3<f32>> {
         self.sets[self.latest].components.lend(py)
     }
@@ -137,7 +157,7 @@ impl Batch {
     fn observe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         self.check_process()?;
         let shape = self.obs_shape();
-        let mut obs = vec![0.0; shape.iter().product()];
+        let mut obs = zeros(shape.iter().product())?;
         self.worlds.observe(&mut obs);
         shaped(py, obs, shape)
     }
@@ -164,81 +184,77 @@ impl Batch {
     ) -> PyResult<(Bound<'py, PyArray3<i64>>, Bound<'py, PyArray3<f32>>)> {
         let slots = self.worlds.rules().scenario.num_victims();
         let envs = self.worlds.num_envs();
-        let mut numbers = Vec::with_capacity(envs * slots * 4);
-        let mut places = Vec::with_capacity(envs * slots * 2);
-        for victim in self.worlds.worlds().flat_map(|world| &world.victims) {
+        let (mut numbers, mut places) = (zeros(envs * slots * 4)?, zeros(envs * slots * 2)?);
+        let rows = numbers.chunks_exact_mut(4).zip(places.chunks_exact_mut(2));
+        let victims = self.worlds.worlds().flat_map(|world| &world.victims);
+        for ((number, place), victim) in rows.zip(victims) {
             if let Some(victim) = victim {
-                numbers.extend([1, victim.task, victim.id, victim.appeared_step].map(i64::from));
-                places.extend([victim.position.x, victim.position.y]);
+                number.copy_from_slice(&[1, victim.task, victim.id, victim.appeared_step].map(i64::from));
+                place.copy_from_slice(&[victim.position.x, victim.position.y]);
             } else {
-                numbers.extend([0, -1, -1, -1]);
-                places.extend([0.0, 0.0]);
+                number.copy_from_slice(&[0, -1, -1, -1]);
             }
         }
         Ok((shaped(py, numbers, [envs, slots, 4])?, shaped(py, places, [envs, slots, 2])?))
     }
 
-    fn step_counts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        self.worlds.worlds().map(|world| i64::from(world.step)).collect::<Vec<_>>().into_pyarray(py)
+    fn step_counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
+        let counts = self.worlds.worlds().map(|world| i64::from(world.step));
+        Ok(gather(self.worlds.num_envs(), counts)?.into_pyarray(py))
     }
 
-    fn episodes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        self.worlds.worlds().map(|world| world.episode as i64).collect::<Vec<_>>().into_pyarray(py)
+    fn episodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
+        let episodes = self.worlds.worlds().map(|world| world.episode as i64);
+        Ok(gather(self.worlds.num_envs(), episodes)?.into_pyarray(py))
     }
 
     fn set_motion(
         &mut self,
-        positions: &Bound<PyArray3<f32>>,
-        velocities: &Bound<PyArray3<f32>>,
+        py: Python,
+        positions: &Bound<PyAny>,
+        velocities: &Bound<PyAny>,
     ) -> PyResult<()> {
         self.check_process()?;
-        let wanted = [self.worlds.num_envs(), self.worlds.rules().team.len(), 2];
-        for (name, shape) in [("positions", positions.shape()), ("velocities", velocities.shape())] {
-            if shape != wanted {
-                return Err(PyValueError::new_err(format!("{name} has shape {shape:?}: must be {wanted:?}")));
-            }
-        }
-        let (positions, velocities) = (positions.readonly(), velocities.readonly());
-        let (positions, velocities) = (contiguous(&positions.as_array()), contiguous(&velocities.as_array()));
-        self.worlds.set_motion(&positions, &velocities).map_err(|error| value_error(&error))
+        let [envs, robots, _] = self.obs_shape();
+        let shape = [envs, robots, 2];
+        let (mut places, mut speeds) = (vec![], vec![]);
+        Door::numbers("positions", &shape).read_f32(positions, &mut places)?;
+        Door::numbers("velocities", &shape).read_f32(velocities, &mut speeds)?;
+        self.worlds.set_motion(&places, &speeds).map_err(|error| raised(py, &error))
     }
 
     fn fault_state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        let robots = self.worlds.rules().team.len();
+        let [envs, robots, _] = self.obs_shape();
         let of =
             |world: &'_ World| (0..robots).flat_map(|robot| world.faults.levels(robot)).collect::<Vec<_>>();
         let numbers = self.worlds.worlds().flat_map(of);
-        shaped(py, numbers.collect(), [self.worlds.num_envs(), robots, NUM_KINDS])
+        shaped(py, gather(envs * robots * NUM_KINDS, numbers)?, [envs, robots, NUM_KINDS])
     }
 
     #[pyo3(signature = (levels, mask))]
-    fn set_faults(
-        &mut self,
-        levels: &Bound<PyArray3<f32>>,
-        mask: Option<Bound<PyArray1<bool>>>,
-    ) -> PyResult<()> {
+    fn set_faults(&mut self, py: Python, levels: &Bound<PyAny>, mask: Option<Bound<PyAny>>) -> PyResult<()> {
         self.check_process()?;
-        let wanted = [self.worlds.num_envs(), self.worlds.rules().team.len(), NUM_KINDS];
-        if levels.shape() != wanted {
-            let (found, [envs, robots, _]) = (&levels.shape()[..2], wanted);
-            return Err(PyValueError::new_err(format!(
-                "faults has shape {found:?}: must be [{envs}, {robots}]"
-            )));
-        }
+        let [envs, robots, width] = self.obs_shape();
+        let mut numbers = vec![];
+        Door::numbers("faults", &[envs, robots, NUM_KINDS]).read_f32(levels, &mut numbers)?;
         let mask = self.mask(mask)?;
-        let levels = levels.readonly();
-        let levels = contiguous(&levels.as_array());
-        self.worlds.set_faults(&levels, mask.as_deref()).map_err(|error| value_error(&error))
+        probe(py, envs * FaultState::most_bytes(robots, width))?;
+        self.worlds.set_faults(&numbers, mask.as_deref()).map_err(|error| raised(py, &error))
     }
 
-    fn snapshot<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, &py.detach(|| self.worlds.snapshot()))
+    fn snapshot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let envs = self.worlds.num_envs();
+        // The image, as it grows, and the bytes.
+        probe(py, 3 * most_bytes(self.worlds.rules(), envs))?;
+        Ok(PyBytes::new(py, &py.detach(|| self.worlds.snapshot())))
     }
 
     fn restore(&mut self, py: Python, image: &[u8]) -> PyResult<()> {
         self.check_process()?;
+        let (rules, envs) = (self.worlds.rules(), self.worlds.num_envs());
+        probe(py, envs * World::most_bytes(rules) + image.len())?;
         let worlds = &mut self.worlds;
-        py.detach(|| worlds.restore(image)).map_err(|error| value_error(&error))
+        py.detach(|| worlds.restore(image)).map_err(|error| raised(py, &error))
     }
 }
 
@@ -261,59 +277,9 @@ impl Batch {
     }
 
     /// A mask with one flag for each env.
-    fn mask(&self, mask: Option<Bound<PyArray1<bool>>>) -> PyResult<Option<Vec<bool>>> {
-        let mask = mask.map(|mask| mask.readonly().as_array().to_vec());
-        let wanted = self.worlds.num_envs();
-        match mask.as_ref().map(Vec::len) {
-            Some(found) if found != wanted => {
-                Err(PyValueError::new_err(format!("mask has shape ({found},): must be ({wanted},)")))
-            }
-            _ => Ok(mask),
-        }
-    }
-
-    fn advance(&mut self, py: Python, commands: Commands) -> PyResult<Vec<Rescue>> {
-        let next = 1 - self.latest;
-        let buffers = self.sets[next].buffers();
-        let worlds = &mut self.worlds;
-        let rescues = py.detach(|| worlds.step(commands, buffers)).map_err(|error| value_error(&error))?;
-        self.latest = next;
-        Ok(rescues)
-    }
-
-    /// The actions as `(E, R)` int64.
-    fn discrete<'py>(&self, actions: &Bound<'py, PyUntypedArray>) -> PyResult<PyReadonlyArray2<'py, i64>> {
-        let (envs, robots) = (self.worlds.num_envs(), self.worlds.rules().team.len());
-        if let Ok(actions) = actions.extract::<PyReadonlyArray2<i64>>()
-            && actions.shape() == [envs, robots]
-            && actions.is_aligned()
-        {
-            return Ok(actions);
-        }
-        let kind: String = actions.dtype().getattr("kind")?.extract()?;
-        if kind != "i" && kind != "u" {
-            let dtype = actions.dtype();
-            return Err(PyTypeError::new_err(format!("actions has dtype {dtype}: must be integers")));
-        }
-        if actions.shape() != [envs, robots] {
-            return Err(wrong_shape(actions, &format!("({envs}, {robots})")));
-        }
-        // Numbers past int64 wrap to negative ones, which the range check refuses.
-        actions.call_method1("astype", ("int64",))?.extract()
-    }
-
-    /// The actions as `(E, R, 2)` float32.
-    fn continuous<'py>(&self, actions: &Bound<'py, PyUntypedArray>) -> PyResult<PyReadonlyArray3<'py, f32>> {
-        let (envs, robots) = (self.worlds.num_envs(), self.worlds.rules().team.len());
-        let kind: String = actions.dtype().getattr("kind")?.extract()?;
-        if kind != "f" {
-            let dtype = actions.dtype();
-            return Err(PyTypeError::new_err(format!("actions has dtype {dtype}: must be floats")));
-        }
-        if actions.shape() != [envs, robots, 2] {
-            return Err(wrong_shape(actions, &format!("({envs}, {robots}, 2)")));
-        }
-        actions.call_method1("astype", ("float32",))?.extract()
+    fn mask(&self, mask: Option<Bound<PyAny>>) -> PyResult<Option<Vec<bool>>> {
+        let shape = [self.worlds.num_envs()];
+        mask.map(|mask| Door::flags("mask", &shape).read_flags(&mask)).transpose()
     }
 
     fn vectors<'py>(
@@ -323,7 +289,8 @@ impl Batch {
         of: impl Fn(&World) -> &Vec<innerattn_env::geometry::Vec2>,
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let numbers = self.worlds.worlds().flat_map(|world| of(world).iter().flat_map(|at| [at.x, at.y]));
-        shaped(py, numbers.collect(), [self.worlds.num_envs(), rows, 2])
+        let shape = [self.worlds.num_envs(), rows, 2];
+        shaped(py, gather(shape.iter().product(), numbers)?, shape)
     }
 
     /// Rescues as a structured array: env, episode, step, slot, victim, task and one helper for each
@@ -333,7 +300,8 @@ impl Batch {
             return Ok(self.no_rescues.clone_ref(py));
         }
         let helpers = self.worlds.rules().scenario.max_needs();
-        let mut rows = Vec::with_capacity(rescues.len() * (RESCUE_FIELDS.len() + helpers));
+        let mut rows = Vec::new();
+        reserve(&mut rows, rescues.len() * (RESCUE_FIELDS.len() + helpers))?;
         for rescue in rescues {
             rows.extend([i64::from(rescue.env), rescue.episode as i64]);
             rows.extend([rescue.step, rescue.slot, rescue.victim, rescue.task].map(i64::from));
@@ -351,17 +319,30 @@ fn rescue_dtype(py: Python, helpers: usize) -> PyResult<Bound<PyAny>> {
     py.import("numpy")?.call_method1("dtype", (fields,))
 }
 
-fn wrong_shape(actions: &Bound<PyUntypedArray>, wanted: &str) -> PyErr {
-    PyValueError::new_err(format!("actions has shape {:?}: must be {wanted}", actions.shape()))
-}
-
-fn contiguous<'a, T: Clone, D: numpy::ndarray::Dimension>(
-    array: &numpy::ndarray::ArrayView<'a, T, D>,
-) -> std::borrow::Cow<'a, [T]> {
-    match array.to_slice() {
-        Some(values) => std::borrow::Cow::Borrowed(values),
-        None => std::borrow::Cow::Owned(array.iter().cloned().collect()),
+/// Steps the worlds, which write into the set of arrays whose turn it is. A panic of some worlds counts as
+/// a step of all.
+fn advance(
+    py: Python,
+    worlds: &mut Worlds,
+    sets: &mut [Arrays; 2],
+    latest: &mut usize,
+    commands: Commands,
+) -> PyResult<Vec<Rescue>> {
+    let next = 1 - *latest;
+    let buffers = sets[next].buffers();
+    let interruption = Mutex::new(None);
+    let poll = || {
+        let interrupted = Python::attach(|py| py.check_signals().err());
+        let stops = interrupted.is_some();
+        *interruption.lock().unwrap_or_else(PoisonError::into_inner) = interrupted;
+        stops
+    };
+    let stepped = py.detach(|| worlds.step_polled(commands, buffers, Some(&poll)));
+    if matches!(stepped, Ok(_) | Err(Error::Panicked { .. })) {
+        *latest = next;
     }
+    let interruption = interruption.into_inner().unwrap_or_else(PoisonError::into_inner);
+    stepped.map_err(|error| interruption.unwrap_or_else(|| raised(py, &error)))
 }
 
 fn shaped<T: numpy::Element, const N: usize>(

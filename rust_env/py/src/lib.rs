@@ -3,6 +3,7 @@
 
 mod arrays;
 mod batch;
+mod door;
 mod rules;
 
 /// rapier makes and frees hundreds of small things a period, which this does faster than the system.
@@ -16,8 +17,19 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-fn value_error(error: &Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
+/// The exception for an error of the worlds.
+fn raised(py: Python, error: &Error) -> PyErr {
+    let text = error.to_string();
+    match error {
+        Error::Panicked { envs, .. } => {
+            let class = py.import("innerattn.errors").and_then(|module| module.getattr("WorldError"));
+            match class.and_then(|class| class.call1((text, envs.clone()))) {
+                Ok(exception) => PyErr::from_value(exception),
+                Err(error) => error,
+            }
+        }
+        _ => PyValueError::new_err(text),
+    }
 }
 
 /// Name, unit, least, most and healthy value, and meaning of each kind of fault, in the order of levels.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use innerattn_env::rules::Rules as Shared;
 use pyo3::prelude::*;
 
-use crate::value_error;
+use crate::raised;
 
 /// A scenario that was found valid, made ready to play.
 #[pyclass(frozen, module = "innerattn._core")]
@@ -15,7 +15,7 @@ pub struct Rules(pub Arc<Shared>);
 impl Rules {
     #[new]
     fn new(py: Python, json: &str) -> PyResult<Self> {
-        let rules = py.detach(|| Shared::from_json(json)).map_err(|error| value_error(&error))?;
+        let rules = py.detach(|| Shared::from_json(json)).map_err(|error| raised(py, &error))?;
         Ok(Self(Arc::new(rules)))
     }
 

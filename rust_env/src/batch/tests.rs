@@ -1,6 +1,7 @@
 //! What a batch refuses, and how episodes end and begin in it.
 
 use super::*;
+use crate::reward::NUM_COMPONENTS;
 use crate::scenario::Scenario;
 
 const ENVS: usize = 3;
@@ -131,4 +132,63 @@ fn only_a_reset_before_the_first_step_keeps_episode_0() {
     step(&mut stepped, Commands::Discrete(&[0; ENVS * 4])).expect("good actions");
     stepped.reset(None, None, &mut obs);
     assert_eq!(episodes(&stepped), [1; ENVS]);
+}
+
+#[test]
+fn a_world_that_panics_stops_no_other() {
+    let quick = |batch: &mut Batch| step(batch, Commands::Discrete(&[1; ENVS * 4]));
+    let (mut batch, mut plain) = (
+        batch(Scenario::default(), Autoreset::SameStep),
+        self::batch(Scenario::default(), Autoreset::SameStep),
+    );
+    batch.panic_in_next_step(vec![1]);
+    let error = quick(&mut batch).expect_err("a panic");
+    assert_eq!(error, Error::Panicked { envs: vec![1], message: "a test asked for it".into() });
+    quick(&mut plain).expect("good actions");
+    let worlds = |batch: &Batch| batch.worlds().cloned().collect::<Vec<_>>();
+    assert!(worlds(&batch)[0] == worlds(&plain)[0] && worlds(&batch)[2] == worlds(&plain)[2]);
+    assert_eq!(worlds(&batch)[1].step, 0);
+    assert_eq!(quick(&mut batch), Err(Error::Broken { env: 1 }));
+    let mut obs = vec![0.0; ENVS * 4 * batch.rules().layout.width()];
+    batch.reset(None, Some(&[true, false, true]), &mut obs);
+    assert_eq!(quick(&mut batch), Err(Error::Broken { env: 1 }));
+    batch.reset(None, Some(&[false, true, false]), &mut obs);
+    quick(&mut batch).expect("all were reset");
+}
+
+#[test]
+fn an_interrupted_step_moves_nothing() {
+    let scenario = Scenario { substeps: 300, ..Scenario::default() };
+    let options = Options {
+        num_envs: 4096,
+        seed: 0,
+        num_threads: Some(2),
+        first_env: 0,
+        autoreset: Autoreset::SameStep,
+    };
+    let mut batch = Batch::new(Rules::new(scenario).expect("a valid scenario"), options).expect("a batch");
+    let mut arrays = (vec![0.0; 4096 * 4 * batch.rules().layout.width()], vec![false; 4096]);
+    let (mut final_obs, mut reward) = (arrays.0.clone(), vec![0.0; 4096 * 4]);
+    let (mut components, mut truncated) = (vec![0.0; 4096 * 4 * NUM_COMPONENTS], arrays.1.clone());
+    let actions = vec![1; 4096 * 4];
+    let mut go = |batch: &mut Batch, stop: bool| {
+        let buffers = StepBuffers {
+            obs: &mut arrays.0,
+            final_obs: &mut final_obs,
+            reward: &mut reward,
+            components: &mut components,
+            terminated: &mut arrays.1,
+            truncated: &mut truncated,
+        };
+        batch.step_polled(Commands::Discrete(&actions), buffers, Some(&|| stop)).map(|_| ())
+    };
+    for _ in 0..20 {
+        let before = batch.snapshot();
+        if go(&mut batch, true) == Err(Error::Interrupted) {
+            assert!(batch.snapshot() == before, "something moved");
+            go(&mut batch, false).expect("nobody stops it");
+            return assert!(batch.snapshot() != before);
+        }
+    }
+    panic!("no step took long enough to be interrupted");
 }

@@ -162,7 +162,10 @@ impl Engine for Discs {
         let contacts = &mut workspace.discs.0;
         let mut left = self.dt;
         let mut touched = 0;
-        for instant in 0.. {
+        // Each instant past the limit stops somebody for good, so that as many more as there are robots
+        // are enough. Numbers that are none might go on for ever.
+        let bound = self.most_instants + positions.len();
+        for instant in 0..=bound {
             let first = self.shapes.first_touch(self.touch, positions, velocities, obstacles);
             if first >= left {
                 break;
@@ -171,7 +174,9 @@ impl Engine for Discs {
             left -= first;
             self.find(positions, obstacles, contacts);
             touched |= self.resolve(contacts, velocities);
-            if instant >= self.most_instants {
+            if instant == bound {
+                velocities.fill(Vec2::zeros());
+            } else if instant >= self.most_instants {
                 // Whoever is in such a throng waits for the next period: it ends, and nobody overlaps.
                 for contact in contacts.iter() {
                     velocities[contact.robot] = Vec2::zeros();

@@ -107,3 +107,22 @@ fn what_could_stand_nowhere_is_refused() {
     let wide = refusal(|scenario| scenario.robots[3].radius_m = 0.5);
     assert!(wide.starts_with("scenario.robots[3].radius_m = 0.5: must be below"), "{wide}");
 }
+
+#[test]
+fn robots_too_fast_for_their_substeps_are_refused() {
+    let refused = refusal(|scenario| (scenario.robots[1].max_speed_mps, scenario.dt_s) = (100.0, 0.9));
+    assert_eq!(
+        refused,
+        "scenario.robots[1].max_speed_mps = 100: must be at most 1.000000 m/s: no robot may move farther in a \
+         substep (dt_s / substeps = 0.150000 s) than 3 times the smallest radius_m (0.05 m); use more substeps, \
+         a smaller dt_s or engine = \"discs\""
+    );
+    let one = Scenario { substeps: 1, ..Scenario::default() };
+    assert_eq!(one.validate(), Ok(()), "1.5 m/s are just three radii in 0.1 s");
+    let fast = |engine| {
+        let mut scenario = Scenario { engine, dt_s: 1.0, ..Scenario::default() };
+        scenario.robots[3].max_speed_mps = 100.0;
+        scenario.validate()
+    };
+    assert!(fast(Engine::Rapier).is_err() && fast(Engine::Discs).is_ok());
+}

@@ -3,8 +3,8 @@
 
 use super::check::{broken, counts, named, within};
 use super::{
-    Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_NEEDS, MAX_OBSTACLES, MAX_ROBOTS, MAX_VICTIMS,
-    Robot, Scenario, Shape,
+    Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_NEEDS, MAX_OBSTACLES, MAX_ROBOTS,
+    MAX_TRAVEL_RADII, MAX_VICTIMS, Robot, Scenario, Shape,
 };
 use crate::error::Result;
 use crate::fault::{Fault, Spec};
@@ -166,6 +166,25 @@ impl Scenario {
             let rule = format!("must be below half of arena_half_width_m = {half} m");
             return broken(&format!("robots[{index}].radius_m"), &self.robots[index].radius_m, &rule);
         }
-        Ok(())
+        self.validate_travel()
+    }
+
+    /// Refuses speeds at which rapier lets robots sink into each other.
+    fn validate_travel(&self) -> Result<()> {
+        let substep = self.dt_s / f64::from(self.substeps);
+        let smallest = self.robots.iter().map(|robot| robot.radius_m).fold(f64::INFINITY, f64::min);
+        let most = MAX_TRAVEL_RADII * smallest / substep;
+        let too_fast = |robot: &Robot| robot.max_speed_mps > most * (1.0 + 1e-12);
+        match self.robots.iter().position(too_fast) {
+            Some(index) if self.engine == Engine::Rapier => {
+                let rule = format!(
+                    "must be at most {most:.6} m/s: no robot may move farther in a substep (dt_s / substeps = \
+                     {substep:.6} s) than {MAX_TRAVEL_RADII} times the smallest radius_m ({smallest} m); use \
+                     more substeps, a smaller dt_s or engine = \"discs\""
+                );
+                broken(&format!("robots[{index}].max_speed_mps"), &self.robots[index].max_speed_mps, &rule)
+            }
+            _ => Ok(()),
+        }
     }
 }

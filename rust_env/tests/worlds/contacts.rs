@@ -1,13 +1,17 @@
 //! Contacts are true: they keep momentum and gain no energy, mass counts, what passes by is left alone
 //! and what is hit moves on as it does in the same scene at sixteen times the substeps.
 
+use innerattn_env::fault::{HEALTHY, Kind};
 use innerattn_env::geometry::Vec2;
 use innerattn_env::physics::Workspace;
+use innerattn_env::reward::NUM_COMPONENTS;
 use innerattn_env::rng::Stream;
+use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Engine, Scenario};
+use innerattn_env::world::World;
 
-use crate::common::{ENGINES, chance, mixed_team};
+use crate::common::{ENGINES, chance, mixed_team, some_obstacles};
 
 /// A team in motion, for periods in which nobody drives.
 struct Scene {
@@ -197,4 +201,43 @@ fn struck(at: [Vec2; 2], velocities: [Vec2; 2], reach: f32, masses: (f32, f32)) 
     let normal = (apart + closing * time).normalize();
     let impulse = normal * (closing.dot(&normal) * masses.0 * masses.1 / (masses.0 + masses.1));
     [velocities[0] + impulse / masses.0, velocities[1] - impulse / masses.1]
+}
+
+#[test]
+fn a_step_of_discs_ends_whatever_the_speed_limits() {
+    let team = |count| [Scenario::default().robots, mixed_team(count)];
+    let mut chance = chance(12);
+    for (case, robots) in [4, 8, 16].into_iter().flat_map(team).enumerate() {
+        let obstacles = if case % 2 == 0 { vec![] } else { some_obstacles() };
+        let count = robots.len();
+        let scenario = Scenario { engine: Engine::Discs, robots, obstacles, ..Scenario::default() };
+        let rules = Rules::new(scenario).expect("a valid scenario");
+        let (mut workspace, mut rescues) = (Workspace::default(), vec![]);
+        for limit in [-1.0, -0.01, -30.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38, -1e38] {
+            for stream in 0..100 {
+                let mut world = World::new(&rules, 0, stream);
+                let mut levels = vec![HEALTHY; count];
+                for level in &mut levels {
+                    if stream % 2 == 0 || chance.below(2) == 0 {
+                        level[Kind::SpeedLimit as usize] = limit;
+                    }
+                }
+                world.set_faults(&rules, &levels);
+                for _ in 0..40 {
+                    let actions: Vec<i64> = (0..count).map(|_| 1 + chance.below(4) as i64).collect();
+                    let commands = Commands::Discrete(&actions);
+                    let (mut components, mut reward) = (vec![0.0; count * NUM_COMPONENTS], vec![0.0; count]);
+                    world.step(
+                        &rules,
+                        &mut workspace,
+                        commands,
+                        0,
+                        &mut rescues,
+                        &mut components,
+                        &mut reward,
+                    );
+                }
+            }
+        }
+    }
 }

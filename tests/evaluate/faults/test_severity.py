@@ -35,7 +35,7 @@ def test_from_health_to_the_worst(kind: str) -> None:
 @pytest.mark.parametrize("severity", [0.0, 0.5, 1.0])
 def test_worlds_take_all_of_them_even_in_huge_arenas(kind: str, severity: float) -> None:
     robots = [robot.replace(max_speed_mps=90.0) for robot in SCENARIO.robots]
-    huge = SCENARIO.replace(arena_half_width_m=80.0, robots=robots)
+    huge = SCENARIO.replace(arena_half_width_m=80.0, robots=robots, engine="discs")
     fault = fault_of(huge, 2, kind, severity)
     with closing(BatchEnv(huge.replace(faults=(fault,)), 1, num_threads=1)) as env:
         assert env.fault_state()[kind][0, 2] == pytest.approx(fault.value)

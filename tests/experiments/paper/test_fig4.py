@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from reseal import reseal
 
 from innerattn.errors import RunError
 from innerattn.experiments.paper.fig4 import PRINTED_NATS, EntropyCourse, fig4, fig4_json
@@ -112,8 +113,10 @@ def test_csv_and_json_hold_the_same_numbers(courses: list[EntropyCourse]) -> Non
 def test_runs_logged_at_other_times_are_refused(runs: list[FinishedRun]) -> None:
     folder = runs[0].folder.with_name("other-times")
     folder.mkdir()
+    (folder / "run.json").write_bytes((runs[0].folder / "run.json").read_bytes())
     text = (runs[0].folder / "metrics.jsonl").read_text().replace('00, "att', '50, "att')
     (folder / "metrics.jsonl").write_text(text)
+    reseal(folder)
     with pytest.raises(RunError, match="never logged at the same env_steps"):
         fig4([runs[1], replace(runs[0], folder=folder)])
     with pytest.raises(RunError, match="not the metrics of a run"):

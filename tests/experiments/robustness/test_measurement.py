@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from reseal import reseal
 
 from innerattn.cli.main import main
 from innerattn.errors import RunError
@@ -74,6 +75,7 @@ def test_other_weights_are_another_measurement(study: Path, planned: list[Planne
     path = planned[1].folder / "run.json"
     info = json.loads(path.read_text())
     path.write_text(json.dumps({**info, "weights_sha256": 64 * "0"}))
+    reseal(path.parent)
     found = scan_runs(planned, study)
     assert len(missing_measurements(found, study)) == 1
     assert read_measurements(finished_runs(found), study) == []

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from markdown_rows import rows_of
+from reseal import reseal
 
 from innerattn.config import read_toml
 from innerattn.errors import RunError
@@ -202,6 +203,7 @@ def test_runs_with_and_without_a_warm_start_are_not_one_method(
     text = config.read_text()
     assert 'warm_start = "none"' in text
     config.write_text(text.replace('warm_start = "none"', 'warm_start = "greedy"'))
+    reseal(warm)
     started = read_run(runs[0].case, warm)
     for pair in ([started, runs[1]], [runs[1], started]):
         with pytest.raises(RunError, match=r"listed as the same but for the seed.*train"):

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from innerattn.config.files import write_whole
+from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json, read_plain
 from innerattn.errors import RunError
 from innerattn.experiments.processes import Job
 from innerattn.experiments.robustness.design import Group, groups
 from innerattn.experiments.robustness.documents import GroupResult, group_result
 from innerattn.experiments.run import FinishedRun
 from innerattn.experiments.scan import RunStatus, finished_runs
-from innerattn.records.run_folder import plain_file
 
 FOLDER = "faults"
 """Holds the documents in a study's folder."""
@@ -96,7 +96,7 @@ def read_measurements(runs: Sequence[FinishedRun], out: Path) -> list[GroupResul
         path = _path(group, [by_case[case] for case in group.cases], out)
         if path.exists():
             try:
-                document = json.loads(plain_file(path).read_text("utf-8"))
+                document = parse_json(read_plain(path, MOST_JSON_BYTES))
                 measured.append(group_result(group, document))
             except (OSError, ValueError, LookupError, TypeError) as error:
                 reason = "not a measurement under faults of this version; remove it"

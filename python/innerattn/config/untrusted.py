@@ -1,0 +1,151 @@
+"""Files that may be damaged or hostile: plain ones of a bounded size, and JSON and TOML in them.
+
+Every limit is checked before memory or time is spent on what lies beyond it. It knows no key.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any, NoReturn
+
+from innerattn.errors import RunError
+
+MOST_JSON_BYTES = 64 << 20
+MOST_TOML_BYTES = 1 << 20
+_MOST_DEPTH = 64
+_MOST_KEYS = 20_000
+_MOST_KEY_PARTS = 16
+_MOST_DIGITS = 40
+
+_QUOTED = re.compile(r'"(?:[^"\\\n]|\\[^\n])*+"|\'[^\'\n]*+\'')
+_MANY_PARTS = re.compile(rf"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++){{{_MOST_KEY_PARTS},}}")
+
+
+def read_plain(path: Path, most_bytes: int, *, follow_link: bool = False) -> bytes:
+    """The bytes of a plain file, read once and whole.
+
+    Args:
+        path: the file.
+        most_bytes: how long it may be.
+        follow_link: whether ``path`` may be a link to the file.
+
+    Raises:
+        RunError: it is missing, a link, a folder, a pipe or a device, or longer than that.
+        OSError: it cannot be read.
+    """
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
+    flags |= getattr(os, "O_BINARY", 0)
+    if not follow_link:
+        flags |= getattr(os, "O_NOFOLLOW", 0)
+        if path.is_symlink():
+            raise _not_plain(path)
+    try:
+        descriptor = os.open(path, flags)
+    except PermissionError:
+        raise
+    except OSError as error:
+        raise _not_plain(path) from error
+    found = os.fstat(descriptor)
+    if not stat.S_ISREG(found.st_mode):
+        os.close(descriptor)
+        raise _not_plain(path)
+    with os.fdopen(descriptor, "rb") as file:
+        if found.st_size > most_bytes:
+            raise RunError(f"{path}: has {found.st_size} bytes: must have at most {most_bytes}")
+        data = file.read(found.st_size + 1)
+    if len(data) != found.st_size:
+        raise RunError(f"{path}: grew or shrank while it was read")
+    return data
+
+
+def parse_json(text: str | bytes) -> Any:
+    """The document in a JSON text, without what Python's own reader adds to JSON.
+
+    Raises:
+        ValueError: it is no JSON, names a key of an object twice, is nested more than 64 deep, or
+            holds a number that is not finite or has more than 40 digits.
+    """
+    try:
+        document = json.loads(
+            text,
+            parse_int=_whole_number,
+            parse_float=_finite_number,
+            parse_constant=_no_number,
+            object_pairs_hook=_no_key_twice,
+        )
+    except RecursionError as error:
+        raise ValueError(f"is nested more than {_MOST_DEPTH} deep") from error
+    _refuse_deep(document)
+    return document
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """The table in a TOML text.
+
+    Raises:
+        ValueError: it is no TOML, or larger in some way than any configuration is.
+    """
+    if text.count("=") > _MOST_KEYS or text.count("[") > _MOST_KEYS:
+        raise ValueError(f"more than {_MOST_KEYS} keys or tables")
+    if _MANY_PARTS.search(_QUOTED.sub("q", text)):
+        raise ValueError(f"a key of more than {_MOST_KEY_PARTS} parts")
+    try:
+        table = tomllib.loads(text)
+    except RecursionError as error:
+        raise ValueError(f"nested more than {_MOST_DEPTH} deep") from error
+    _refuse_deep(table)
+    return table
+
+
+def _not_plain(path: Path) -> RunError:
+    return RunError(f"{path}: missing, or not a plain file")
+
+
+def _whole_number(text: str) -> int:
+    if len(text) > _MOST_DIGITS:
+        raise ValueError(f"a number has {len(text)} digits: must have at most {_MOST_DIGITS}")
+    return int(text)
+
+
+def _finite_number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text[:_MOST_DIGITS]} is not finite")
+    return value
+
+
+def _no_number(text: str) -> NoReturn:
+    raise ValueError(f"{text} is not a number of JSON")
+
+
+def _no_key_twice(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the key {twice[:_MOST_DIGITS]!r} comes twice")
+    return found
+
+
+def _refuse_deep(document: Any) -> None:
+    """Refuse nesting and whole numbers that no document of ours has."""
+    level = [document]
+    for _ in range(_MOST_DEPTH):
+        nested: list[Any] = []
+        for value in level:
+            if isinstance(value, dict):
+                nested += value.values()
+            elif isinstance(value, list):
+                nested += value
+            elif isinstance(value, int) and abs(value) >= 10**_MOST_DIGITS:
+                raise ValueError(f"a number has more than {_MOST_DIGITS} digits")
+        if not nested:
+            return
+        level = nested
+    raise ValueError(f"is nested more than {_MOST_DEPTH} deep")

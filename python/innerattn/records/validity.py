@@ -1,0 +1,84 @@
+"""What a record cannot be, whatever the file says that it was read from."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.records.record import Record
+
+_MOST_EPISODE = 2**53
+_KINDS = "biuf"
+
+
+def step_dtype(text: Any) -> np.dtype[Any]:
+    """The dtype that a file names: numbers, or fields of numbers.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    dtype = np.dtype(text if isinstance(text, str) else [(name, kind) for name, kind in text])
+    parts = [dtype[name] for name in dtype.names] if dtype.names else [dtype]
+    if any(part.kind not in _KINDS or part.itemsize > 8 or part.shape for part in parts):
+        raise ValueError(f"dtype {str(dtype)[:80]}: must be numbers of at most 64 bits")
+    return dtype
+
+
+def step_shape(rows: int, shape: Any, length: int, found: int) -> tuple[int, ...]:
+    """The shape of what was recorded step by step, if it is that of what is there.
+
+    Args:
+        rows: episodes E.
+        shape: what the file names, (T, ...).
+        length: steps of an episode T.
+        found: numbers that are there.
+
+    Raises:
+        ValueError: it is not.
+    """
+    sizes = [rows, *shape]
+    if not all(isinstance(size, int) and 0 <= size < 2**31 for size in sizes) or len(sizes) > 8:
+        raise ValueError(f"shape {str(shape)[:80]}: must be a few sizes")
+    if sizes[1:2] != [length] or math.prod(sizes) != found:
+        raise ValueError(f"shape {sizes}: must have {length} steps and {found} numbers")
+    return tuple(sizes)
+
+
+def refuse_impossible(record: Record) -> None:
+    """Refuse numbers that no play leaves behind.
+
+    Raises:
+        ValueError: one that names what is wrong.
+    """
+    scenario = record.scenario
+    _within("seed", record.seed, 0, 2**64 - 1)
+    _within("first episode", record.first_episode, 0, _MOST_EPISODE)
+    if record.robot_names != tuple(robot.name for robot in scenario.robots):
+        raise ValueError("robot names: must be those of the scenario")
+    _all_within("steps", record.lengths, 1, scenario.episode_steps)
+    events = record.rescues
+    episodes = events["episode"] - record.first_episode
+    _all_within("episode of a rescue", episodes, 0, record.num_episodes - 1)
+    _all_within("slot of a rescue", events["slot"], 0, scenario.num_victims - 1)
+    _all_within("victim of a rescue", events["victim"], 0, 2**32 - 1)
+    if (events["step"] < 0).any() or (events["step"] >= record.lengths[episodes]).any():
+        raise ValueError("step of a rescue: must be one of its episode")
+    for name, values in {"reward": record.rewards_total, **record.steps}.items():
+        for part in [values[field] for field in values.dtype.names or ()] or [values]:
+            if not np.isfinite(part).all():
+                raise ValueError(f"{name}: must be finite")
+
+
+def _within(name: str, value: Any, low: int, high: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise ValueError(f"{name} = {str(value)[:80]}: must be in {low}..={high}")
+
+
+def _all_within(name: str, values: NDArray[Any], low: int, high: int) -> None:
+    if values.dtype.kind not in "iu":
+        raise ValueError(f"{name}: must be whole numbers")
+    if len(values) and not (low <= int(values.min()) and int(values.max()) <= high):
+        raise ValueError(f"{name}: must be in {low}..={high}")

@@ -1,0 +1,93 @@
+//! Images that were forged, with a right checksum.
+
+use super::*;
+use crate::scenario::{Obstacle, Scenario, Shape};
+
+fn rules(scenario: Scenario) -> Rules {
+    Rules::new(scenario).expect("a valid scenario")
+}
+
+/// Why worlds are refused that are no worlds of these rules, though the checksum is right.
+fn refusal(change: impl Fn(&mut World)) -> String {
+    let rules = rules(Scenario { episode_steps: 9, end_when_rescued: Some(3), ..Scenario::default() });
+    let mut worlds = [World::new(&rules, 0, 0), World::new(&rules, 0, 1)];
+    assert_eq!(load(&rules, 2, &save(&rules, 2, worlds.iter())), Ok(worlds.to_vec()));
+    change(&mut worlds[1]);
+    let error = load(&rules, 2, &save(&rules, 2, worlds.iter())).expect_err("a forged image").to_string();
+    error.strip_prefix("snapshot: env 1 does not fit the scenario: its ").unwrap_or(&error).into()
+}
+
+#[test]
+fn worlds_that_do_not_fit_are_refused() {
+    type Change = fn(&mut World);
+    let changes: [(&str, Change); 31] = [
+        ("episode", |world| world.episode = u64::MAX),
+        ("step", |world| world.step = 10),
+        ("step", |world| world.step = u32::MAX),
+        ("over", |world| world.step = 9),
+        ("over", |world| world.over = true),
+        ("over", |world| world.rescued = 3),
+        ("fresh", |world| world.episode = 1),
+        ("fresh", |world| world.step = 1),
+        ("rescued", |world| world.rescued = 1),
+        ("appeared", |world| world.appeared = 0),
+        ("appeared", |world| world.appeared = u32::MAX),
+        ("victim_words", |world| world.victim_words = 1 << 40),
+        ("positions", |world| world.positions[2].x = f32::NAN),
+        ("positions", |world| world.positions[2].x = 1.01),
+        ("positions", |world| world.positions[3].y = -7.0),
+        ("positions", |world| world.positions.push(Vec2::zeros())),
+        ("velocities", |world| world.velocities[0].y = f32::INFINITY),
+        ("velocities", |world| world.velocities[0].y = 2e4),
+        ("velocities", |world| world.velocities.clear()),
+        ("obstacles", |world| world.obstacles.push(Vec2::zeros())),
+        ("victims", |world| world.victims.push(None)),
+        ("appeared", |world| world.victims.clear()),
+        ("victims", |world| world.victims[0].as_mut().expect("one is present").task = 2),
+        ("victims", |world| world.victims[0].as_mut().expect("one is present").id = 9),
+        ("victims", |world| world.victims[0].as_mut().expect("one is present").appeared_step = 1),
+        ("victims", |world| world.victims[0].as_mut().expect("one is present").position.x = 0.95),
+        ("victims", |world| world.victims[0].as_mut().expect("one is present").position.y = f32::NAN),
+        ("victims", |world| {
+            world.victims = vec![world.victims[0]; 2];
+            world.appeared = 2;
+        }),
+        ("victims", |world| {
+            (world.victims, world.appeared) = (vec![None; 2], 0);
+        }),
+        ("faults", |world| world.faults.forge_level(0, 1, -1.0)),
+        ("faults", |world| world.faults.forge_level(0, 1, 0.5)),
+    ];
+    for (number, (what, change)) in changes.into_iter().enumerate() {
+        assert_eq!(refusal(change), what, "change {number}");
+    }
+}
+
+#[test]
+fn obstacles_stay_where_they_are_given() {
+    let disc =
+        |position_m| Obstacle { shape: Shape::Disc, radius_m: Some(0.1), half_extents_m: None, position_m };
+    let rules =
+        rules(Scenario { obstacles: vec![disc(Some([0.5, 0.5])), disc(None)], ..Scenario::default() });
+    let refused = |index: usize, at: Vec2| {
+        let mut world = World::new(&rules, 0, 0);
+        world.obstacles[index] = at;
+        load(&rules, 1, &save(&rules, 1, [world].iter())).is_err()
+    };
+    assert!(refused(0, Vec2::new(0.5, 0.4)) && !refused(0, Vec2::new(0.5, 0.5)));
+    assert!(refused(1, Vec2::new(0.0, 0.91)) && !refused(1, Vec2::new(0.0, 0.89)));
+}
+
+#[test]
+fn another_version_and_bytes_left_over_are_refused() {
+    let rules = rules(Scenario::default());
+    let head = Head { version: VERSION + 1, scenario: rules.scenario.to_json(), num_envs: 0 };
+    let image = sealed(postcard::to_extend(&head, MAGIC.to_vec()).expect("plain data serialises"));
+    let error = load(&rules, 0, &image).expect_err("another version").to_string();
+    assert_eq!(error, "snapshot: version 3 was found; this version reads 2");
+    let mut image = save(&rules, 1, [World::new(&rules, 0, 0)].iter());
+    image.truncate(image.len() - CHECKSUM_BYTES);
+    image.extend([0; 3]);
+    let error = load(&rules, 1, &sealed(image)).expect_err("an extended image").to_string();
+    assert_eq!(error, "snapshot: 3 bytes are left over after the last env");
+}
