@@ -33,6 +33,10 @@ def one_thread() -> Iterator[None]:
         yield
 
 
+def go_on() -> None:
+    """Nobody interrupts."""
+
+
 def run(scenario: Scenario, method: str = "mappo", **values: object) -> RunConfig:
     shaped = {"train.potential": "hungarian", "train.threads": 1, "train.potential_env_steps": 5000}
     small = {"network.hidden_width": 8, "td.warmup_env_steps": 100_000, "td.replay_capacity": 2000}
@@ -47,7 +51,7 @@ def test_shaping_changes_returns_only_by_the_potential_at_both_ends(discount: fl
     config = run(scenario, **{"train.potential_discount": discount})
     ends = {"terminated": 0, "truncated": 0}
     with closing(BatchEnv(scenario, 200, seed=5, num_threads=1)) as env:
-        potential, _ = fitted_potential(config, env)
+        potential, _ = fitted_potential(config, env, go_on)
         collector = shaped_collector(config, env, potential)
         first = potential.values(torch.from_numpy(env.observe()))
         shaped = torch.zeros(200, dtype=torch.float64)
@@ -119,7 +123,7 @@ def test_the_potential_is_the_scripts_value(obstacles: tuple[Obstacle, ...]) -> 
     values = {"train.potential_env_steps": 60_000, "train.potential_discount": 0.9}
     config = run(scenario, **values)
     with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
-        potential, correlation = fitted_potential(config, env)
+        potential, correlation = fitted_potential(config, env, go_on)
     obs, returns = discounted_returns(scenario, 0.9)
     phi = potential.values(torch.from_numpy(obs)).numpy()
     assert np.corrcoef(phi, returns)[0, 1] > 0.8
@@ -131,7 +135,7 @@ def test_a_turned_state_has_the_same_potential() -> None:
     scenario = Scenario.preset("mixed")
     config = run(scenario)
     with closing(BatchEnv(scenario, 100, seed=3, num_threads=1)) as env:
-        potential, _ = fitted_potential(config, env)
+        potential, _ = fitted_potential(config, env, go_on)
         obs = torch.from_numpy(env.reset())
         symmetry = SquareSymmetry(vector_columns(env.observation_names()), torch.device("cpu"))
     values = potential.values(obs)
@@ -146,10 +150,29 @@ def test_where_nobody_is_rescued_the_potential_is_nothing() -> None:
     scenario = Scenario.preset("mixed").replace(episode_steps=1)
     config = run(scenario, **{"train.potential": "random"})
     with closing(BatchEnv(scenario, 10, seed=3, num_threads=1)) as env:
-        potential, correlation = fitted_potential(config, env)
+        potential, correlation = fitted_potential(config, env, go_on)
         values = potential.values(torch.from_numpy(env.reset()))
     assert -1.0 <= correlation <= 1.0
     assert values.abs().max() < 1e-4
+
+
+@pytest.mark.parametrize("after", [0, 3, 8])
+def test_a_fit_can_be_interrupted(after: int) -> None:
+    config = run(Scenario.preset("mixed"))
+    calls = 0
+
+    def press_ctrl_c() -> None:
+        nonlocal calls
+        calls += 1
+        if calls > after:
+            raise KeyboardInterrupt
+
+    with (
+        closing(BatchEnv(config.scenario, 10, seed=3, num_threads=1)) as env,
+        pytest.raises(KeyboardInterrupt),
+    ):
+        fitted_potential(config, env, press_ctrl_c)
+    assert calls == after + 1
 
 
 def test_td_weighs_the_remembered_potential_anew() -> None:
@@ -157,7 +180,7 @@ def test_td_weighs_the_remembered_potential_anew() -> None:
     ramps = {"train.schedule": {"potential_weight": WEIGHT}}
     config = run(scenario, "td-inner", **ramps)
     with closing(BatchEnv(scenario, 50, seed=5, num_threads=1)) as env:
-        potential, _ = fitted_potential(config, env)
+        potential, _ = fitted_potential(config, env, go_on)
         collector = shaped_collector(config, env, potential)
         learner = build_learner(config, env)
         schedule = Schedule(config, env, learner)
@@ -174,19 +197,27 @@ def test_td_weighs_the_remembered_potential_anew() -> None:
         torch.testing.assert_close(learner.replay.reward_mean, (parts @ weights).mean(0))  # type: ignore[attr-defined]
 
 
-def test_the_script_plays_on_from_where_robots_wandered() -> None:
-    scenario = Scenario.preset("mixed").replace(episode_steps=20)
-    play = play_script("hungarian", scenario, 60 * 1024 - 5, seed=4, threads=1)
-    assert play.obs.shape[:2] == play.reward.shape == (60, 1024)
-    assert len(play.after) == int(play.cut.sum()) == 3 * 1024
-    episodes = play.scripted.view(3, 20, 1024)
-    assert bool((episodes[:, 1:] >= episodes[:, :-1]).all())
-    assert episodes.sum(1).unique().tolist() == list(range(10, 21))
-    by_script = play.reward[play.scripted].mean()
-    assert by_script > 5 * play.reward[~play.scripted].mean()
-    again = play_script("hungarian", scenario, 60 * 1024 - 5, seed=4, threads=1)
-    other = play_script("hungarian", scenario, 60 * 1024 - 5, seed=5, threads=1)
-    assert torch.equal(play.obs, again.obs)
+def test_a_play_is_that_of_the_script() -> None:
+    scenario = Scenario.preset("mixed").replace(episode_steps=20, rescue_reward=3.0)
+    play = play_script("hungarian", scenario, 50 * 1024 - 5, seed=4, threads=1, check=go_on)
+    script = scripted_policy("hungarian", scenario)
+    reward, after = torch.zeros(50, 1024), []
+    with closing(BatchEnv(scenario, 1024, seed=4, num_threads=1)) as env:
+        now = env.reset()
+        for t in range(50):
+            assert torch.equal(play.obs[t], torch.tensor(now))
+            step = env.step(script.act(PolicyInput(now, WorldState.of(env))))
+            for event in step.rescues:
+                reward[t, event["env"]] += 3.0
+            if t in (19, 39, 49):
+                after.append(torch.from_numpy(step.final_obs.copy()))
+            now = step.obs
+    assert torch.equal(play.reward, reward)
+    assert torch.equal(play.after, torch.cat(after))
+    assert play.ended.sum(1).nonzero().squeeze(1).tolist() == [19, 39]
+    assert play.cut.sum(1).nonzero().squeeze(1).tolist() == [19, 39, 49]
+    assert not play.terminated.any()
+    other = play_script("hungarian", scenario, 50 * 1024 - 5, seed=5, threads=1, check=go_on)
     assert not torch.equal(play.obs, other.obs)
 
 

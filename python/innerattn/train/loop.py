@@ -174,8 +174,7 @@ class _Loop:
 
     def _fit_potential(self) -> None:
         """Let a script's value shape rewards; the first line of metrics says how well it fits."""
-        self._check_interrupted()
-        potential, correlation = fitted_potential(self._run, self._env)
+        potential, correlation = fitted_potential(self._run, self._env, self._check_interrupted)
         self._schedule.shape(potential)
         self._interval.add_losses({"potential_correlation": correlation})
 

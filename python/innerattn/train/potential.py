@@ -7,6 +7,7 @@ It shapes rewards by F = discount * Phi(s') - Phi(s) and knows no learner. Sourc
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -87,8 +88,12 @@ class Potential:
             values[new] = self.values(obs[new])
         return values
 
-    def fit(self, play: Play) -> float:
+    def fit(self, play: Play, check: Callable[[], None]) -> float:
         """Fit Phi to the lambda-returns of a script's play, by fitted value iteration.
+
+        Args:
+            play: the play; its observations are turned in place, since they may be large.
+            check: called before each pass.
 
         Returns:
             The correlation of Phi with the discounted returns in worlds that were held out. Where
@@ -96,11 +101,10 @@ class Potential:
             one of both never changes.
         """
         steps, worlds = play.reward.shape
-        rows = self._as_rows(play.obs.flatten(0, 1))
-        after = self._as_rows(play.after)
+        rows, after = self._as_rows_in_place(play.obs.flatten(0, 1)), self._as_rows(play.after)
         held_out = torch.arange(worlds, device=rows.device) % _HELD_OUT == _HELD_OUT - 1
-        fitted = (play.scripted & ~held_out).flatten().nonzero().squeeze(1)
-        self._mean = play.reward[play.scripted].mean() / (1.0 - self.discount)
+        fitted = (~held_out).repeat(steps).nonzero().squeeze(1)
+        self._mean = play.reward.mean() / (1.0 - self.discount)
         self._deviation = torch.ones_like(self._mean)
         first = self._returns(play, self._mean.expand(steps * worlds), self._mean, _LAMBDA)
         self._deviation = first.flatten()[fitted].std().clamp_min(1e-6)
@@ -109,6 +113,7 @@ class Potential:
         total = _PASSES * -(-len(fitted) // _MINIBATCH)
         rates = iter(torch.linspace(1.0, 0.01, total, dtype=torch.float64) * _LEARNING_RATE)
         for _ in range(_PASSES):
+            check()
             target = self._returns(play, self._all(rows), self._all(after), _LAMBDA).flatten()
             order = torch.randperm(len(fitted), generator=self._generator).to(fitted.device)
             for chosen in torch.split(fitted[order], _MINIBATCH):
@@ -116,7 +121,7 @@ class Potential:
                 gradients, _ = adam.gradients(partial(self._loss, some, wanted))
                 adam.step(gradients, next(rates))
         values = self._all(rows)
-        seen = (play.scripted & held_out).flatten()
+        seen = held_out.repeat(steps)
         returns = self._returns(play, values, self._all(after), 1.0).flatten()
         correlation = torch.corrcoef(torch.stack([values[seen], returns[seen]]))[0, 1]
         return float(correlation.nan_to_num())
@@ -151,6 +156,12 @@ class Potential:
         standard: Tensor = self._network(rows.unsqueeze(0), _NO_ACTIONS).q[0, 0]
         return self._mean + self._deviation * standard
 
+    def _as_rows_in_place(self, obs: Tensor) -> Tensor:
+        """As `_as_rows`, in the memory of the observations."""
+        for some in torch.split(obs, _CHUNK):
+            some.copy_(self._as_rows(some).view(some.shape))
+        return obs.flatten(1)
+
     def _as_rows(self, obs: Tensor) -> Tensor:
         """Observations (B, R, D) as one row for each state, (B, R * D)."""
         if self._symmetry is not None:
@@ -158,12 +169,15 @@ class Potential:
         return obs.flatten(1)
 
 
-def fitted_potential(config: RunConfig, env: BatchEnv) -> tuple[Potential, float]:
+def fitted_potential(
+    config: RunConfig, env: BatchEnv, check: Callable[[], None]
+) -> tuple[Potential, float]:
     """Phi of the script `train.potential` in the training worlds, and how well it fits.
 
     Args:
         config: the run.
         env: its training worlds; they are not stepped.
+        check: called again and again on the way; what it raises is passed on.
 
     Returns:
         Phi, and its correlation with returns that were held out, see `Potential.fit`.
@@ -179,6 +193,7 @@ def fitted_potential(config: RunConfig, env: BatchEnv) -> tuple[Potential, float
         train.potential_env_steps,
         seed=int(numbers[0]),
         threads=train.threads,
+        check=check,
     )
     device = torch.device(train.device)
     potential = Potential(
@@ -188,4 +203,4 @@ def fitted_potential(config: RunConfig, env: BatchEnv) -> tuple[Potential, float
         torch.Generator().manual_seed(int(numbers[1])),
         device,
     )
-    return potential, potential.fit(Play._make(tensor.to(device) for tensor in play))
+    return potential, potential.fit(Play._make(tensor.to(device) for tensor in play), check)
