@@ -149,6 +149,54 @@ def test_potential_shaping_goes_with_the_learners_discount(method: str) -> None:
     load_run_config(method=method, overrides={"scenario.shaping_discount": 0.9})
 
 
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"train.potential": "planner"}, "train.potential = 'planner': must be 'none', 'random'"),
+        (
+            {"train.potential_discount": 0.9},
+            "train.potential_discount = 0.9: train.potential = 'none' needs None",
+        ),
+        (
+            {"train.schedule": {"potential_weight": {"first": 1.0, "last": 0.0}}},
+            "train.schedule.potential_weight: train.potential = 'none' needs None",
+        ),
+        (
+            {"train.potential": "greedy", "train.potential_discount": 1.0},
+            "train.potential_discount = 1.0: must be less than 1",
+        ),
+        (
+            {"train.potential": "greedy", "td.gamma": 1.0},
+            "train.potential = 'greedy': a potential needs a discount below 1; td.gamma = 1.0",
+        ),
+        (
+            {
+                "train.potential": "greedy",
+                "train.schedule": {"gamma": {"first": 0.9, "last": 0.95}},
+            },
+            "train.potential_discount = None: must be given where train.schedule.gamma",
+        ),
+        (
+            {"train.potential": "greedy", "train.potential_env_steps": 999},
+            "train.potential_env_steps = 999: must be greater than or equal to 1000",
+        ),
+    ],
+)
+def test_potentials_that_make_no_sense_are_refused(values: dict[str, object], message: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(message)):
+        load_run_config(overrides=values)
+
+
+def test_a_potential_has_the_learners_discount_unless_another_is_given() -> None:
+    shaped: dict[str, object] = {"train.potential": "hungarian", "td.gamma": 0.9}
+    assert load_run_config(overrides=shaped).potential_discount == 0.9
+    given = {**shaped, "train.potential_discount": 0.98}
+    assert load_run_config(overrides=given).potential_discount == 0.98
+    ramp = {"train.schedule": {"gamma": {"first": 0.9, "last": 0.95}}}
+    assert load_run_config(overrides={**given, **ramp}).potential_discount == 0.98
+    assert load_run_config(overrides=given).digest() != load_run_config(overrides=shaped).digest()
+
+
 def test_a_fault_begins_within_every_length_that_is_measured() -> None:
     fault = {"robot": "food_0", "kind": "unavailable", "value": 1.0, "onset_step": 100}
     given: dict[str, object] = {"scenario.episode_steps": 200, "scenario.faults": [fault]}
@@ -192,7 +240,10 @@ def test_what_a_run_depends_on(method: str, warm_start: str, unused: set[str]) -
 
 ADDED_SINCE = {
     "network": ("shared_gradients", "joint_critic", "symmetry"),
-    "train": ("episode_steps", "engine", "stagger_starts", "schedule"),
+    "train": (
+        *("episode_steps", "engine", "stagger_starts", "schedule"),
+        *("potential", "potential_discount", "potential_env_steps"),
+    ),
 }
 
 

@@ -76,6 +76,12 @@ class RunConfig(Model):
         section: AlgorithmConfig = getattr(self, methods()[self.train.method].algorithm.name)
         return section
 
+    @property
+    def potential_discount(self) -> float:
+        """Discount of a control step in the potential: `train.potential_discount`, or gamma."""
+        given = self.train.potential_discount
+        return self.algorithm.gamma if given is None else given
+
     def in_use(self) -> dict[str, dict[str, Any]]:
         """The values that the run depends on, as JSON values by section and key.
 
@@ -128,6 +134,7 @@ class RunConfig(Model):
                         f"{section}.{key} = {value!r}: train.method = {name!r} needs {wanted!r}"
                     )
         refuse_late_faults(self.scenario, self.evaluate)
+        self._check_potential()
         gamma, world = self.algorithm.gamma, self.scenario
         if world.shaping == "potential" and self.train.schedule.gamma is not None:
             raise ValueError(
@@ -141,6 +148,31 @@ class RunConfig(Model):
                 f"{gamma!r}"
             )
         return self
+
+    def _check_potential(self) -> None:
+        """Refuse keys of a potential that do not go together."""
+        train = self.train
+        if train.potential == "none":
+            if train.potential_discount is not None:
+                key = f"train.potential_discount = {train.potential_discount!r}"
+            elif train.schedule.potential_weight is not None:
+                key = "train.schedule.potential_weight"
+            else:
+                return
+            raise ValueError(f"{key}: train.potential = 'none' needs None")
+        if train.potential_discount is not None:
+            return
+        if train.schedule.gamma is not None:
+            raise ValueError(
+                "train.potential_discount = None: must be given where train.schedule.gamma changes "
+                "the learner's discount, because a potential has one discount throughout"
+            )
+        if self.algorithm.gamma >= 1.0:
+            raise ValueError(
+                f"train.potential = {train.potential!r}: a potential needs a discount below 1; "
+                f"{self.algorithm.place}.gamma = {self.algorithm.gamma!r}, so "
+                "train.potential_discount must be given"
+            )
 
 
 def _given(section: object) -> Mapping[str, Any]:

@@ -52,6 +52,9 @@ class ScheduleConfig(Model):
     team_credit: Ramp | None = Field(
         None, description="share of the reward for rescues that goes to the whole team, 0 to 1"
     )
+    potential_weight: Ramp | None = Field(
+        None, description="factor of the potential's reward, where train.potential names a script"
+    )
     gamma: Ramp | None = Field(None, description="discount of a control step, 0 to 1")
     entropy_weight: Ramp | None = Field(
         None, description="weight of the policy's entropy; td: the temperature"
@@ -71,4 +74,5 @@ class ScheduleConfig(Model):
     @property
     def weighs_rewards(self) -> bool:
         """Whether the learner weighs reward components itself."""
-        return self.dense_weight is not None or self.team_credit is not None
+        ramps = (self.dense_weight, self.team_credit, self.potential_weight)
+        return any(ramp is not None for ramp in ramps)

@@ -19,6 +19,7 @@ register_attention("uniform", "innerattn.nn:UniformAttention")
 Method = Annotated[str, OneOf(methods)]
 Attention = Annotated[str, OneOf(lambda: (*attentions(), "none"))]
 WarmStart = Literal["none", "hungarian", "greedy"]
+Script = Literal["none", "random", "greedy", "hungarian", "oracle"]
 
 
 class NetworkConfig(Model):
@@ -163,6 +164,25 @@ class TrainConfig(Model):
     )
     schedule: Annotated[ScheduleConfig, ADDED_LATER] = Field(
         default_factory=ScheduleConfig, description="what changes in the course of the run"
+    )
+    potential: Annotated[Script, ADDED_LATER] = Field(
+        "none",
+        description="scripted policy whose value function shapes rewards, as a potential that is "
+        "fitted to the script's play before training",
+    )
+    potential_discount: Annotated[float | None, ADDED_LATER] = Field(
+        None,
+        ge=0.0,
+        lt=1.0,
+        description="discount of a control step in the potential; None: the learner's gamma, with "
+        "which the best policy stays the best; any other biases what is learnt",
+    )
+    potential_env_steps: Annotated[int, ADDED_LATER] = Field(
+        100_000,
+        ge=1_000,
+        le=MOST_ROWS,
+        description="length of the script's play that the potential is fitted to, summed over "
+        "worlds [env-steps]",
     )
 
 

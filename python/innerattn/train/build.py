@@ -64,14 +64,31 @@ def _turning_columns(scenario: Scenario, names: Sequence[str]) -> VectorColumns:
     Raises:
         ConfigError: Obstacles make a turned world another one, which no robot could see.
     """
+    index = _asymmetric_obstacle(scenario)
+    if index is not None:
+        raise ConfigError(
+            f"scenario.obstacles[{index}]: network.symmetry must be 'none' where an obstacle "
+            "has a fixed place or is an oblong box; a turned world would be another one"
+        )
+    return vector_columns(names)
+
+
+def square_symmetry(
+    scenario: Scenario, names: Sequence[str], device: torch.device
+) -> SquareSymmetry | None:
+    """The group for observations of these columns; None where worlds do not have its symmetry."""
+    if _asymmetric_obstacle(scenario) is not None:
+        return None
+    return SquareSymmetry(vector_columns(names), device)
+
+
+def _asymmetric_obstacle(scenario: Scenario) -> int | None:
+    """Number of the first obstacle that makes a turned world another one."""
     for index, obstacle in enumerate(scenario.obstacles):
         sides = obstacle.half_extents_m
         if obstacle.position_m is not None or (sides is not None and sides[0] != sides[1]):
-            raise ConfigError(
-                f"scenario.obstacles[{index}]: network.symmetry must be 'none' where an obstacle "
-                "has a fixed place or is an oblong box; a turned world would be another one"
-            )
-    return vector_columns(names)
+            return index
+    return None
 
 
 _ROWS_PER_THREAD = 512

@@ -66,17 +66,15 @@ class Collector:
         actions = self._learner.act(self._obs)
         step = self._env.step(actions.cpu().numpy())
         truncated = self._tensor(step.truncated)
-        reward, parts = self._tensor(step.reward), None
-        if self._schedule is not None:
-            reward, parts = self._schedule.weigh(step, reward)
         transitions = Transitions(
             obs=self._obs,
             actions=actions,
-            reward=reward,
+            reward=self._tensor(step.reward),
             next_obs=self._tensor(step.final_obs),
             terminated=self._tensor(step.terminated),
-            reward_parts=parts,
         )
+        if self._schedule is not None:
+            transitions = self._schedule.weigh(transitions, step)
         self._obs = self._tensor(step.obs)
         np.add.at(self._open_rescues, step.rescues["env"], 1)
         self._count(step.terminated | step.truncated)

@@ -31,6 +31,7 @@ from innerattn.train.imitate import Imitation
 from innerattn.train.interruption import remembered_interruptions
 from innerattn.train.matmul_backend import best_matmul_backend
 from innerattn.train.metrics import Interval, Metrics, MetricsFile, refuse_divergence
+from innerattn.train.potential import fitted_potential
 from innerattn.train.schedule import Schedule
 
 Stage = Literal["imitating", "training"]
@@ -135,11 +136,11 @@ class _Loop:
         progress: Callable[[Progress], None] | None,
         check_interrupted: Callable[[], None],
     ) -> None:
-        self._config = config.train
+        self._run, self._config = config, config.train
         self._folder = folder
         self._learner = learner
         self._collector = collector
-        self._schedule = schedule
+        self._schedule, self._env = schedule, env
         self._attention = AttentionLog(env.robot_names, env.scenario.episode_steps)
         self._progress = progress
         self._check_interrupted = check_interrupted
@@ -155,6 +156,8 @@ class _Loop:
         interrupted it.
         """
         try:
+            if self._run.train.potential != "none":
+                self._fit_potential()
             if imitation is not None:
                 self._do("imitating", imitation.env_steps, imitation.step)
             self._do("training", self._config.env_steps, self._step)
@@ -169,6 +172,12 @@ class _Loop:
         except BaseException:
             self._mark("interrupted")
             raise
+
+    def _fit_potential(self) -> None:
+        """Let a script's value shape rewards; the first line of metrics says how well it fits."""
+        potential, correlation = fitted_potential(self._run, self._env, self._check_interrupted)
+        self._schedule.shape(potential)
+        self._interval.add_losses({"potential_correlation": correlation})
 
     def _do(self, stage: Stage, total: int, step: Step) -> None:
         """Repeat ``step`` until ``total`` env-steps are done."""

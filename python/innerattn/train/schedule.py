@@ -1,4 +1,4 @@
-"""Follows a run's schedule: weighs reward components, and tells the learner the other numbers."""
+"""Follows a run's schedule: weighs parts of the reward, and tells the learner the other numbers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv, Step
 from innerattn.errors import ConfigError
 from innerattn.learn.framed import FramedLearner
-from innerattn.learn.types import Learner, Scheduled, ScheduledLearner
+from innerattn.learn.types import Learner, Scheduled, ScheduledLearner, Transitions
+from innerattn.train.potential import Potential
 
 _DENSE = "progress"
 """The reward component of shaping."""
@@ -29,30 +30,41 @@ class Schedule:
         """
         self._ramps = config.train.schedule
         self._env, self._world = env, config.scenario
+        self._shaped = config.train.potential != "none"
+        self._potential: Potential | None = None
         self._learner: ScheduledLearner | None = None
-        if self._ramps != type(self._ramps)():
+        if self._shaped or self._ramps != type(self._ramps)():
             inner = learner.learner if isinstance(learner, FramedLearner) else learner
             if not isinstance(inner, ScheduledLearner):
+                key = "train.potential" if self._shaped else "train.schedule"
                 raise ConfigError(
-                    f"train.schedule: method {config.train.method!r} cannot follow one; "
+                    f"{key}: method {config.train.method!r} cannot follow one; "
                     "its learner has no method `follow`"
                 )
             self._learner = inner
         self._weights: Tensor | None = None
         self.set_progress(0.0)
 
+    def shape(self, potential: Potential) -> None:
+        """Let ``potential`` shape rewards; to be called before the first step if a run has one."""
+        self._potential = potential
+
     def set_progress(self, share: float) -> None:
         """Follow the ramps to where ``share`` of the run is done, 0 to 1."""
         if self._learner is None:
             return
         ramps = self._ramps
-        if ramps.weighs_rewards:
+        if self._shaped or ramps.weighs_rewards:
             dense = 1.0 if ramps.dense_weight is None else ramps.dense_weight.at(share)
             if ramps.team_credit is None:
                 team = 1.0 if self._world.rescue_credit == "team" else 0.0
             else:
                 team = ramps.team_credit.at(share)
-            self._weights = torch.tensor([1.0 - team, team, dense, 1.0])
+            weights = [1.0 - team, team, dense, 1.0]
+            if self._shaped:
+                ramp = ramps.potential_weight
+                weights.append(1.0 if ramp is None else ramp.at(share))
+            self._weights = torch.tensor(weights)
         self._learner.follow(
             Scheduled(
                 gamma=None if ramps.gamma is None else ramps.gamma.at(share),
@@ -63,21 +75,30 @@ class Schedule:
             )
         )
 
-    def weigh(self, step: Step, reward: Tensor) -> tuple[Tensor, Tensor | None]:
-        """The reward of a step, weighed as the schedule says.
+    def weigh(self, transitions: Transitions, step: Step) -> Transitions:
+        """A control step of all worlds with its reward weighed as the schedule says.
 
         Args:
+            transitions: the E transitions with the worlds' own reward.
             step: what the worlds gave.
-            reward: (E, R) their own reward.
 
         Returns:
-            The reward (E, R) float32, and its parts (E, R, 4), or None where they are not weighed:
-            the helpers' and the team's reward for rescues, shaping, and costs.
+            The transitions with reward (E, R) float32 and `reward_parts` (E, R, P): the helpers'
+            and the team's reward for rescues, shaping, costs and, if the run has one, the
+            potential's. They are as given where nothing is weighed.
         """
         if self._weights is None:
-            return reward, None
-        parts = torch.from_numpy(self._parts(step)).to(reward.device)
-        return parts @ self._weights.to(reward.device), parts
+            return transitions
+        device = transitions.reward.device
+        parts = torch.from_numpy(self._parts(step)).to(device)
+        if self._potential is not None:
+            shaping = self._potential.shaping(
+                transitions.obs, transitions.next_obs, transitions.terminated
+            )
+            shaping = shaping.view(-1, 1, 1).expand(-1, parts.shape[1], 1)
+            parts = torch.cat([parts, shaping], dim=2)
+        reward = parts @ self._weights.to(device)
+        return transitions._replace(reward=reward, reward_parts=parts)
 
     def _parts(self, step: Step) -> NDArray[np.float32]:
         components = self._env.reward_components()
