@@ -14,6 +14,8 @@ import pytest
 from browser import PHONE, WIDE, Visit, opened_browser, until
 
 from innerattn.cli.main import main
+from innerattn.records.run_files import seal
+from innerattn.records.run_folder import run_info
 
 
 def mark(run: Path, **values: Any) -> None:
@@ -28,7 +30,7 @@ def test_a_training_goes_on_under_the_eyes_of_its_reader(run_dir: Path, tmp_path
     lines = (run / "metrics.jsonl").read_text().splitlines(keepends=True)
     (run / "metrics.jsonl").write_text(lines[0])
     (run / "checkpoints").rename(run / "later")
-    mark(run, state="running", env_steps=json.loads(lines[0])["env_steps"])
+    mark(run, state="running", sealed=False, env_steps=json.loads(lines[0])["env_steps"])
     command = [sys.executable, "-m", "innerattn", "watch", str(run), "--episodes", "2"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -47,7 +49,8 @@ def test_a_training_goes_on_under_the_eyes_of_its_reader(run_dir: Path, tmp_path
             assert page.get_by_text("The first checkpoint is not there yet.").is_visible()
             (run / "metrics.jsonl").write_text("".join(lines))
             (run / "later").rename(run / "checkpoints")
-            mark(run, state="done", env_steps=400)
+            ended = {"state": "done", "env_steps": 400}
+            seal(run, run_info(json.loads((run / "run.json").read_text()) | ended))
             page.get_by_text("All trainings have ended.").wait_for()
             assert row.locator("td").nth(2).inner_text() == "400"
             replay = page.frame_locator("#episodes")

@@ -49,7 +49,7 @@ def test_a_run_half_way(run: Path) -> None:
     lines = logged(run)[:2]
     lines[1]["env_steps_per_s"] = 50.0
     (run / "metrics.jsonl").write_text("".join(f"{json.dumps(line)}\n" for line in lines))
-    mark(run, state="running", env_steps=lines[1]["env_steps"])
+    mark(run, state="running", sealed=False, env_steps=lines[1]["env_steps"])
     shutil.rmtree(run / "checkpoints")
     found = read_live(run)
     assert found.checkpoint is None
@@ -60,7 +60,7 @@ def test_a_run_half_way(run: Path) -> None:
 
 def test_a_run_that_has_logged_nothing(run: Path) -> None:
     (run / "metrics.jsonl").unlink()
-    mark(run, state="running", env_steps=0)
+    mark(run, state="running", sealed=False, env_steps=0)
     found = read_live(run)
     assert (found.env_steps, found.times, found.entropy, found.silent_s) == (0, (), (), None)
 

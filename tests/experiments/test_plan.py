@@ -69,5 +69,5 @@ def test_the_command_for_one_run_trains_the_same(
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(ConfigError, match="'triple': known are double, mixed, "):
         plan(METHODS, ("triple",), (0,), "quick", OUT)
-    with pytest.raises(ConfigError, match="'long': known are paper, quick, short"):
+    with pytest.raises(ConfigError, match="'long': known are fast, paper, quick, short, strong"):
         plan(METHODS, SITUATIONS, (0,), "long", OUT)

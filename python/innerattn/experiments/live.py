@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from dataclasses import dataclass
@@ -12,9 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from innerattn.config import RunConfig
+from innerattn.config.untrusted import parse_json, read_plain
 from innerattn.errors import RunError
-from innerattn.records.run_folder import State, newest_weights, plain_file, read_config, read_info
+from innerattn.records.run_folder import State, newest_weights, read_config, read_info
 
+_MOST_BYTES = 1 << 30
 MOST_POINTS = 400
 """As many points of a course are kept; of longer ones every second, third, ..."""
 
@@ -105,7 +106,8 @@ def _read_logged(path: Path) -> list[_Logged]:
     if not path.exists():
         return []
     try:
-        return [_logged(json.loads(line)) for line in plain_file(path).read_text().splitlines()]
+        lines = read_plain(path, _MOST_BYTES).splitlines()
+        return [_logged(parse_json(line)) for line in lines]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not the metrics of a run") from error
 
