@@ -5,7 +5,7 @@ from browser import REQUIRED, opened_browser
 
 
 def test_a_missing_browser(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("shutil.which", lambda name: None)
+    monkeypatch.setattr("shutil.which", lambda _: None)
     monkeypatch.delenv(REQUIRED, raising=False)
     with pytest.raises(pytest.skip.Exception, match="apt-get install"), opened_browser():
         pass
