@@ -37,7 +37,6 @@ TABLES: dict[tuple[str, str], tuple[Path, Mapping[str, tuple[str, ...]]]] = {
     (target, budget): (DOCS / "learning.md", {part: (SCORES, ATTENTION)})
     for target, budget, part in (
         ("learning", "fast", "learning_fast"),
-        ("learning", "strong", "learning_strong"),
         ("learning", "quick", "learning_quick"),
         ("learning", "short", "learning_short"),
         ("learning-entities", "short", "learning_short_entities"),
