@@ -74,15 +74,16 @@ class Watch(Command):
 
 
 def _scripts_beside(folder: Path) -> dict[str, float]:
-    """Rescues per episode of scripts in the worlds of a run's evaluation."""
+    """Rescues per episode of scripts in the worlds that a run trains in."""
     from innerattn.evaluate import run_episodes, scripted_policy
     from innerattn.records.run_folder import read_config
+    from innerattn.train.loop import training_worlds
 
     config = read_config(folder)
-    seed = config.evaluate.seed
+    worlds, seed = training_worlds(config), config.evaluate.seed
     found = {}
     for name in SCRIPTS:
-        policy = scripted_policy(name, config.scenario, seed)
-        played = run_episodes(policy, config.scenario, SCRIPT_EPISODES, seed, num_threads=1)
+        policy = scripted_policy(name, worlds, seed)
+        played = run_episodes(policy, worlds, SCRIPT_EPISODES, seed, num_threads=1)
         found[name] = float(played.rescue_counts().mean())
     return found

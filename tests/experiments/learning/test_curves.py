@@ -36,20 +36,21 @@ def test_a_curve_is_the_mean_over_runs(runs: list[FinishedRun]) -> None:
     own = [run for run in runs if run.method == "td-inner"]
     (curve,) = learning_curves([own])
     assert (curve.situation, curve.method) == ("mixed", "td-inner")
-    assert len(curve.env_steps) == PARTS
-    width = 1200 / PARTS
-    logged = [
-        [json.loads(line) for line in (run.folder / "metrics.jsonl").read_text().splitlines()]
-        for run in own
-    ]
-    for lines in zip(*logged, strict=True):
-        part = int(np.ceil(lines[0]["env_steps"] / width)) - 1
-        values = [line["rescues_per_episode"] for line in lines]
-        if values[0] is None:
-            assert np.isnan(curve.rescues.mean[part])
-        else:
-            assert curve.env_steps[part] == pytest.approx((part + 0.5) * width)
-            assert curve.rescues.mean[part] == pytest.approx(np.mean(values))
+    courses = []
+    for run in own:
+        lines = map(json.loads, (run.folder / "metrics.jsonl").read_text().splitlines())
+        courses.append([one for one in lines if one["rescues_per_episode"] is not None])
+    parts = min(PARTS, 2 * min(map(len, courses)) // 3)
+    width = min(lines[-1]["env_steps"] for lines in courses) / parts
+    means = []
+    for lines in courses:
+        by_part: list[list[float]] = [[] for _ in range(parts)]
+        for one in lines:
+            part = min(int(np.ceil(one["env_steps"] / width - 1e-9)) - 1, parts - 1)
+            by_part[part].append(one["rescues_per_episode"])
+        means.append([np.mean(values) if values else np.nan for values in by_part])
+    np.testing.assert_allclose(curve.env_steps, (np.arange(parts) + 0.5) * width)
+    np.testing.assert_allclose(curve.rescues.mean, np.mean(means, axis=0))
     scripted = own[0].summary["scripted"]
     assert curve.scripts == {name: scripted[name]["mean"] for name in SCRIPTS}
 

@@ -14,7 +14,7 @@ from innerattn.stats.seeds import SeedCurve, seed_curve
 Array = NDArray[np.float64]
 
 PARTS = 40
-"""Points of a curve: means over so many equal parts of a run."""
+"""Points of a curve at most: means over so many equal parts of a run."""
 SCRIPTS = ("hungarian", "greedy")
 """The scripted policies that a curve is shown beside."""
 
@@ -26,10 +26,10 @@ class LearningCurve:
     Attributes:
         situation: of the worlds.
         method: of training.
-        env_steps: (PARTS,) in the middle of each part.
-        rescues: (PARTS,) per episode of training, over runs; NaN where no episode ended.
+        env_steps: (P,) in the middle of each part.
+        rescues: (P,) per training episode, over runs; NaN where no episode ended.
         scripts: rescues per episode of `SCRIPTS` by name, in the worlds of the first run's
-            evaluation.
+            evaluation; empty where training episodes have another length.
     """
 
     situation: str
@@ -57,14 +57,21 @@ def _curve(group: Sequence[FinishedRun]) -> LearningCurve | None:
     if not all(len(steps) for steps, _ in courses):
         return None
     end = min(steps[-1] for steps, _ in courses)
-    edges = np.linspace(0.0, end, PARTS + 1)
+    # Parts are longer than the time between two lines of metrics, so that none is without one.
+    fewest = min(len(steps) for steps, _ in courses)
+    parts = max(1, min(PARTS, 2 * fewest // 3))
+    edges = np.linspace(0.0, end, parts + 1)
     first = group[0]
+    comparable = all(
+        run.config.train.episode_steps in (None, run.config.scenario.episode_steps) for run in group
+    )
+    scripted = first.summary["scripted"] if comparable else {}
     return LearningCurve(
         situation=first.situation,
         method=first.method,
         env_steps=(edges[1:] + edges[:-1]) / 2.0,
         rescues=seed_curve(np.stack([in_parts(steps, values, edges) for steps, values in courses])),
-        scripts={name: float(first.summary["scripted"][name]["mean"]) for name in SCRIPTS},
+        scripts={name: float(scripted[name]["mean"]) for name in SCRIPTS if name in scripted},
     )
 
 

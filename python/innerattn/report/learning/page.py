@@ -47,7 +47,7 @@ def learning_page(found: Learning, budget: str, figure: str | None, left_out: Se
             f"![Rescues per training episode against env-steps]({figure})\n",
             "Curves are training episodes with sampled actions: means over seeds with 95 % "
             "intervals (Student's t), of two seeds the range. Dotted lines are the scripts in the "
-            "worlds of the evaluation.\n",
+            "worlds of the evaluation, where training episodes are as long as those.\n",
         ]
     return "\n".join(parts)
 
