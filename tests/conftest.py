@@ -1,7 +1,9 @@
 """Finished runs for tests of more than one room: trained by the command itself, or made up."""
 
 import shutil
+import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -112,3 +114,11 @@ def crossed_study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[
         made.folder.rename(one.folder)
         found.append(read_run(one.case, one.folder))
     return out, found
+
+
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Ctrl-C interrupts this process and those it begins, whatever it was begun with itself."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

@@ -25,6 +25,7 @@ def mark(run: Path, **values: Any) -> None:
     (run / "new.json").replace(run / "run.json")
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_a_training_goes_on_under_the_eyes_of_its_reader(run_dir: Path, tmp_path: Path) -> None:
     run = Path(shutil.copytree(run_dir, tmp_path / "mine <b>"))
     lines = (run / "metrics.jsonl").read_text().splitlines(keepends=True)

@@ -71,6 +71,7 @@ LONG = Scenario(substeps=1000, arena_half_width_m=0.3, spawn_clearance_m=0.05)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("num_threads", [1, 2])
 def test_ctrl_c_ends_a_long_step_and_nothing_moves(num_threads: int) -> None:
     env = BatchEnv(LONG, 6000, num_threads=num_threads)
@@ -94,7 +95,7 @@ def test_ctrl_c_ends_a_long_step_and_nothing_moves(num_threads: int) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         go_on()
-    assert time.monotonic() - sent < 1.0
+    assert time.monotonic() - sent < 10.0  # fifty steps would take minutes
     thread.join()
     assert env.snapshot() == kept[-1]
     other = BatchEnv(LONG, 6000, num_threads=num_threads)
