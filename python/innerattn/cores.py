@@ -14,8 +14,8 @@ def usable_cores() -> int:
 def let_waiting_threads_sleep() -> None:
     """Let threads of OpenMP sleep while they wait for each other; before torch is imported.
 
-    By default they spin. Where another program takes one of the cores, spinning threads make an
-    update ten times slower, because the one that all others wait for does not get to run. Results
+    By default they spin. Where another program takes one of the cores, spinning threads make
+    updates many times slower, because the one that all others wait for does not get to run. Results
     are the same. What the user has set is left alone.
     """
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
