@@ -55,7 +55,7 @@ def test_a_study_takes_archived_runs_for_runs(
     found = scan_runs(planned, tmp_path)
     assert [one.state for one in found] == ["finished", "finished", "missing", "missing"]
     assert [run.folder for run in finished_runs(found)] == [one.folder for one in planned[:2]]
-    (whole, *_) = scan_runs(planned, tmp_path, whole=True)
+    (whole, *_) = scan_runs(planned, tmp_path, steps=True, archived=False)
     assert (whole.state, whole.why) == ("unreadable", "archived, without metrics and steps")
     other = plan(methods, situations, (0,), "quick", tmp_path, {**small, "td.polyak": 0.5})
     assert scan_runs(other, tmp_path)[0].why == "td.polyak = 0.02, planned 0.5"

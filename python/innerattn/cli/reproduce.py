@@ -6,6 +6,7 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
@@ -81,21 +82,28 @@ class Reproduce(Command):
         from innerattn.experiments.score_means import method_scores
         from innerattn.report.plots.drawing import check_format
 
-        whole = target.whole or self.page is not None
+        page = self.page is not None
+        scan = partial(
+            scan_runs,
+            planned,
+            out,
+            steps=target.steps or page,
+            archived=target.archived and not page,
+        )
         self._check_page(planned)  # before hours of training, not after
         if target.draws:
             check_format(out / "figure.png")
         console = Console(markup=False, highlight=False)
         with StudyLock.take(out) as lock:
-            found = scan_runs(planned, out, whole=whole)
+            found = scan()
             self._print_plan(console, found, out)
             try:
                 if not self.report_only:
                     self._train(found, out, lock)
-                    found = scan_runs(planned, out, whole=whole)
+                    found = scan()
                 jobs = self._measure(target, found, out, lock)
             except KeyboardInterrupt:
-                found = scan_runs(planned, out, whole=whole)
+                found = scan()
                 write_account(out, self.target, self.budget, found)
                 _say_what_is_kept(found)
                 raise

@@ -51,7 +51,9 @@ class RunStatus:
     run: FinishedRun | None = None
 
 
-def scan_runs(planned: Iterable[PlannedRun], out: Path, *, whole: bool = False) -> list[RunStatus]:
+def scan_runs(
+    planned: Iterable[PlannedRun], out: Path, *, steps: bool = False, archived: bool = True
+) -> list[RunStatus]:
     """What is there of each planned run of the study in ``out``; every file is read once.
 
     A run without a folder is taken from the study's archive, if that has it.
@@ -59,16 +61,22 @@ def scan_runs(planned: Iterable[PlannedRun], out: Path, *, whole: bool = False) 
     Args:
         planned: the runs.
         out: folder of the study.
-        whole: whether metrics and steps are needed, so that archived runs do not do.
+        steps: whether the runs' records are to hold what was recorded step by step.
+        archived: whether archived runs do, which hold neither metrics nor steps.
 
     Raises:
         RunError: the study's list of failures or its archive is damaged.
     """
     failures = read_failures(out)
     path = out / archive.FILE
-    archived = archive.read_archive(path) if os.path.lexists(path) else []
-    by_name = {run.folder.name: run for run in archived}
-    found = [_scan(one, by_name.get(one.folder.name), whole) for one in planned]
+    kept = archive.read_archive(path) if os.path.lexists(path) else []
+    by_name = {run.folder.name: run for run in kept}
+    found = [
+        _scan_folder(one, steps)
+        if os.path.lexists(one.folder)
+        else _scan_archive(one, by_name.get(one.folder.name), archived)
+        for one in planned
+    ]
     return [
         RunStatus(one.planned, "failed", failures[name])
         if one.state in TO_TRAIN and (name := one.planned.folder.name) in failures
@@ -96,21 +104,19 @@ def differences(config: RunConfig, planned: RunConfig) -> list[str]:
     ]
 
 
-def _scan(planned: PlannedRun, archived: FinishedRun | None, whole: bool) -> RunStatus:
-    folder = planned.folder
-    if os.path.lexists(folder):
-        return _scan_folder(planned, whole)
-    if archived is None:
+def _scan_archive(planned: PlannedRun, run: FinishedRun | None, does: bool) -> RunStatus:
+    if run is None:
         return RunStatus(planned, "missing")
-    differing = differences(archived.config, planned.config)
+    differing = differences(run.config, planned.config)
     if differing:
         return RunStatus(planned, "other_configuration", _some(differing))
-    if whole:
+    if not does:
         return RunStatus(planned, "unreadable", "archived, without metrics and steps")
-    return RunStatus(planned, "finished", run=replace(archived, case=planned.case, folder=folder))
+    found = replace(run, case=planned.case, folder=planned.folder)
+    return RunStatus(planned, "finished", run=found)
 
 
-def _scan_folder(planned: PlannedRun, whole: bool) -> RunStatus:
+def _scan_folder(planned: PlannedRun, steps: bool) -> RunStatus:
     folder = planned.folder
     try:
         files = RunFiles(folder)
@@ -120,7 +126,7 @@ def _scan_folder(planned: PlannedRun, whole: bool) -> RunStatus:
             return RunStatus(planned, "other_configuration", _some(differing))
         if info.state != "done":
             return RunStatus(planned, "unfinished", f"its state is {info.state!r}")
-        run = measured_run(planned.case, files, config, steps=whole)
+        run = measured_run(planned.case, files, config, steps=steps)
     except NotMeasuredError as error:
         if not os.path.lexists(folder / "checkpoints"):
             return RunStatus(planned, "unreadable", f"it has no weights to measure, and {error}")

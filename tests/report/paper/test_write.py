@@ -55,6 +55,34 @@ def test_the_report_opens_with_one_row_for_each_claim(folder: Path) -> None:
     assert len(text.split()) < 2_500
 
 
+def test_archived_runs_count_for_the_table_and_not_for_the_figures(
+    runs: list[FinishedRun], folder: Path, tmp_path: Path
+) -> None:
+    archived = [replace(run, archived=run.method == "td-uniform" or run.seed == 2) for run in runs]
+    (tmp_path / "some").mkdir()
+    write_report(archived, tmp_path / "some", "quick")
+    write_report([run for run in archived if not run.archived], tmp_path / "full", "quick")
+    for name in FILES["table2"]:
+        assert (tmp_path / "some" / name).read_bytes() == (folder / name).read_bytes()
+    for name in ("fig4.csv", "fig5.json", "fig5_evidence.json"):
+        made = (tmp_path / "some" / name).read_bytes()
+        assert made == (tmp_path / "full" / name).read_bytes(), name
+    assert (tmp_path / "some" / "fig4.csv").read_bytes() != (folder / "fig4.csv").read_bytes()
+    text = (tmp_path / "some" / "report.md").read_text()
+    full = [run for run in archived if not run.archived]
+    methods = ", ".join(sorted({run.method for run in full}, reverse=True))
+    seeds = ", ".join(map(str, sorted({run.seed for run in full})))
+    assert text.count(f"Made of {len(full)} runs, {methods} with seeds {seeds}: the others") == 2
+    assert "Made of" not in (folder / "report.md").read_text()
+
+
+def test_without_metrics_there_is_no_figure(runs: list[FinishedRun], tmp_path: Path) -> None:
+    findings = write_report([replace(run, archived=True) for run in runs], tmp_path, "quick")
+    assert (findings.courses, findings.evidence, findings.scene) == ((), (), None)
+    assert not list(tmp_path.glob("*.png"))
+    assert "No run has attention that chooses" in (tmp_path / "report.md").read_text()
+
+
 def test_all_else_is_linked(runs: list[FinishedRun], folder: Path) -> None:
     text = (folder / "report.md").read_text()
     linked = {name for name in ALL if f"({name})" in text}

@@ -48,6 +48,7 @@ class Findings:
 
     Attributes:
         runs: all runs, by situation and method, then seed.
+        in_full: those that are not archived, which Fig. 4 and Fig. 5 are made of.
         claims: all claims that can be asked of the parts, in the order of `CLAIMS`.
         table: Table II.
         comparison: what stands beside it; there where the table is.
@@ -57,6 +58,7 @@ class Findings:
     """
 
     runs: tuple[FinishedRun, ...]
+    in_full: tuple[FinishedRun, ...]
     claims: tuple[Claim, ...]
     table: Table2 | None
     comparison: Comparison | None
@@ -75,7 +77,8 @@ def find(runs: Sequence[FinishedRun], parts: Collection[str] = PARTS) -> Finding
     """What runs show.
 
     Args:
-        runs: finished runs; they are read only. Archived runs are enough for the table.
+        runs: finished runs; they are read only. Archived runs are enough for the table; Fig. 4 and
+            Fig. 5 are made of the others.
         parts: which of `PARTS`.
 
     Raises:
@@ -87,11 +90,15 @@ def find(runs: Sequence[FinishedRun], parts: Collection[str] = PARTS) -> Finding
     groups = list(by_method(runs).values())
     ordered = tuple(run for group in groups for run in group)
     refuse_unlike(ordered)
+    in_full = tuple(run for run in ordered if not run.archived)
+    groups_in_full = list(by_method(in_full).values()) if in_full else []
     if "fig5" in parts:
-        refuse_without_steps(ordered)
+        refuse_without_steps(in_full)
     table = table2(groups) if "table2" in parts else None
-    courses = tuple(fig4(ordered)) if "fig4" in parts else None
-    found = tuple(filter(None, map(evidence, groups))) if "fig5" in parts else None
+    courses = None
+    if "fig4" in parts:
+        courses = tuple(fig4(in_full)) if in_full else ()
+    found = tuple(filter(None, map(evidence, groups_in_full))) if "fig5" in parts else None
     claims = [
         *(sharing_claims(table) if table else []),
         *entropy_claims(courses or ()),
@@ -99,11 +106,12 @@ def find(runs: Sequence[FinishedRun], parts: Collection[str] = PARTS) -> Finding
     ]
     return Findings(
         runs=ordered,
+        in_full=in_full,
         claims=tuple(sorted(claims, key=lambda claim: CLAIMS.index(claim.claim))),
         table=table,
         comparison=compare(table) if table else None,
         courses=courses,
-        scene=_scene(groups) if "fig5" in parts else None,
+        scene=_scene(groups_in_full) if "fig5" in parts else None,
         evidence=found,
     )
 

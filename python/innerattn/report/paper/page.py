@@ -120,7 +120,7 @@ def _fig4(findings: Findings) -> str:
         f"{markdown(entropy_table(courses))}\n"
         "Black: mean over robots and heads with its band over runs. Colours: robots. Dots at the "
         "right: every head of every run, mean over the last tenth of training. Uniform attention "
-        f"stays at ln(N − 1). Logged at {logged(courses)} env-steps.\n"
+        f"stays at ln(N − 1). Logged at {logged(courses)} env-steps.{_made_of(findings)}\n"
     )
 
 
@@ -135,7 +135,7 @@ def _fig5(findings: Findings) -> str:
             "is the other food robot: what it shows too follows from which victims are there, not "
             "from who hands over. Only handoffs count during which it rescues nobody. The ceiling "
             "is the difference that attention would show which follows each robot's own next "
-            f"rescue. {_FILES['evidence']}\n"
+            f"rescue.{_made_of(findings)} {_FILES['evidence']}\n"
         )
     else:
         text += "No run has handoffs and attention that chooses.\n"
@@ -146,6 +146,16 @@ def _fig5(findings: Findings) -> str:
         f"One handoff as an illustration: {findings.scene.title}. A rule chose it that looks at no "
         f"attention: {SCENE_RULE}.\n"
     )
+
+
+def _made_of(findings: Findings) -> str:
+    """Which runs a figure is made of, where it is not all."""
+    runs = findings.in_full
+    if len(runs) == len(findings.runs):
+        return ""
+    methods = ", ".join(dict.fromkeys(run.method for run in runs))
+    seeds = format_seeds(sorted({run.seed for run in runs}))
+    return f" Made of {len(runs)} runs, {methods} with seeds {seeds}: the others are archived."
 
 
 def _files(findings: Findings) -> str:
