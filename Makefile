@@ -68,7 +68,7 @@ $(VENV)/.built: $(VENV)/.installed $(RUST)
 	@touch $@
 
 lock: $(VENV)/.installed ## renew constraints.txt: the newest versions that pyproject.toml allows
-	PIP_CONSTRAINT= pip install --dry-run --ignore-installed --report $(VENV)/report.json '.[dev,peers]'
+	PIP_CONSTRAINT= pip install --dry-run --ignore-installed --report $(VENV)/report.json '.[dev,log,peers]'
 	@python -c 'import json; found = json.load(open("$(VENV)/report.json"))["install"]; \
 	names = {one["metadata"]["name"].lower(): one["metadata"]["version"].partition("+")[0] for one in found}; \
 	names.pop("innerattn"); \

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, make_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
@@ -20,15 +20,24 @@ from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
 from innerattn.config.registry import methods
 from innerattn.config.sections import WarmStart
 from innerattn.cores import usable_cores
-from innerattn.experiments.side_by_side import Run, refuse_what_cannot_run, train_side_by_side
+from innerattn.experiments.side_by_side import (
+    Run,
+    refuse_what_cannot_run,
+    say_not_logged,
+    train_side_by_side,
+)
+from innerattn.loggers import LOGGERS, Opened, RunLoggers
 from innerattn.report.tables.evaluation import print_seeds, print_summary
 
 if TYPE_CHECKING:
     Preset: TypeAlias = str
     Budget: TypeAlias = str
     Method: TypeAlias = str
+    LoggerName: TypeAlias = str
+    from innerattn.train import Progress
 else:
     Preset, Budget, Method = Literal[SCENARIOS], Literal[BUDGETS], Literal[tuple(methods())]
+    LoggerName = Literal[tuple(LOGGERS)]
 
 
 @dataclass(kw_only=True)
@@ -79,6 +88,9 @@ class _Train(_Sources):
     """Train one run per seed, instead of --seed: 0..4 (both ends), 0,3,7 or 0..2,7.
     As many go side by side as there are cores, with one thread each unless --train.threads is
     given."""
+    log: tuple[LoggerName, ...] = ()
+    """Send metrics to these too: tensorboard (event files in the run folder), wandb, mlflow,
+    trackio. Needs pip install 'innerattn[log]'."""
 
     def run(self) -> int:
         """Train, evaluate and print.
@@ -114,14 +126,16 @@ class _Train(_Sources):
         console.print(f"{_what(config)}, seed {config.train.seed}")
         console.print(f"Run folder: {run_dir}", soft_wrap=True)
         try:
-            with Training() as progress:
-                train(config, run_dir, progress=progress)
-            with Evaluating() as progress:
-                evaluation = evaluate_run(run_dir, progress=progress)
+            with RunLoggers(self.log, Opened(run_dir, config), failed=say_not_logged) as loggers:
+                with Training() as progress:
+                    train(config, run_dir, progress=_both(progress, loggers))
+                with Evaluating() as evaluating:
+                    evaluation = evaluate_run(run_dir, progress=evaluating)
+                evaluation.write(run_dir / "evaluation")
+                loggers.log_scores(evaluation.summary)
         except KeyboardInterrupt:
             _say_what_is_kept([run_dir])
             raise
-        evaluation.write(run_dir / "evaluation")
         _say_if_nothing_was_learnt([run_dir])
         print_summary(console, evaluation.summary, config.scenario)
         console.print(f"Measure it again with: innerattn evaluate {run_dir}", soft_wrap=True)
@@ -132,7 +146,7 @@ class _Train(_Sources):
         from innerattn.experiments.score_means import seed_scores
 
         stamp = _stamp()
-        runs = [Run(config, self._folder_of_seed(config, stamp)) for config in configs]
+        runs = [Run(one, self._folder_of_seed(one, stamp), log=self.log) for one in configs]
         refuse_what_cannot_run(runs)
         threads = configs[0].train.threads or 1
         at_once = max(1, min(usable_cores() // threads, len(runs)))
@@ -179,6 +193,16 @@ def _what(config: RunConfig) -> str:
         f"{first}Training {train.method} on {config.scenario.situation}: "
         f"{train.env_steps:,} env-steps in {train.num_envs} worlds"
     )
+
+
+def _both(
+    first: Callable[[Progress], None], second: Callable[[Progress], None]
+) -> Callable[[Progress], None]:
+    def report(progress: Progress) -> None:
+        first(progress)
+        second(progress)
+
+    return report
 
 
 def _say_why(run: Run) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -27,11 +28,13 @@ class Run(Job):
         config: what is trained.
         folder: where.
         trained: it is trained already, and only measured.
+        log: where its metrics go beside the run folder, names of `innerattn.loggers.LOGGERS`.
     """
 
     config: RunConfig
     folder: Path
     trained: bool = False
+    log: tuple[str, ...] = ()
 
     @property
     def size(self) -> float:
@@ -47,21 +50,27 @@ class Run(Job):
     def do(self, report: Callable[[float], None]) -> Summary:
         """Train it, unless it is trained, and evaluate it."""
         from innerattn.evaluate import evaluate_run
+        from innerattn.loggers import Opened, RunLoggers
         from innerattn.train import train
 
         report(0.0)
         before = 0.0 if self.trained else _TRAINING
-        if not self.trained:
-            train(
-                self.config,
+        with RunLoggers(
+            self.log, Opened(self.folder, self.config), failed=say_not_logged
+        ) as loggers:
+
+            def progress(newest: Progress) -> None:
+                report(before * trained_share(self.config, newest))
+                loggers(newest)
+
+            if not self.trained:
+                train(self.config, self.folder, progress=progress)
+            evaluation = evaluate_run(
                 self.folder,
-                progress=lambda p: report(before * trained_share(self.config, p)),
+                progress=lambda done, total: report(before + done / total * (1.0 - before)),
             )
-        evaluation = evaluate_run(
-            self.folder,
-            progress=lambda done, total: report(before + done / total * (1.0 - before)),
-        )
-        evaluation.write(self.folder / "evaluation")
+            evaluation.write(self.folder / "evaluation")
+            loggers.log_scores(evaluation.summary)
         return evaluation.summary
 
 
@@ -100,6 +109,11 @@ def train_side_by_side(
             ends them at once.
     """
     run_side_by_side(runs, at_once, changed=changed, failed=failed, debug=debug, keep=keep)
+
+
+def say_not_logged(problem: str) -> None:
+    """Say on standard error that a logger failed."""
+    print(f"innerattn: warning: --log {problem}; training goes on without it", file=sys.stderr)
 
 
 def trained_share(config: RunConfig, progress: Progress) -> float:

@@ -1,0 +1,39 @@
+"""trackio; its own settings say where to, such as ``TRACKIO_DIR``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import trackio
+
+from innerattn.loggers.logger import Ending, Opened
+
+PROJECT = "innerattn"
+
+
+def open_trackio(run: Opened) -> TrackioLogger:
+    """A logger with a trackio run of its own."""
+    begun = trackio.init(
+        PROJECT,
+        name=run.name,
+        config=run.parameters,
+        embed=False,
+        auto_log_gpu=False,
+        auto_log_cpu=False,
+    )
+    return TrackioLogger(begun)
+
+
+class TrackioLogger:
+    """Sends numbers by env-steps."""
+
+    def __init__(self, run: trackio.Run) -> None:
+        self._run = run
+
+    def log(self, env_steps: int, values: Mapping[str, float]) -> None:
+        """Send the numbers."""
+        self._run.log(dict(values), step=env_steps)
+
+    def close(self, _ending: Ending, /) -> None:
+        """Send what is left."""
+        self._run.finish()
