@@ -6,6 +6,7 @@ mod common;
 mod contacts;
 mod containment;
 mod determinism;
+mod digests;
 mod engines;
 mod extending;
 mod faults;
