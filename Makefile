@@ -12,7 +12,7 @@ export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train test test-pool test-slow lint format bench lock docs setup clean
+.PHONY: train test test-pool test-slow reliability soak lint format bench lock docs setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -27,6 +27,13 @@ test-pool: ## the pool of threads under every order of events that the memory mo
 test-slow: setup test-pool ## the long checks: ten million env-steps of contacts, compilers at their slowest
 	INNERATTN_SLOW=1 cargo test --quiet --test worlds containment
 	pytest -m slow
+
+reliability: setup ## every row of docs/reliability.md in full; fills its table
+	cargo test --quiet --locked --no-run --test worlds
+	python benches/reliability.py
+
+soak: setup ## 10^8 env-steps and an hour of training: memory, threads and open files must not grow
+	python benches/soak.py
 
 lint: setup ## formatting, lints, types, stub, import floors
 	cargo fmt --check

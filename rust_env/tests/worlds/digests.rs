@@ -24,9 +24,8 @@ fn crc32(scenario: Scenario, envs: usize, steps: u64, seed: u64) -> u32 {
     let mut hasher = Hasher::new();
     let row = table.obs.len() / envs;
     for step in 0..steps {
-        let actions: Vec<[f32; 2]> = (0..envs * robots)
-            .map(|at| drive(step, (at / robots) as u64, (at % robots) as u64))
-            .collect();
+        let actions: Vec<[f32; 2]> =
+            (0..envs * robots).map(|at| drive(step, (at / robots) as u64, (at % robots) as u64)).collect();
         table.step(&actions);
         for env in 0..envs {
             let obs = &table.obs[env * row..][..row];

@@ -10,6 +10,7 @@ mod digests;
 mod engines;
 mod extending;
 mod faults;
+mod fuzz;
 mod snapshot;
 mod speed;
 mod structure;

@@ -1,0 +1,90 @@
+"""The scoreboard of reliability: runs the tests behind each row in full, and writes the table.
+
+`python benches/reliability.py` fills its place in `docs/reliability.md`; `make test` runs a short
+form of the same tests. `--rows "exact resume" "disk full"` runs some rows and prints them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from page import machine, table
+from reliability_rows import ROWS, Row
+
+from innerattn.report.marks import fill
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "reliability.md"
+FUZZ_SECONDS = "60"
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a row's tests found: how many ran and failed, and how many cases they say they tried."""
+
+    passed: int
+    failed: int
+    seconds: float
+
+
+def run_row(row: Row) -> Result:
+    """Run all tests of a row, the slow ones too."""
+    start, passed, failed = time.perf_counter(), 0, 0
+    env = {**os.environ, "INNERATTN_SLOW": "1", "INNERATTN_FUZZ_SECONDS": FUZZ_SECONDS}
+    if row.python:
+        with tempfile.TemporaryDirectory() as folder:
+            report = Path(folder) / "report.xml"
+            command = [sys.executable, "-m", "pytest", "-q", "-m", "slow or not slow"]
+            subprocess.run([*command, f"--junit-xml={report}", *row.python], cwd=ROOT, env=env)
+            suite = ET.parse(report).getroot().find("testsuite")
+        assert suite is not None, "pytest wrote no report"
+        count = {
+            key: int(suite.get(key, "0")) for key in ("tests", "failures", "errors", "skipped")
+        }
+        bad = count["failures"] + count["errors"] + count["skipped"]  # a skipped test is no proof
+        passed, failed = passed + count["tests"] - bad, failed + bad
+    if row.rust:
+        command = ["cargo", "test", "--quiet", "--locked", "--test", "worlds", "--", *row.rust]
+        done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True)
+        found = re.search(r"(\d+) passed; (\d+) failed", done.stdout)
+        ran = (int(found[1]), int(found[2])) if found else (0, 1)
+        passed, failed = passed + ran[0], failed + ran[1]
+    return Result(passed, failed, time.perf_counter() - start)
+
+
+def line_of(row: Row, result: Result) -> list[str]:
+    """A line of the table."""
+    holds = "yes" if result.passed and not result.failed and not row.missing else "**no**"
+    tests = f"{result.passed}" + (f", {result.failed} failed" if result.failed else "")
+    what = row.what + (f" Not tested: {row.missing}." if row.missing else "")
+    return [row.name, what, holds, tests, f"{result.seconds:,.0f} s"]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the rows, print each, and fill the page where all ran."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rows", nargs="+", choices=[row.name for row in ROWS], default=None)
+    chosen = parser.parse_args(arguments).rows
+    lines = []
+    for row in ROWS:
+        if chosen is None or row.name in chosen:
+            lines.append(line_of(row, run_row(row)))
+            print(" | ".join(lines[-1]), flush=True)
+    if chosen is None:
+        heads = ["row", "what holds", "holds?", "tests", "time"]
+        fill(PAGE, "scoreboard", f"{machine('numpy', 'torch')}.\n\n{table(heads, lines)}")
+    return int(any("no" in line[2] for line in lines))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

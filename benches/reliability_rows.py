@@ -1,0 +1,157 @@
+"""The rows of the scoreboard in `docs/reliability.md`, and the tests behind each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Row:
+    """Something that must hold.
+
+    Attributes:
+        name: in the table.
+        what: what holds, for a reader.
+        python: tests as pytest names them.
+        rust: names of tests of the program `worlds`, or parts of them.
+        missing: what is not tested yet; the row then does not hold.
+    """
+
+    name: str
+    what: str
+    python: tuple[str, ...] = ()
+    rust: tuple[str, ...] = ()
+    missing: str = ""
+
+
+_BATCH, _DAMAGE = "tests/envs/test_batch_", "tests/records/test_damage.py::test_"
+_NEIGHBOURS = f"{_BATCH}env.py::test_threads_and_neighbours_change_no_byte"
+_FUZZ_SNAPSHOTS = "tests/envs/test_batch_snapshots.py::test_forged_snapshots_are_refused_or_go_on"
+
+ROWS: tuple[Row, ...] = (
+    Row(
+        "truncated or flipped file",
+        "1,000 cuts and 1,000 flipped bits of each file of a run give an error, never a run.",
+        (f"{_DAMAGE}no_cut_and_no_flipped_bit_is_read",),
+    ),
+    Row(
+        "malicious file",
+        "Bombs, deep nesting, forged digests, links, pipes and code in files are refused.",
+        (
+            f"{_DAMAGE}what_is_no_plain_file_of_this_run_is_refused",
+            f"{_DAMAGE}numbers_that_cannot_be_are_refused_though_nothing_is_sealed",
+            f"{_DAMAGE}nothing_is_written_through_a_link",
+            "tests/records/test_limits.py",
+            "tests/config/test_untrusted.py",
+            "tests/train/test_weights.py",
+            "tests/test_security.py",
+        ),
+    ),
+    Row(
+        "NaN or infinite action",
+        "It is refused, and no world moves.",
+        (f"{_BATCH}refusals.py::test_bad_actions_move_nothing",),
+        ("fuzz::steps",),
+    ),
+    Row(
+        "wrong action id",
+        "It is refused, read once, and no world moves.",
+        (
+            f"{_BATCH}refusals.py::test_bad_actions_move_nothing",
+            "tests/envs/test_array_zoo.py::test_actions_are_read_once",
+        ),
+        ("fuzz::steps",),
+    ),
+    Row(
+        "array zoo",
+        "Each of over 100 arrays at each function has the same bits as the plain array, or is "
+        "refused.",
+        ("tests/envs/test_array_zoo.py",),
+    ),
+    Row(
+        "num_envs extremes",
+        "1 to 65,536 worlds do the same; what does not fit is a MemoryError.",
+        (
+            "tests/envs/test_extremes.py::test_batches_of_any_size_do_the_same",
+            f"{_BATCH}failures.py::test_a_lack_of_memory_is_an_error_and_never_an_abort",
+        ),
+    ),
+    Row(
+        "panic in one world",
+        "An exception names the world; all others have done the step.",
+        (f"{_BATCH}failures.py",),
+    ),
+    Row(
+        "soak",
+        "Memory, threads and open files do not grow; `make soak` does the long form.",
+        ("tests/benches/test_soak.py",),
+        missing="the long form: 10⁸ env-steps and an hour of training",
+    ),
+    Row(
+        "thread count",
+        "1, 2, 3, 8 and 16 threads give the same bytes.",
+        (
+            "tests/cross/test_digests.py",
+            f"{_BATCH}env.py::test_threads_and_neighbours_change_no_byte",
+        ),
+        ("determinism::threads",),
+    ),
+    Row(
+        "batch independence",
+        "A world alone, in a batch, and beside other neighbours does the same.",
+        (
+            "tests/cross/test_digests.py",
+            f"{_BATCH}env.py::test_threads_and_neighbours_change_no_byte",
+        ),
+        ("determinism::",),
+    ),
+    Row(
+        "committed digests",
+        "Ten scenarios do what `tests/cross/digests.json` says, optimised and with assertions.",
+        ("tests/cross/test_digests.py",),
+        ("digests::",),
+        missing="other processors than the one above, and `enhanced-determinism` of rapier, which "
+        "is off",
+    ),
+    Row(
+        "tunnelling, escape",
+        "Ten million env-steps with each engine: no robot leaves the arena or passes another.",
+        (),
+        ("containment::", "speed::"),
+    ),
+    Row(
+        "1 to 64 robots, 1 to 32 victims",
+        "Random teams and waves: finite numbers, inside the arena, apart.",
+        ("tests/envs/test_extremes.py::test_any_team_and_any_number_of_victims",),
+    ),
+    Row(
+        "seed hygiene",
+        "Random states of the process are left alone; neighbouring streams are independent by "
+        "correlation and χ² over 20,000 worlds.",
+        (
+            "tests/envs/test_extremes.py::test_random_states_of_the_process_are_left_alone",
+            "tests/envs/test_extremes.py::test_random_streams_are_independent",
+        ),
+    ),
+    Row(
+        "Rust against Python",
+        "Worlds do what a plain stepper in Python does.",
+        ("tests/cross/test_stepper.py",),
+    ),
+    Row(
+        "parser fuzz",
+        "Forged images, texts of scenarios and steps, a minute each: refused, or played.",
+        (_FUZZ_SNAPSHOTS,),
+        ("fuzz::",),
+    ),
+    Row(
+        "two threads, use after close",
+        "The second thread, a forked child and a closed batch get an error.",
+        (
+            f"{_BATCH}env.py::test_two_threads_in_one_environment_are_told",
+            f"{_BATCH}env.py::test_a_forked_child_is_told_instead_of_hanging",
+            f"{_BATCH}refusals.py::test_a_closed_environment_says_so",
+        ),
+    ),
+)
+"""In the order of the table."""
