@@ -17,7 +17,7 @@ import torch
 
 from innerattn.cli.main import main
 from innerattn.cli.progress import Training
-from innerattn.config import RunConfig, load_run_config, read_toml
+from innerattn.config import RunConfig, Scenario, load_run_config, read_toml
 from innerattn.errors import RunError
 from innerattn.learn import TD
 
@@ -116,6 +116,18 @@ def test_sources_and_their_order(asked: list[tuple[RunConfig, Path]], tmp_path: 
     assert (config.train.method, config.network.attention) == ("td-inner", "inner")
 
 
+@pytest.mark.parametrize("head", ["", "[scenario]\n"])
+def test_a_scenario_of_ones_own(
+    asked: list[tuple[RunConfig, Path]], tmp_path: Path, head: str
+) -> None:
+    file = tmp_path / "flood.toml"
+    file.write_text(f"{head}situation = 'double'\nepisode_steps = 40\n")
+    options = ["--scenario", str(file), "--method", "ppo-inner"]
+    config, run_dir = config_of(asked, *options, "--scenario.dt-s", "0.2")
+    assert config.scenario == Scenario(situation="double", episode_steps=40, dt_s=0.2)
+    assert run_dir.name.startswith("flood-ppo-inner-quick-s0-")
+
+
 @pytest.mark.parametrize(
     ("options", "key", "value"),
     [
@@ -163,6 +175,7 @@ def test_help_shows_the_chosen_defaults(capsys: pytest.CaptureFixture[str]) -> N
         (["--network.attention", "uniform"], "network.attention = 'uniform': train.method"),
         (["--scenario.episode-steps", "0"], "scenario.episode_steps = 0: must be"),
         (["--config", "none.toml"], "cannot read none.toml"),
+        (["--scenario", "none.toml"], "cannot read none.toml"),
         (["--device", "abacus"], "train.device = 'abacus': not usable here, must be 'cpu'"),
         (["--td.batch-size", "9", "--td.replay-capacity", "8"], "td.replay_capacity = 8: must be"),
         (["--scenario.actions", "continuous"], "scenario.actions = 'continuous'"),

@@ -142,11 +142,45 @@ def test_a_scenarios_file_is_not_a_runs_and_is_told(tmp_path: Path) -> None:
     path.write_text('situation = "double"')
     with pytest.raises(ConfigError) as error:
         load_run_config(config_file=path)
-    told = "situation: unknown key; a scenario's stand in [scenario]"
+    told = "situation: unknown key; a scenario's stand in [scenario], or in a file for --scenario"
     assert str(error.value) == f"{path}: {told}"
-    write_toml(load_run_config(), path)
-    with pytest.raises(ConfigError, match=r"configures a run; a scenario's file has the keys of"):
-        Scenario.from_toml(path)
+
+
+@pytest.mark.parametrize("head", ["", "[scenario]\n"])
+def test_a_file_is_the_scenario_of_a_run(tmp_path: Path, head: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(f'{head}situation = "double"\nepisode_steps = 40\n')
+    scenario = Scenario(situation="double", episode_steps=40)
+    assert Scenario.from_toml(path) == scenario
+    config = load_run_config("mixed-faults", "ppo-inner", "fast", scenario_file=path)
+    assert config.scenario == scenario
+    assert config.train == load_run_config("double", "ppo-inner", "fast").train
+    single = {"scenario.episode_steps": 41}
+    config = load_run_config(scenario_file=path, overrides=single)
+    assert config.scenario == scenario.replace(episode_steps=41)
+
+
+def test_the_configuration_of_a_run_is_a_scenarios_file(tmp_path: Path) -> None:
+    path, config = tmp_path / "config.toml", load_run_config("mixed-faults")
+    write_toml(config, path)
+    assert Scenario.from_toml(path) == config.scenario
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("dt_s = 0.2\n[scenario]\nsituation = 'single'", "dt_s: must stand in [scenario], as the"),
+        ("[scenario]\ndt_s = -1", "scenario.dt_s = -1: must be"),
+        ("colour = 1", "scenario.colour: unknown key"),
+    ],
+)
+def test_what_is_wrong_in_a_scenarios_file_names_it(tmp_path: Path, text: str, told: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    for load in (Scenario.from_toml, lambda file: load_run_config(scenario_file=file)):
+        with pytest.raises(ConfigError) as error:
+            load(path)
+        assert str(error.value).startswith(f"{path}: {told}")
 
 
 def test_tables_in_a_file_replace_lists(tmp_path: Path) -> None:

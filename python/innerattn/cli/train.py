@@ -46,6 +46,8 @@ class _Sources(Command):
 
     preset: Preset = "mixed"
     """Built-in scenario."""
+    scenario_file: Annotated[Path | None, tyro.conf.arg(name="scenario")] = None
+    """TOML file with a scenario of your own, instead of --preset."""
     budget: Budget = "quick"
     """Built-in budget: how long to train, and with which numbers."""
     config: Path | None = None
@@ -55,7 +57,11 @@ class _Sources(Command):
     def load(self, overrides: dict[str, object]) -> RunConfig:
         """The configuration, with single values on top."""
         return load_run_config(
-            self.preset, budget=self.budget, config_file=self.config, overrides=overrides
+            self.preset,
+            budget=self.budget,
+            config_file=self.config,
+            overrides=overrides,
+            scenario_file=self.scenario_file,
         )
 
 
@@ -83,7 +89,8 @@ class _Train(_Sources):
 
     run_dir: Path | None = None
     """Folder to make for the run; with --seeds one for each, RUN_DIR-s0, RUN_DIR-s1, ...; None:
-    runs/SITUATION-METHOD[-from-SCRIPT]-BUDGET-sSEED-TIME."""
+    runs/SITUATION-METHOD[-from-SCRIPT]-BUDGET-sSEED-TIME, where a scenario's file gives its name
+    for SITUATION."""
     seeds: str | None = None
     """Train one run per seed, instead of --seed: 0..4 (both ends), 0,3,7 or 0..2,7.
     As many go side by side as there are cores, with one thread each unless --train.threads is
@@ -177,7 +184,8 @@ class _Train(_Sources):
     def _new_run_dir(self, config: RunConfig, stamp: str) -> Path:
         train = config.train
         warm = "" if train.warm_start == "none" else f"-from-{train.warm_start}"
-        name = f"{config.scenario.situation}-{train.method}{warm}-{self.budget}"
+        worlds = self.scenario_file.stem if self.scenario_file else config.scenario.situation
+        name = f"{worlds}-{train.method}{warm}-{self.budget}"
         return Path("runs") / f"{name}-s{train.seed}-{stamp}"
 
 

@@ -1,7 +1,7 @@
 """Makes a `RunConfig` from presets, a file and single values, and writes and reads it as TOML.
 
-Later sources win: scenario preset, budget, what the algorithm changes in the budget, what it
-changes after a warm start, configuration file, single values.
+Later sources win: scenario preset or file, budget, what the algorithm changes in the budget, what
+it changes after a warm start, configuration file, single values.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from innerattn.config.files import (
 from innerattn.config.model import config_error
 from innerattn.config.registry import methods
 from innerattn.config.run import RunConfig
-from innerattn.config.scenario import Scenario
+from innerattn.config.scenario import Scenario, scenario_table
 from innerattn.errors import ConfigError
 
 _CHOOSING = ("method", "warm_start")
@@ -36,15 +36,17 @@ def load_run_config(
     budget: str = "quick",
     config_file: str | Path | None = None,
     overrides: Mapping[str, object] | None = None,
+    scenario_file: str | Path | None = None,
 ) -> RunConfig:
     """The configuration of a run.
 
     Args:
-        preset: name of a built-in scenario.
+        preset: name of a built-in scenario; without effect where ``scenario_file`` is given.
         method: value of `train.method`.
         budget: name of a built-in budget.
         config_file: TOML file with any of `RunConfig`'s sections and keys.
         overrides: values by dotted key, e.g. ``{"td.gamma": 0.99}``.
+        scenario_file: TOML file as of `Scenario.from_toml`.
 
     Raises:
         ConfigError: unknown preset or key, value out of range, or values that contradict each
@@ -55,13 +57,18 @@ def load_run_config(
         from_file = toml_table(config_file)
         if misplaced := [key for key in from_file if key in Scenario.model_fields]:
             raise ConfigError(
-                f"{config_file}: {misplaced[0]}: unknown key; a scenario's stand in [scenario]"
+                f"{config_file}: {misplaced[0]}: unknown key; a scenario's stand in [scenario], "
+                "or in a file for --scenario"
             )
         _merge(given, from_file)
     train = given["train"] if isinstance(given["train"], dict) else {}
     single = overrides or {}
     chosen = {name: single.get(f"train.{name}", train.get(name)) for name in _CHOOSING}
-    table: dict[str, Any] = {"scenario": preset_table("scenarios", preset)}
+    scenario = preset_table("scenarios", preset)
+    if scenario_file is not None:
+        Scenario.from_toml(scenario_file)  # where the file is wrong by itself, the message names it
+        scenario = scenario_table(scenario_file)
+    table: dict[str, Any] = {"scenario": scenario}
     _merge(table, preset_table("budgets", budget))
     known = methods().get(str(chosen["method"]))
     if known is not None:
@@ -80,7 +87,7 @@ def load_run_config(
         return _validated(table, "" if overrides else str(config_file))
     except ConfigError:
         if overrides:  # where the file is wrong by itself, the message names it
-            load_run_config(preset, method, budget, config_file)
+            load_run_config(preset, method, budget, config_file, scenario_file=scenario_file)
         raise
 
 

@@ -91,6 +91,21 @@ class Fault(Model):
     )
 
 
+def scenario_table(path: str | Path) -> dict[str, Any]:
+    """The keys of a scenario in a TOML file: those of its section ``scenario``, or of all of it.
+
+    Raises:
+        ConfigError: the file cannot be read, is not TOML, or has both forms.
+    """
+    table = toml_table(path)
+    section = table.get(Scenario.place)
+    if not isinstance(section, dict):
+        return table
+    if both := [key for key in table if key in Scenario.model_fields]:
+        raise ConfigError(f"{path}: {both[0]}: must stand in [scenario], as the others do")
+    return section
+
+
 def _default_team() -> tuple[Robot, ...]:
     """The four robots of Table I."""
     slow: dict[str, Any] = {"kind": "food", "abilities": ("food",), "max_speed_mps": 1.0}
@@ -200,7 +215,9 @@ class Scenario(Model, Shown):
 
     @classmethod
     def from_toml(cls, path: str | Path, **fields: object) -> Scenario:
-        """The scenario in a TOML file whose keys are this model's fields.
+        """The scenario in a TOML file: its keys, at the top or in a section ``scenario``.
+
+        So the configuration of a run is such a file, too.
 
         Args:
             path: the file.
@@ -209,13 +226,8 @@ class Scenario(Model, Shown):
         Raises:
             ConfigError: the file cannot be read, is not TOML, or describes no valid scenario.
         """
-        table = toml_table(path)
-        if isinstance(table.get("scenario"), dict):
-            raise ConfigError(
-                f"{path}: configures a run; a scenario's file has the keys of [scenario]"
-            )
         try:
-            return cls.model_validate(table | fields)
+            return cls.model_validate(scenario_table(path) | fields)
         except ValidationError as error:
             raise config_error(error, "scenario", str(path)) from error
 
