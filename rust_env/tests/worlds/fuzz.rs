@@ -18,14 +18,14 @@ use crate::common::{
 
 const ENVS: usize = 2;
 
-/// Repeats `tries` until the time is up; says how often it was.
-fn for_a_while(what: &str, mut tries: impl FnMut(&mut Stream) -> bool) {
+/// Repeats `attempt` until the time is up; says how often it was.
+fn for_a_while(what: &str, mut attempt: impl FnMut(&mut Stream) -> bool) {
     let seconds = std::env::var("INNERATTN_FUZZ_SECONDS").map_or(1.0, |text| text.parse().expect("a number"));
     let (start, mut source) = (Instant::now(), chance(2));
     let (mut tried, mut taken) = (0_u64, 0_u64);
     while tried < 100 || start.elapsed() < Duration::from_secs_f64(seconds) {
         tried += 1;
-        taken += u64::from(tries(&mut source));
+        taken += u64::from(attempt(&mut source));
     }
     println!("{what}: {tried} tried, {taken} of them taken");
     assert!(taken > 0 && taken < tried, "{what}: {taken} of {tried} were taken, so nothing was tested");
