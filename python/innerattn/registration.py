@@ -13,7 +13,7 @@ ENV_ID = "innerattn/Rescue-v0"
 
 def register_with_gymnasium() -> None:
     """Register `ENV_ID`: now if Gymnasium is imported already, else as soon as it is."""
-    if "gymnasium" in sys.modules:
+    if sys.modules.get("gymnasium") is not None:
         _register()
     else:
         sys.meta_path.insert(0, _AfterGymnasium())
