@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from innerattn import _core
 from innerattn.config.scenario import Scenario
+from innerattn.envs.aligned import aligned_copy
 from innerattn.envs.state import state_names, world_states
 from innerattn.shown import Shown
 
@@ -170,7 +171,7 @@ class BatchEnv(Shown):
             KeyboardInterrupt: Ctrl-C during a long step; nothing has moved.
         """
         step = Step._make(self._core.step(actions))
-        return Step._make(array.copy() for array in step) if self._copy else step
+        return Step._make(aligned_copy(array) for array in step) if self._copy else step
 
     def observation_names(self) -> list[str]:
         """Names of the D columns of an observation; units are m and m/s."""

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config.scenario import Scenario
+from innerattn.envs.aligned import aligned_empty
 
 
 def state_names(scenario: Scenario) -> list[str]:
@@ -56,4 +57,5 @@ def world_states(
         obstacles,
     ]
     rows = [part.reshape(len(positions), -1) for part in parts]
-    return np.concatenate(rows, axis=1, dtype=np.float32)
+    states = aligned_empty((len(positions), sum(row.shape[1] for row in rows)), np.float32)
+    return np.concatenate(rows, axis=1, out=states)

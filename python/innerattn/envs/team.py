@@ -9,6 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from innerattn.config.scenario import Scenario
+from innerattn.envs.aligned import aligned_copy
 from innerattn.envs.spaces import (
     robot_action_spaces,
     robot_observation_spaces,
@@ -44,8 +45,8 @@ class TeamForm:
     def observed(self, obs: NDArray[np.float32]) -> Any:
         """A copy of observations (..., R, D) as the form has them; of each robot (..., D)."""
         if self._names is None:
-            return obs.copy()
-        return {name: obs[..., i, :].copy() for i, name in enumerate(self._names)}
+            return aligned_copy(obs)
+        return {name: aligned_copy(obs[..., i, :]) for i, name in enumerate(self._names)}
 
     def lent(self, obs: NDArray[np.float32]) -> Any:
         """The same without a copy."""
