@@ -51,6 +51,7 @@ bench: setup ## speed of worlds and learner on this machine, beside their peers;
 	python benches/env_cost.py
 	python benches/fault_cost.py
 	python benches/copy_cost.py
+	python benches/view_cost.py
 	python benches/time_to_score.py
 	python benches/compare_learner.py $(if $(MAAC),--maac "$(MAAC)")
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from innerattn.config.scenario import Scenario
 from innerattn.envs.batch import BatchEnv
 from innerattn.envs.spaces import state_space
-from innerattn.envs.team import Form, TeamForm
+from innerattn.envs.team import Form, TeamForm, team_rewards
 from innerattn.envs.view import STEPS_PER_SECOND, Screen, chosen_scenario, seed_or_random
 
 
@@ -103,7 +103,7 @@ class RescueEnv(gymnasium.Env[Any, Any]):
         self._going_on = not (terminated or truncated)
         self._screen.follow(self._env)
         info = {"robot_rewards": step.reward[0].copy(), "rescues": len(step.rescues)}
-        reward = float(step.reward.sum(axis=1, dtype=np.float64)[0])
+        reward = float(team_rewards(step.reward)[0])
         return self._form.observed(step.obs[0]), reward, terminated, truncated, info
 
     def state(self) -> NDArray[np.float32]:

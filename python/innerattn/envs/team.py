@@ -75,3 +75,9 @@ class TeamForm:
         if len({row.shape for row in rows}) > 1 or rows[0].ndim < batch_axes:
             raise ValueError(f"actions have shapes {[row.shape for row in rows]}: must be the same")
         return np.stack(rows, axis=batch_axes)
+
+
+def team_rewards(rewards: NDArray[np.float32]) -> NDArray[np.float64]:
+    """The sum of the robots' rewards (E, R) in each world, (E,)."""
+    total: NDArray[np.float64] = rewards.astype(np.float64) @ np.ones(rewards.shape[1])
+    return total  # a product: a sum along so short an axis takes longer

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from innerattn.config.scenario import Scenario
 from innerattn.envs.batch import MOST_SEED, Autoreset, BatchEnv, Step, whole_number
 from innerattn.envs.spaces import state_space
-from innerattn.envs.team import Form, TeamForm
+from innerattn.envs.team import Form, TeamForm, team_rewards
 from innerattn.envs.view import STEPS_PER_SECOND, Screen, chosen_scenario, seed_or_random
 
 _AUTORESET: dict[AutoresetMode, Autoreset] = {
@@ -146,7 +146,7 @@ class RescueVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         if not self._started:
             raise ResetNeeded("no episode has started: call reset() before step()")
         step = self._env.step(self._form.actions(actions, batch_axes=1))
-        rewards = step.reward.sum(axis=1, dtype=np.float64)
+        rewards = team_rewards(step.reward)
         infos = self._infos(step)
         if self._copy:
             obs = self._form.observed(step.obs)
@@ -204,8 +204,8 @@ class RescueVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         if self._mode is AutoresetMode.DISABLED or not ended.any():
             return _masked(found, np.ones(self.num_envs, bool), self._copy)
         final_obs = np.full(self.num_envs, None, dtype=object)
-        for world in np.flatnonzero(ended):
-            final_obs[world] = self._form.observed(step.final_obs[world])
+        for world, rows in zip(np.flatnonzero(ended), step.final_obs[ended], strict=True):
+            final_obs[world] = self._form.lent(rows)
         return {
             "final_obs": final_obs,
             "_final_obs": ended,
