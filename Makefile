@@ -5,6 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST := Cargo.toml Cargo.lock $(shell find rust_env -name '*.rs' -o -name Cargo.toml)
 CONSTRAINTS ?= constraints.txt
+PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 TRAIN ?= --preset mixed --method ppo-inner --budget fast
 export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 export PIP_CONSTRAINT := $(if $(CONSTRAINTS),$(CURDIR)/$(CONSTRAINTS))
@@ -12,7 +13,7 @@ export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train test test-pool test-slow reliability soak lint format bench lock docs setup clean
+.PHONY: train test test-pool test-slow reliability soak lint format bench lock docs dist smoke setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -57,6 +58,7 @@ bench: setup ## speed of worlds and learner on this machine, beside their peers;
 	python benches/env_cost.py
 	python benches/fault_cost.py
 	python benches/copy_cost.py
+	python benches/view_cost.py
 	python benches/time_to_score.py
 	python benches/compare_learner.py $(if $(MAAC),--maac "$(MAAC)")
 
@@ -84,5 +86,18 @@ lock: $(VENV)/.installed ## renew constraints.txt: the newest versions that pypr
 docs: setup ## draw the pictures of the documentation
 	python docs/pictures.py
 
+dist: $(VENV)/.installed ## wheel for manylinux2014 and source archive, into dist/
+	rm -rf dist
+	pip install ziglang
+	maturin build --release --locked --zig --compatibility manylinux2014 --out dist
+	maturin sdist --out dist
+
+smoke: dist ## try wheel and source archive in fresh environments of all PYTHONS that are here
+	@for python in $(PYTHONS); do \
+	if ! command -v $$python >/dev/null; then echo "$$python: not here, left out"; continue; fi; \
+	tests/smoke.sh $$python dist/*.whl || exit 1; done
+	tests/smoke.sh $(PYTHON) dist/*.whl 'numpy<2'
+	tests/smoke.sh $(PYTHON) dist/*.tar.gz
+
 clean: ## remove everything that was built
-	rm -rf $(VENV) target python/innerattn/_core*.so
+	rm -rf $(VENV) target dist python/innerattn/_core*.so

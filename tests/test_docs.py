@@ -1,6 +1,7 @@
 """The documentation names everything that it should."""
 
 import re
+from importlib.util import find_spec
 from pathlib import Path
 
 from innerattn.config import Scenario, load_run_config
@@ -28,6 +29,20 @@ def test_the_examples_about_runs_work(run_dir: Path) -> None:
     assert len(examples) == 2
     for example in examples:
         exec(compile(example, "docs/runs.md", "exec"), {"run": str(run_dir)})
+
+
+def test_the_examples_for_other_libraries_work() -> None:
+    text = (ROOT / "docs" / "libraries.md").read_text("utf-8")
+    examples = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    assert len(examples) == 6
+    known: dict[str, object] = {}
+    for example in examples:
+        if "TorchRL" in example and find_spec("torchrl") is None:
+            continue
+        exec(compile(example, "docs/libraries.md", "exec"), known)
+    assert known["state"].shape == (24,)  # type: ignore[attr-defined]
+    assert known["states"].shape == (64, 24)  # type: ignore[attr-defined]
+    assert known["last"].shape == (64,)  # type: ignore[attr-defined]
 
 
 def test_what_is_said_of_a_runs_files_is_there(run_dir: Path) -> None:

@@ -11,7 +11,8 @@ _IMPORT = """
 import importlib, pkgutil, sys
 room = importlib.import_module(sys.argv[1])
 for module in pkgutil.walk_packages(room.__path__, f"{room.__name__}."):
-    importlib.import_module(module.name)
+    if module.name != "innerattn.envs.torchrl":  # the view for a library of torch
+        importlib.import_module(module.name)
 print(" ".join(name for name in ("torch", "scipy") if name in sys.modules))
 """
 

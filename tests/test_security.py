@@ -24,6 +24,7 @@ ALLOWED = {
     # Names of installed packages' entry points, never of a file.
     "python/innerattn/config/registry.py": {"importlib.import_module"},
     # Modules of this package and libraries, named in the source.
+    "python/innerattn/lazy.py": {"importlib.import_module"},
     "python/innerattn/shown.py": {"importlib.import_module"},
     "python/innerattn/loggers/logger.py": {"importlib.import_module"},
 }

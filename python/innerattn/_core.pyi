@@ -51,8 +51,11 @@ class Batch:
     to be used from two threads at once (RuntimeError), nor, with several threads, in a child
     process after a fork (RuntimeError).
 
+    `autoreset` is "same_step", "next_step" or "disabled".
+
     Raises:
-        ValueError: num_envs or num_threads out of range, or more threads than the system gives.
+        ValueError: num_envs, num_threads or autoreset not allowed, or more threads than the system
+            gives.
         MemoryError: the arrays do not fit.
     """
 
@@ -63,7 +66,7 @@ class Batch:
         seed: int,
         num_threads: int | None,
         first_env: int,
-        autoreset: bool,
+        autoreset: str,
     ) -> Batch: ...
     @property
     def num_threads(self) -> int:

@@ -33,8 +33,41 @@ class RunError(InnerattnError):
     """A run folder is missing, foreign, damaged, or already there."""
 
 
-class MissingLibraryError(InnerattnError):
+EXTRA_OF = {
+    "gymnasium": "gym",
+    "imageio_ffmpeg": "report",
+    "matplotlib": "report",
+    "pettingzoo": "gym",
+    "plotly": "report",
+    "rich": "train",
+    "safetensors": "train",
+    "tensordict": "torchrl",
+    "torch": "train",
+    "torchrl": "torchrl",
+    "tyro": "train",
+}
+"""The extra of this package that brings a library, by the library's module."""
+
+
+class MissingLibraryError(InnerattnError, ImportError):
     """A library that is no dependency is not installed; the message says how to install it."""
+
+
+def missing_library(
+    what: str, error: ModuleNotFoundError, extra: str = ""
+) -> MissingLibraryError | None:
+    """The error that says which extra brings a module that was not found; none for other modules.
+
+    Args:
+        what: who needs it.
+        error: what Python raised.
+        extra: the extra to install; none: the one that brings the module.
+    """
+    library = (error.name or "").partition(".")[0]
+    if library not in EXTRA_OF:
+        return None
+    extra = extra or EXTRA_OF[library]
+    return MissingLibraryError(f"{what} needs {library}: pip install 'innerattn[{extra}]'")
 
 
 class UnsealedRunWarning(UserWarning):

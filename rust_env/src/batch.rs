@@ -38,6 +38,8 @@ const LONG_STEP: Duration = Duration::from_millis(100);
 pub enum Autoreset {
     /// The next episode starts in the same step.
     SameStep,
+    /// The next episode starts in the next step, in which the world does nothing else.
+    NextStep,
     /// The world waits for a reset.
     Disabled,
 }
@@ -251,8 +253,8 @@ impl Batch {
             return Err(Error::Broken { env: *env });
         }
         match self.worlds().position(|world| world.over) {
-            Some(env) => Err(Error::EpisodeOver { env }),
-            None => Ok(()),
+            Some(env) if self.options.autoreset != Autoreset::NextStep => Err(Error::EpisodeOver { env }),
+            _ => Ok(()),
         }
     }
 

@@ -42,7 +42,7 @@ pub struct World {
     pub episode: u64,
     /// Steps done in this episode.
     pub step: u32,
-    /// Whether the episode is over (only seen while autoreset is disabled).
+    /// Whether the episode is over (never seen with autoreset in the same step).
     pub over: bool,
     /// Whether there was neither a reset nor a step yet: the first reset then keeps episode 0.
     pub fresh: bool,

@@ -156,7 +156,7 @@ def test_unknown_keys_are_named() -> None:
         ({"num_threads": 0}, ValueError, "num_threads = 0: must be in 1..=256"),
         ({"num_threads": 257}, ValueError, "num_threads = 257: must be in 1..=256"),
         ({"first_env": -1}, ValueError, "first_env = -1: must be in 0..="),
-        ({"autoreset": "next_step"}, ValueError, "autoreset = 'next_step': must be"),
+        ({"autoreset": "NextStep"}, ValueError, "autoreset = 'NextStep': must be"),
         ({"copy": "no"}, TypeError, "copy = 'no': must be True or False"),
     ],
 )

@@ -14,7 +14,7 @@ from innerattn.cli.options import Command
 from innerattn.config import BUDGETS, SCENARIOS, Scenario
 from innerattn.cores import usable_cores
 
-_PACKAGES = ("torch", "numpy", "pydantic", "pettingzoo")
+_PACKAGES = ("torch", "numpy", "pydantic", "gymnasium", "pettingzoo")
 
 
 @dataclass(kw_only=True)

@@ -28,9 +28,12 @@ from innerattn.cli.robustness import Robustness
 from innerattn.cli.train import command_type
 from innerattn.cli.watch import Watch
 from innerattn.cores import let_waiting_threads_sleep
-from innerattn.errors import UnsealedRunWarning, needs_no_traceback, one_line
+from innerattn.errors import UnsealedRunWarning, missing_library, needs_no_traceback, one_line
 
-_DESCRIPTION = "Train teams of unlike robots to rescue together, and measure how they do it."
+_DESCRIPTION = (
+    "Train teams of unlike robots to rescue together, and measure how they do it. "
+    "`innerattn --version` prints the version."
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -59,7 +62,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has left, e.g. `innerattn info | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except Exception as error:
+    except Exception as raised:
+        error = _named_by_its_extra(raised)
         if "--debug" in argv or not needs_no_traceback(error):
             raise
         print(f"innerattn: error: {one_line(error)}", file=sys.stderr)
@@ -98,6 +102,13 @@ def _plain_warnings() -> Iterator[None]:
         yield
     finally:
         warnings.showwarning = shown
+
+
+def _named_by_its_extra(error: Exception) -> Exception:
+    """What says how to install a module that was not found; any other error as it is."""
+    if not isinstance(error, ModuleNotFoundError):
+        return error
+    return missing_library("the command", error) or error
 
 
 def _parse(argv: list[str]) -> Any:

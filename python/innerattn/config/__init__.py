@@ -1,20 +1,31 @@
 """Configuration as data: the scenario of a world and everything a run needs to be repeated.
 
 It validates and reads and writes TOML; it steps no world, trains nothing and prints nothing.
+Each module is imported when one of its names is asked for: a scenario does without the rest.
 """
 
-from innerattn.config.load import load_run_config, read_toml, write_toml
-from innerattn.config.ppo import PPOConfig
-from innerattn.config.registry import (
-    Algorithm,
-    AlgorithmConfig,
-    register_algorithm,
-    register_attention,
-)
-from innerattn.config.run import BUDGETS, RunConfig, refuse_late_faults
-from innerattn.config.scenario import SCENARIOS, Fault, Obstacle, Robot, Scenario, Task
-from innerattn.config.sections import EvaluateConfig, ImitationConfig, NetworkConfig, TrainConfig
-from innerattn.config.td import TDConfig
+from typing import TYPE_CHECKING
+
+from innerattn.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from innerattn.config.load import load_run_config, read_toml, write_toml
+    from innerattn.config.ppo import PPOConfig
+    from innerattn.config.registry import (
+        Algorithm,
+        AlgorithmConfig,
+        register_algorithm,
+        register_attention,
+    )
+    from innerattn.config.run import BUDGETS, RunConfig, refuse_late_faults
+    from innerattn.config.scenario import SCENARIOS, Fault, Obstacle, Robot, Scenario, Task
+    from innerattn.config.sections import (
+        EvaluateConfig,
+        ImitationConfig,
+        NetworkConfig,
+        TrainConfig,
+    )
+    from innerattn.config.td import TDConfig
 
 __all__ = [
     "BUDGETS",
@@ -40,3 +51,31 @@ __all__ = [
     "register_attention",
     "write_toml",
 ]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "Algorithm": "registry",
+        "AlgorithmConfig": "registry",
+        "BUDGETS": "run",
+        "EvaluateConfig": "sections",
+        "Fault": "scenario",
+        "ImitationConfig": "sections",
+        "NetworkConfig": "sections",
+        "Obstacle": "scenario",
+        "PPOConfig": "ppo",
+        "Robot": "scenario",
+        "RunConfig": "run",
+        "SCENARIOS": "scenario",
+        "Scenario": "scenario",
+        "TDConfig": "td",
+        "Task": "scenario",
+        "TrainConfig": "sections",
+        "load_run_config": "load",
+        "read_toml": "load",
+        "refuse_late_faults": "run",
+        "register_algorithm": "registry",
+        "register_attention": "registry",
+        "write_toml": "load",
+    },
+)

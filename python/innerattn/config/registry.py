@@ -93,6 +93,7 @@ def register_algorithm(algorithm: Algorithm) -> None:
     Raises:
         ValueError: Its name or one of its methods is taken.
     """
+    _register_ours()
     if algorithm.name in _algorithms:
         raise ValueError(f"algorithm {algorithm.name!r} is registered already")
     taken = _methods_of(_algorithms.values()).keys() & _methods_of([algorithm]).keys()
@@ -113,6 +114,7 @@ def register_attention(name: str, attention: str) -> None:
     Raises:
         ValueError: The name is taken.
     """
+    _register_ours()
     if name in (*_attentions, "none"):
         raise ValueError(f"attention {name!r} is registered already")
     _attentions[name] = attention
@@ -147,9 +149,15 @@ def _methods_of(algorithms: Iterable[Algorithm]) -> dict[str, Method]:
     return found
 
 
+def _register_ours() -> None:
+    """Import the modules of this package that register something, if nobody has done so before."""
+    import innerattn.config.run  # noqa: F401
+
+
 @cache
 def _load_extensions() -> None:
     """Import the modules that installed packages name; leave out those that cannot be imported."""
+    _register_ours()
     for extension in entry_points(group=EXTENSIONS):
         try:
             import_module(extension.value)

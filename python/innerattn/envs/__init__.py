@@ -1,21 +1,42 @@
-"""Rescue worlds for Python: batches, and a view for PettingZoo. Never imports torch.
+"""Rescue worlds for Python: batches, and views for the libraries that others use.
 
-Gymnasium and PettingZoo are imported when `parallel_env` is first asked for.
+Nothing is imported before its name is asked for: Gymnasium, PettingZoo and TorchRL are needed for
+their own views alone, torch for that of TorchRL.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from innerattn.envs.batch import BatchEnv, Step
+from innerattn.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from innerattn.envs.parallel import parallel_env
+    from innerattn.envs.aec import env
+    from innerattn.envs.batch import BatchEnv, Step
+    from innerattn.envs.parallel import RescueParallelEnv, parallel_env
+    from innerattn.envs.single import RescueEnv
+    from innerattn.envs.torchrl import RescueTorchRLEnv
+    from innerattn.envs.vector import RescueVectorEnv
 
-__all__ = ["BatchEnv", "Step", "parallel_env"]
+__all__ = [
+    "BatchEnv",
+    "RescueEnv",
+    "RescueParallelEnv",
+    "RescueTorchRLEnv",
+    "RescueVectorEnv",
+    "Step",
+    "env",
+    "parallel_env",
+]
 
-
-def __getattr__(name: str) -> Any:
-    if name != "parallel_env":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from innerattn.envs.parallel import parallel_env
-
-    return parallel_env
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "BatchEnv": "batch",
+        "RescueEnv": "single",
+        "RescueParallelEnv": "parallel",
+        "RescueTorchRLEnv": "torchrl",
+        "RescueVectorEnv": "vector",
+        "Step": "batch",
+        "env": "aec",
+        "parallel_env": "parallel",
+    },
+)

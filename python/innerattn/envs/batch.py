@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Any, Literal, NamedTuple, Self, TypeVar
+from typing import Any, Literal, NamedTuple, Self, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from innerattn import _core
 from innerattn.config.scenario import Scenario
+from innerattn.envs.aligned import aligned_copy
+from innerattn.envs.state import state_names, world_states
 from innerattn.shown import Shown
 
-Autoreset = Literal["same_step", "disabled"]
+Autoreset = Literal["same_step", "next_step", "disabled"]
 Array = TypeVar("Array", bound=NDArray[Any])
 
 NUM_DISCRETE_ACTIONS = 5
+MOST_SEED = 2**64 - 1
 _VICTIM_DTYPE = np.dtype(
     [
         ("present", "?"),
@@ -54,7 +57,9 @@ class BatchEnv(Shown):
     """E rescue worlds of one scenario, stepped together by compiled code on several threads.
 
     Autoreset is Gymnasium's SAME_STEP: on an episode's last step `obs` is the next episode's
-    first already and `final_obs` holds the last of the old one. A step gives arrays of your own,
+    first already and `final_obs` holds the last of the old one. With "next_step" (Gymnasium's
+    NEXT_STEP) the step after the last one begins the next episode and does nothing else in that
+    world: its action is not used, its rewards are 0. A step gives arrays of your own,
     as `reset` and `observe` do. With `copy=False` it lends C-contiguous read-only views of buffers
     owned by the environment. They are valid until the step after next, which gives the same array
     objects again: change neither their shape nor their dtype in place, and let no thread read them
@@ -62,6 +67,9 @@ class BatchEnv(Shown):
 
     A step that takes long looks for Ctrl-C on the way; if that raises, nothing has moved. Worlds
     that fail inside compiled code are named by a `WorldError`; all others have done the step.
+
+    A batch can be pickled and deep-copied, to other processes, too: its copy goes on from the same
+    state. The rewards of the last step by component are not part of that.
 
     World i depends on scenario, seed, `first_env + i` and its actions alone, whatever the number of
     threads or worlds. The scenario was checked when it was made; what it does not say (sizes, seed,
@@ -72,7 +80,8 @@ class BatchEnv(Shown):
         num_envs: number of worlds E, 1 to 1,048,576.
         seed: seed of all random streams, 0 to 2**64 - 1.
         num_threads: 1 to 256; as many cores as are worth it if None.
-        autoreset: "same_step", or "disabled" to leave ended worlds until `reset(mask=...)`.
+        autoreset: "same_step", "next_step", or "disabled" to leave ended worlds until
+            `reset(mask=...)`.
         copy: let steps return arrays of your own; views if False.
         first_env: number of the first world's random streams, for batches split over processes.
 
@@ -105,16 +114,18 @@ class BatchEnv(Shown):
         self.scenario = Scenario.preset(scenario) if isinstance(scenario, str) else scenario
         if not isinstance(copy, bool):
             raise TypeError(f"copy = {copy!r}: must be True or False")
-        if autoreset not in ("same_step", "disabled"):
-            raise ValueError(f"autoreset = {autoreset!r}: must be 'same_step' or 'disabled'")
+        if autoreset not in get_args(Autoreset):
+            known = "'same_step', 'next_step' or 'disabled'"
+            raise ValueError(f"autoreset = {autoreset!r}: must be {known}")
         self._batch: _core.Batch | None = _core.Batch(
             self.scenario.rules,
-            _whole("num_envs", num_envs, 1, 2**20),
-            _whole("seed", seed, 0, 2**64 - 1),
-            None if num_threads is None else _whole("num_threads", num_threads, 1, 256),
-            _whole("first_env", first_env, 0, 2**63),
-            autoreset == "same_step",
+            whole_number("num_envs", num_envs, 1, 2**20),
+            whole_number("seed", seed, 0, MOST_SEED),
+            None if num_threads is None else whole_number("num_threads", num_threads, 1, 256),
+            whole_number("first_env", first_env, 0, 2**63),
+            autoreset,
         )
+        self._made_with = (seed, num_threads, autoreset, copy, first_env)
         self.num_envs = int(num_envs)
         self.num_threads = self._core.num_threads
         self.robot_names = tuple(robot.name for robot in self.scenario.robots)
@@ -139,7 +150,7 @@ class BatchEnv(Shown):
             TypeError, ValueError: a seed or mask that is not allowed; nothing has changed then.
         """
         if seed is not None:
-            seed = _whole("seed", seed, 0, 2**64 - 1)
+            seed = whole_number("seed", seed, 0, MOST_SEED)
         return self._core.reset(seed, mask)
 
     def step(self, actions: ArrayLike) -> Step:
@@ -160,7 +171,7 @@ class BatchEnv(Shown):
             KeyboardInterrupt: Ctrl-C during a long step; nothing has moved.
         """
         step = Step._make(self._core.step(actions))
-        return Step._make(array.copy() for array in step) if self._copy else step
+        return Step._make(aligned_copy(array) for array in step) if self._copy else step
 
     def observation_names(self) -> list[str]:
         """Names of the D columns of an observation; units are m and m/s."""
@@ -212,6 +223,21 @@ class BatchEnv(Shown):
         that are struck (0 = healthy, 1 = all).
         """
         return self._core.fault_state().view(_FAULT_DTYPE)[..., 0]
+
+    def state(self) -> NDArray[np.float32]:
+        """The whole of each world, (E, S) float32, world frame, for centralised critics.
+
+        Columns are `state_names`: for each robot x, y [m] and x, y velocity [m/s]; for each victim
+        slot one column per task (1 where such a victim is present), x, y [m]; for each obstacle
+        x, y [m]. Empty slots are zeros.
+        """
+        return world_states(
+            self.positions(), self.velocities(), self.victims(), self.obstacles(), self.scenario
+        )
+
+    def state_names(self) -> list[str]:
+        """Names of the S columns of `state`; units are m and m/s."""
+        return state_names(self.scenario)
 
     def set_faults(self, faults: NDArray[np.void], mask: ArrayLike | None = None) -> None:
         """Put faults in place of the scenario's, from now to the end of the present episodes.
@@ -274,6 +300,10 @@ class BatchEnv(Shown):
         """Give back memory and threads; the environment cannot be used afterwards."""
         self._batch = None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle and `copy.deepcopy`: how the batch was made, and its snapshot."""
+        return _made_again, (self.scenario, self.num_envs, *self._made_with, self.snapshot())
+
     def __enter__(self) -> Self:
         return self
 
@@ -295,8 +325,37 @@ class BatchEnv(Shown):
         return array.copy() if self._copy else array
 
 
-def _whole(name: str, value: int, low: int, high: int) -> int:
-    """The value as an int, if it is a whole number in low..=high."""
+def _made_again(
+    scenario: Scenario,
+    num_envs: int,
+    seed: int,
+    num_threads: int | None,
+    autoreset: Autoreset,
+    copy: bool,
+    first_env: int,
+    image: bytes,
+) -> BatchEnv:
+    """The batch that was pickled."""
+    env = BatchEnv(
+        scenario,
+        num_envs,
+        seed,
+        num_threads,
+        autoreset=autoreset,
+        copy=copy,
+        first_env=first_env,
+    )
+    env.restore(image)
+    return env
+
+
+def whole_number(name: str, value: int, low: int, high: int) -> int:
+    """The value as an int.
+
+    Raises:
+        TypeError: it is no integer.
+        ValueError: it is not in low..=high.
+    """
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
         raise TypeError(f"{name} = {value!r}: must be an integer in {low}..={high}")
     if not low <= value <= high:

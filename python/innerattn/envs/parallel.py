@@ -5,7 +5,6 @@ It steps a single world through `BatchEnv`; for training at speed use `BatchEnv`
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -14,10 +13,10 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from innerattn.config import Scenario
+from innerattn.config.scenario import Scenario
 from innerattn.envs.batch import BatchEnv
-from innerattn.envs.render import draw_world
-from innerattn.errors import ConfigError
+from innerattn.envs.spaces import robot_action_spaces, robot_observation_spaces, state_space
+from innerattn.envs.view import STEPS_PER_SECOND, Screen, chosen_scenario, seed_or_random
 
 Obs: TypeAlias = NDArray[np.float32]
 Action: TypeAlias = Any  # an integer, or (2,) float32 where actions are continuous
@@ -37,7 +36,7 @@ def parallel_env(
         scenario: the world, or the name of a preset.
         max_cycles: length of an episode [control steps]; none: the scenario's `episode_steps`,
             25 in every preset.
-        render_mode: none, or "rgb_array" for `render` to give pictures.
+        render_mode: none; "rgb_array": `render` gives pictures; "human": a window shows every step.
         seed: seed of the episodes until `reset` is given one; none: a random one.
         overrides: fields of `Scenario` to change.
 
@@ -46,15 +45,8 @@ def parallel_env(
         TypeError: ``scenario`` or ``seed`` is of another type.
         ValueError: ``seed`` is out of range.
     """
-    if not isinstance(scenario, (Scenario, str)):
-        raise TypeError(f"scenario = {scenario!r}: must be a Scenario or the name of a preset")
-    if isinstance(scenario, str):
-        scenario = Scenario.preset(scenario)
-    if max_cycles is not None:
-        if "episode_steps" in overrides:
-            raise ConfigError("max_cycles and episode_steps are the same: give one of them")
-        overrides["episode_steps"] = max_cycles
-    return RescueParallelEnv(scenario.replace(**overrides), render_mode, seed)
+    scenario = chosen_scenario(scenario, max_cycles, "max_cycles", overrides)
+    return RescueParallelEnv(scenario, render_mode, seed)
 
 
 class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
@@ -70,41 +62,31 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
 
     metadata: ClassVar[dict[str, Any]] = {
         "name": "innerattn_v0",
-        "render_modes": ["rgb_array"],
+        "render_modes": ["human", "rgb_array"],
         "is_parallelizable": True,
-        "render_fps": 10,
+        "render_fps": STEPS_PER_SECOND,
     }
 
     def __init__(self, scenario: Scenario, render_mode: str | None, seed: int | None) -> None:
         """See `parallel_env`."""
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ConfigError(f"render_mode = {render_mode!r}: must be None or 'rgb_array'")
-        if render_mode is not None and find_spec("matplotlib") is None:
-            raise ConfigError(
-                f"render_mode = {render_mode!r}: needs matplotlib; install innerattn[figures]"
-            )
-        if seed is None:
-            seed = int(np.random.default_rng().integers(2**63))
         self.scenario = scenario
         self.render_mode = render_mode
         self.max_cycles = scenario.episode_steps
-        self._env = BatchEnv(scenario, 1, seed, num_threads=1, autoreset="disabled", copy=False)
+        self._screen = Screen(render_mode, self.metadata["render_modes"])
+        self._env = BatchEnv(
+            scenario,
+            1,
+            seed_or_random(seed),
+            num_threads=1,
+            autoreset="disabled",
+            copy=False,
+        )
         self.possible_agents = list(self._env.robot_names)
         self.agents: list[str] = []
         self._started = False
-        width = self._env.obs_width
-        self.observation_spaces = {
-            name: spaces.Box(-np.inf, np.inf, (width,), np.float32) for name in self.possible_agents
-        }
-        self.action_spaces = {name: self._new_action_space() for name in self.possible_agents}
-        size = 4 * scenario.num_robots + 2 * len(scenario.obstacles)
-        size += (len(scenario.tasks) + 2) * scenario.num_victims
-        self.state_space = spaces.Box(-np.inf, np.inf, (size,), np.float32)
-
-    def _new_action_space(self) -> spaces.Space[Any]:
-        if self.scenario.actions == "continuous":
-            return spaces.Box(-1.0, 1.0, (2,), np.float32)
-        return spaces.Discrete(self._env.num_actions)
+        self.observation_spaces = robot_observation_spaces(scenario)
+        self.action_spaces = robot_action_spaces(scenario)
+        self.state_space = state_space(scenario)
 
     def observation_space(self, agent: str) -> spaces.Space[Obs]:
         """The space of the agent's observations, the same object at every call."""
@@ -126,6 +108,7 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         obs = self._env.reset(seed)
         self._started = True
         self.agents = self.possible_agents.copy()
+        self._screen.follow(self._env)
         return self._by_agent(obs[0]), {agent: {} for agent in self.agents}
 
     def step(
@@ -147,8 +130,9 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
             wrong = sorted(actions.keys() ^ set(agents))
             raise ValueError(f"actions must be of the live agents {agents}; differs in {wrong}")
         step = self._env.step(
-            np.stack([[self._checked(agent, actions[agent]) for agent in agents]])
+            np.stack([[self.checked_action(agent, actions[agent]) for agent in agents]])
         )
+        self._screen.follow(self._env)
         terminated, truncated = bool(step.terminated[0]), bool(step.truncated[0])
         if terminated or truncated:
             self.agents = []
@@ -160,8 +144,13 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
             self._infos(step.rescues),
         )
 
-    def _checked(self, agent: str, action: Action) -> NDArray[Any]:
-        """An action as the worlds take it; whether it is in range they say themselves."""
+    def checked_action(self, agent: str, action: Action) -> NDArray[Any]:
+        """An action as the worlds take it; whether it is in range they say themselves.
+
+        Raises:
+            TypeError: no integer; no two numbers where actions are continuous.
+            ValueError: another shape.
+        """
         continuous = self.scenario.actions == "continuous"
         kinds, shape, dtype = ("fiu", (2,), np.float32) if continuous else ("iu", (), np.int64)
         given = np.asarray(action)
@@ -173,27 +162,16 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         return given.astype(dtype)
 
     def state(self) -> NDArray[np.float32]:
-        """The whole world, of shape `state_space.shape`, float32, world frame.
-
-        For each robot x, y [m] and x, y velocity [m/s]; for each victim slot one column per task
-        (1 where such a victim is present), x, y [m]; for each obstacle x, y [m]. Empty slots are
-        zeros.
+        """The whole world, (S,) float32; `BatchEnv.state` has the columns.
 
         Raises:
             gymnasium.error.ResetNeeded: no episode has started yet.
         """
         self._need_start("state")
-        robots = np.concatenate([self._env.positions()[0], self._env.velocities()[0]], axis=1)
-        victims = self._env.victims()[0]
-        present = victims["present"].astype(bool)
-        is_task = victims["task"][:, None] == np.arange(len(self.scenario.tasks))
-        slots = np.column_stack([is_task, victims["x"], victims["y"]])
-        slots = np.where(present[:, None], slots, 0.0)
-        parts = [robots, slots, self._env.obstacles()[0]]
-        return np.concatenate([np.ravel(part) for part in parts], dtype=np.float32)
+        return self._env.state().reshape(-1)
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The world as an (H, W, 3) picture, or none where `render_mode` is none.
+        """The world as an (H, W, 3) picture, or none where `render_mode` is none or "human".
 
         Raises:
             gymnasium.error.ResetNeeded: no episode has started yet.
@@ -201,19 +179,12 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         if self.render_mode is None:
             return None
         self._need_start("render")
-        env = self._env
-        return draw_world(
-            self.scenario,
-            env.positions()[0],
-            env.velocities()[0],
-            env.victims()[0],
-            env.obstacles()[0],
-            title=f"step {int(env.step_counts()[0])} of {self.scenario.episode_steps}",
-        )
+        return self._screen.show(self._env)
 
     def close(self) -> None:
         """Free the world; the environment cannot be used afterwards."""
         self._env.close()
+        self._screen.close()
 
     def _need_start(self, what: str) -> None:
         if not self._started:

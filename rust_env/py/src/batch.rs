@@ -12,7 +12,7 @@ use innerattn_env::snapshot::most_bytes;
 use innerattn_env::task::Rescue;
 use innerattn_env::world::World;
 use numpy::{IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray3, PyArrayMethods};
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -64,9 +64,9 @@ impl Batch {
         seed: u64,
         num_threads: Option<usize>,
         first_env: u64,
-        autoreset: bool,
+        autoreset: &str,
     ) -> PyResult<Self> {
-        let autoreset = if autoreset { Autoreset::SameStep } else { Autoreset::Disabled };
+        let autoreset = autoreset_named(autoreset)?;
         let options = Options { num_envs, seed, num_threads, first_env, autoreset };
         let rules = Arc::clone(&rules.0);
         Worlds::check(&options).map_err(|error| raised(py, &error))?;
@@ -308,6 +308,18 @@ impl Batch {
             rows.extend(rescue.helpers[..helpers].iter().map(|helper| helper.map_or(-1, i64::from)));
         }
         Ok(rows.into_pyarray(py).call_method1("view", (&self.rescue_dtype,))?.unbind())
+    }
+}
+
+/// What happens when an episode ends, by its name in Python.
+fn autoreset_named(name: &str) -> PyResult<Autoreset> {
+    match name {
+        "same_step" => Ok(Autoreset::SameStep),
+        "next_step" => Ok(Autoreset::NextStep),
+        "disabled" => Ok(Autoreset::Disabled),
+        _ => Err(PyValueError::new_err(format!(
+            "autoreset = {name:?}: must be \"same_step\", \"next_step\" or \"disabled\""
+        ))),
     }
 }
 

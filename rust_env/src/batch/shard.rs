@@ -14,7 +14,7 @@ use crate::reward::NUM_COMPONENTS;
 use crate::robot::Commands;
 use crate::rules::Rules;
 use crate::task::Rescue;
-use crate::world::World;
+use crate::world::{Ending, World};
 
 /// Time between two polls of the caller.
 const BETWEEN_POLLS: Duration = Duration::from_millis(50);
@@ -119,8 +119,15 @@ impl Shard {
             &mut buffers.components[index * robots * NUM_COMPONENTS..][..robots * NUM_COMPONENTS];
         let reward = &mut buffers.reward[index * robots..][..robots];
         let env = self.first + index;
-        let ending =
-            world.step(rules, &mut self.workspace, commands, env, &mut self.rescues, components, reward);
+        let ending = if world.over {
+            // Only seen with `Autoreset::NextStep`: all else refuses to step such a world.
+            world.begin(rules, world.episode + 1);
+            components.fill(0.0);
+            reward.fill(0.0);
+            Ending { terminated: false, truncated: false }
+        } else {
+            world.step(rules, &mut self.workspace, commands, env, &mut self.rescues, components, reward)
+        };
         assert!(!stepping.doomed.contains(&env), "a test asked for it");
         buffers.terminated[index] = ending.terminated;
         buffers.truncated[index] = ending.truncated;

@@ -87,6 +87,23 @@ fn without_autoreset_an_ended_world_waits() {
 }
 
 #[test]
+fn with_autoreset_in_the_next_step_that_step_begins_the_episode_and_moves_nobody() {
+    let scenario = Scenario { episode_steps: 1, action_cost: 1.0, ..Scenario::default() };
+    let mut later = batch(scenario.clone(), Autoreset::NextStep);
+    let mut same = batch(scenario, Autoreset::SameStep);
+    for _ in 0..3 {
+        let (obs, final_obs, _, truncated) = step(&mut later, Commands::Discrete(&[1; 12])).expect("valid");
+        let (next, last, ..) = step(&mut same, Commands::Discrete(&[1; 12])).expect("valid");
+        assert!(obs == last && final_obs == last && truncated == [true; 3]);
+        assert!(later.worlds().all(|world| world.over));
+        let (obs, final_obs, terminated, truncated) =
+            step(&mut later, Commands::Discrete(&[2; 12])).expect("valid");
+        assert!(obs == next && final_obs == next && terminated == [false; 3] && truncated == [false; 3]);
+        assert!(later.worlds().all(|world| world.step == 0 && !world.over));
+    }
+}
+
+#[test]
 fn a_reset_goes_on_to_the_next_episode_or_starts_over() {
     let mut batch = batch(Scenario::default(), Autoreset::SameStep);
     let mut obs = vec![0.0; ENVS * 4 * batch.rules().layout.width()];

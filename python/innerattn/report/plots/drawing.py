@@ -39,7 +39,7 @@ def check_format(path: Path) -> str:
     if kind not in FORMATS:
         raise RunError(f"{path}: the file must end in {', '.join('.' + x for x in FORMATS)}")
     if find_spec("matplotlib") is None:
-        raise RunError("drawing needs matplotlib: install innerattn[figures]")
+        raise RunError("drawing needs matplotlib: pip install 'innerattn[report]'")
     return kind
 
 

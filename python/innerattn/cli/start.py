@@ -1,0 +1,34 @@
+"""Where the command `innerattn` begins: its version, and what to install if it cannot start."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from innerattn.errors import missing_library
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command, or say in one line which of its libraries is not installed.
+
+    Args:
+        argv: the arguments; none: those of the process.
+
+    Returns:
+        The exit code, as of `innerattn.cli.main.main`; 1 if a library is missing.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if arguments == ["--version"]:
+        from innerattn import __version__
+
+        print(f"innerattn {__version__}")
+        return 0
+    try:
+        from innerattn.cli.main import main as run
+    except ModuleNotFoundError as error:
+        missing = missing_library("the command", error)
+        if missing is None:
+            raise
+        print(f"innerattn: error: {missing}", file=sys.stderr)
+        return 1
+    return run(arguments)

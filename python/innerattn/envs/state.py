@@ -1,0 +1,61 @@
+"""The state of worlds as one row each, for critics that see everything."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.config.scenario import Scenario
+from innerattn.envs.aligned import aligned_empty
+
+
+def state_names(scenario: Scenario) -> list[str]:
+    """Names of the S columns of `world_states`; units are m and m/s."""
+    robots = [
+        f"{robot.name}.{quantity}.{axis}"
+        for robot in scenario.robots
+        for quantity in ("position", "velocity")
+        for axis in ("x", "y")
+    ]
+    columns = [*(f"task.{task.name}" for task in scenario.tasks), "position.x", "position.y"]
+    victims = [
+        f"victim_{slot}.{column}" for slot in range(scenario.num_victims) for column in columns
+    ]
+    obstacles = [
+        f"obstacle_{index}.position.{axis}"
+        for index in range(len(scenario.obstacles))
+        for axis in ("x", "y")
+    ]
+    return robots + victims + obstacles
+
+
+def world_states(
+    positions: NDArray[np.float32],
+    velocities: NDArray[np.float32],
+    victims: NDArray[np.void],
+    obstacles: NDArray[np.float32],
+    scenario: Scenario,
+) -> NDArray[np.float32]:
+    """The states of E worlds.
+
+    Args:
+        positions: (E, R, 2) robots' centres [m].
+        velocities: (E, R, 2) robots' velocities [m/s].
+        victims: (E, V) structured; fields ``present``, ``task``, ``x``, ``y`` [m] are used.
+        obstacles: (E, O, 2) obstacles' centres [m].
+        scenario: the worlds' description.
+
+    Returns:
+        (E, S) float32, columns `state_names`.
+    """
+    present = victims["present"]
+    is_task = victims["task"][..., None] == np.arange(len(scenario.tasks))
+    places = np.stack([victims["x"], victims["y"]], axis=-1) * present[..., None]
+    parts = [
+        np.concatenate([positions, velocities], axis=2),
+        np.concatenate([is_task & present[..., None], places], axis=2),
+        obstacles,
+    ]
+    rows = [part.reshape(len(positions), -1) for part in parts]
+    states = aligned_empty((len(positions), sum(row.shape[1] for row in rows)), np.float32)
+    return np.concatenate(rows, axis=1, out=states)

@@ -1,0 +1,126 @@
+"""What the views of rescue worlds share: the scenario that was asked for, seeds, and pictures."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.config.scenario import Scenario
+from innerattn.envs.render import draw_world
+from innerattn.errors import ConfigError, MissingLibraryError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
+
+    from innerattn.envs.batch import BatchEnv
+
+STEPS_PER_SECOND = 10
+"""Pictures per second, as many as there are control periods by default."""
+
+
+def chosen_scenario(
+    scenario: Scenario | str, steps: int | None, steps_name: str, overrides: dict[str, Any]
+) -> Scenario:
+    """The scenario that a caller of a view asked for.
+
+    Args:
+        scenario: the world, or the name of a preset.
+        steps: length of an episode [control steps]; none: the scenario's.
+        steps_name: what the view calls ``steps``.
+        overrides: fields of `Scenario` to change.
+
+    Raises:
+        ConfigError: unknown preset or field, or an invalid value.
+        TypeError: ``scenario`` is of another type.
+    """
+    if not isinstance(scenario, (Scenario, str)):
+        raise TypeError(f"scenario = {scenario!r}: must be a Scenario or the name of a preset")
+    if isinstance(scenario, str):
+        scenario = Scenario.preset(scenario)
+    if steps is not None:
+        if "episode_steps" in overrides:
+            raise ConfigError(f"{steps_name} and episode_steps are the same: give one of them")
+        overrides = overrides | {"episode_steps": steps}
+    return scenario.replace(**overrides) if overrides else scenario
+
+
+def seed_or_random(seed: int | None) -> int:
+    """The seed, or a random one where there is none."""
+    return int(np.random.default_rng().integers(2**63)) if seed is None else seed
+
+
+class Screen:
+    """Shows single worlds of a batch: as arrays, in a window, or not at all.
+
+    Args:
+        mode: none, "rgb_array" or "human".
+        modes: what is allowed beside none.
+
+    Raises:
+        ConfigError: another mode.
+        MissingLibraryError: Matplotlib is not installed.
+    """
+
+    def __init__(self, mode: str | None, modes: list[str]) -> None:
+        if mode not in (None, *modes):
+            known = " or ".join(repr(one) for one in modes)
+            raise ConfigError(f"render_mode = {mode!r}: must be None or {known}")
+        if mode is not None and find_spec("matplotlib") is None:
+            raise MissingLibraryError(
+                f"render_mode = {mode!r} needs matplotlib: pip install 'innerattn[report]'"
+            )
+        self.mode = mode
+        self._modes = modes
+        self._window: tuple[Figure, AxesImage] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle: a copy opens a window of its own."""
+        return Screen, (self.mode, self._modes)
+
+    def show(self, env: BatchEnv, world: int = 0) -> NDArray[np.uint8] | None:
+        """The picture of a world, (H, W, 3); none where it goes to the window or nowhere."""
+        if self.mode is None:
+            return None
+        picture = draw_world(
+            env.scenario,
+            env.positions()[world],
+            env.velocities()[world],
+            env.victims()[world],
+            env.obstacles()[world],
+            title=f"step {int(env.step_counts()[world])} of {env.scenario.episode_steps}",
+        )
+        if self.mode == "rgb_array":
+            return picture
+        self._put_into_window(picture)
+        return None
+
+    def follow(self, env: BatchEnv) -> None:
+        """After a reset or a step: shows the world where somebody watches."""
+        if self.mode == "human":
+            self.show(env)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            from matplotlib import pyplot
+
+            pyplot.close(self._window[0])
+            self._window = None
+
+    def _put_into_window(self, picture: NDArray[np.uint8]) -> None:
+        """Show a picture in the window, if the system has a display."""
+        from matplotlib import pyplot
+
+        if self._window is None:
+            figure = pyplot.figure(figsize=(8, 6), num="innerattn", clear=True)
+            axes = figure.add_axes((0, 0, 1, 1))
+            axes.set_axis_off()
+            self._window = figure, axes.imshow(picture)
+        figure, image = self._window
+        image.set_data(picture)
+        if getattr(figure.canvas, "required_interactive_framework", None) is not None:
+            pyplot.pause(1 / STEPS_PER_SECOND)

@@ -1,0 +1,92 @@
+"""What an installed package must do, tried where nothing else is installed: `make smoke` runs it.
+
+It takes the extras that are there as an argument, e.g. "gym", and needs no test library.
+"""
+
+import pickle
+import subprocess
+import sys
+import sysconfig
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+EXTRAS = sys.argv[1].split(",") if len(sys.argv) > 1 else []
+
+
+def command(*arguments: str) -> "subprocess.CompletedProcess[str]":
+    path = Path(sysconfig.get_path("scripts")) / "innerattn"
+    return subprocess.run([path, *arguments], capture_output=True, text=True, check=False)
+
+
+def worlds_scripts_records_and_statistics() -> None:
+    import numpy as np
+
+    from innerattn.config import Scenario
+    from innerattn.envs import BatchEnv
+    from innerattn.evaluate import read_records, run_episodes, scripted_policy, write_records
+    from innerattn.measures.registry import measures_of
+    from innerattn.records.record import FIELDS
+    from innerattn.stats.student import student_interval
+
+    env = BatchEnv("mixed", 8, seed=1)
+    env.reset()
+    for _ in range(40):
+        step = env.step(np.ones((8, 4), int))
+    assert np.isfinite(step.obs).all()
+    assert pickle.loads(pickle.dumps(env)).state().tobytes() == env.state().tobytes()
+    scenario = Scenario.preset("mixed-8")  # more robots than are assigned without scipy
+    record = run_episodes(scripted_policy("hungarian", scenario), scenario, 4, 0, record=FIELDS)
+    with TemporaryDirectory() as folder:
+        write_records([record], Path(folder))
+        (again,) = read_records(Path(folder))
+    assert measures_of(again) == measures_of(record)
+    assert student_interval([1.0, 2.0, 4.0]).low < 2.3
+    versions = f"Python {sys.version.split()[0]}, numpy {np.__version__}"
+    print(f"{versions}: worlds, scripts, records, statistics,", end=" ")
+    assert "torch" not in sys.modules
+
+
+def the_command() -> None:
+    from innerattn import __version__
+
+    assert command("--version").stdout == f"innerattn {__version__}\n"
+    if "train" not in EXTRAS:
+        done = command("train")
+        assert done.returncode == 1, done
+        assert done.stderr.endswith("pip install 'innerattn[train]'\n"), done.stderr
+        assert done.stderr.count("\n") == 1, done.stderr
+
+
+def views() -> None:
+    import gymnasium
+    from pettingzoo.test import api_test, parallel_api_test
+
+    from innerattn.envs import env, parallel_env
+
+    parallel_api_test(parallel_env(), num_cycles=30)
+    api_test(env(), num_cycles=30)
+    many = gymnasium.make_vec("innerattn/Rescue-v0", num_envs=3)
+    many.reset(seed=0)
+    many.step(many.action_space.sample())
+
+
+def missing_views() -> None:
+    said = "nothing"
+    try:
+        from innerattn.envs import parallel_env  # noqa: F401
+    except ImportError as error:
+        said = str(error)
+    assert said.endswith("pip install 'innerattn[gym]'"), said
+
+
+if __name__ == "__main__":
+    before = time.perf_counter()
+    import innerattn.envs
+
+    seconds = time.perf_counter() - before
+    assert not {"gymnasium", "numpy", "torch"} & set(sys.modules), innerattn.envs.__file__
+    worlds_scripts_records_and_statistics()
+    the_command()
+    (views if "gym" in EXTRAS else missing_views)()
+    print(f"command{', views' if 'gym' in EXTRAS else ''}; import innerattn.envs: {seconds:.3f} s")
