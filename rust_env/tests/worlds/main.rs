@@ -12,3 +12,4 @@ mod faults;
 mod snapshot;
 mod speed;
 mod structure;
+mod victims;
