@@ -105,7 +105,11 @@ ENTRANCES = {
         "victims", tasks, lambda env, x: core(env).set_victims(present(env), x, spots(env)), "iu", 8
     ),
     "core.set_victims' places": Entrance(
-        "victims", spots, lambda env, x: core(env).set_victims(present(env), tasks(env), x), "iuf", 8
+        "victims",
+        spots,
+        lambda env, x: core(env).set_victims(present(env), tasks(env), x),
+        "iuf",
+        8,
     ),
     "core.set_motion": Entrance(
         "positions", places, lambda env, x: core(env).set_motion(x, env.velocities()), "iuf", 8

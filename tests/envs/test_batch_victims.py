@@ -65,7 +65,9 @@ def test_a_victim_that_is_added_is_seen_and_rescued() -> None:
 def test_what_is_accepted_is_what_is_there_then(data: st.DataObject) -> None:
     situation = data.draw(st.sampled_from(["single", "double", "mixed"]))
     env = batch(situation)
-    numbers = st.floats(-1.25, 1.25, width=32, allow_subnormal=False) | st.sampled_from([np.nan, np.inf, 0.9, -0.9])
+    numbers = st.floats(-1.25, 1.25, width=32, allow_subnormal=False) | st.sampled_from(
+        [np.nan, np.inf, 0.9, -0.9]
+    )
     victims, before = env.victims(), env.snapshot()
     there = victims.copy()
     for world, slot in np.ndindex(victims.shape):

@@ -153,9 +153,7 @@ def test_messages_are_taken(taking: LocalServer) -> None:
 def test_messages_of_others_are_refused(
     taking: LocalServer, path: str, body: bytes, headers: dict[str, str], status: int
 ) -> None:
-    found, answered, text = asked(
-        taking, path.format(word=taking.word), "POST", body, **headers
-    )
+    found, answered, text = asked(taking, path.format(word=taking.word), "POST", body, **headers)
     assert found == status
     assert answered["Content-Type"] == "application/json; charset=utf-8"
     assert list(json.loads(text)) == ["error"]

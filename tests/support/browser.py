@@ -63,7 +63,11 @@ class Visit:
 
 @contextmanager
 def visit(
-    browser: Browser, path: Path | str, size: tuple[int, int] = WIDE, theme: str = "light", **options: Any
+    browser: Browser,
+    path: Path | str,
+    size: tuple[int, int] = WIDE,
+    theme: str = "light",
+    **options: Any,
 ) -> Iterator[Visit]:
     """Opens a file without any network, or an address; nothing may go wrong on it."""
     context: Any = browser.new_context(

@@ -22,7 +22,7 @@ SCRIPTS = ("greedy", "hungarian", "oracle", "random")
 
 @dataclass(kw_only=True)
 class Play(Command):
-    """Play with a team in a browser on this machine: move, push and break robots; Ctrl-C ends it."""
+    """Play with a team in a browser on this machine: move, push, break robots; Ctrl-C ends it."""
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
     """A run's folder, or one of random, greedy, hungarian, oracle; it acts first."""

@@ -6,7 +6,7 @@ It steps a single world through `BatchEnv`; for training at speed use `BatchEnv`
 from __future__ import annotations
 
 from importlib.util import find_spec
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
@@ -16,8 +16,12 @@ from pettingzoo import ParallelEnv
 
 from innerattn.config import Scenario
 from innerattn.envs.batch import BatchEnv
-from innerattn.envs.render import draw_world
+from innerattn.envs.render import draw_world, paint_figure
+from innerattn.envs.window import Window
 from innerattn.errors import ConfigError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Obs: TypeAlias = NDArray[np.float32]
 Action: TypeAlias = Any  # an integer, or (2,) float32 where actions are continuous
@@ -37,12 +41,14 @@ def parallel_env(
         scenario: the world, or the name of a preset.
         max_cycles: length of an episode [control steps]; none: the scenario's `episode_steps`,
             25 in every preset.
-        render_mode: none, or "rgb_array" for `render` to give pictures.
+        render_mode: none; "rgb_array" for `render` to give pictures; or "human" for a window that
+            `reset` and `step` keep up to date, at most `metadata["render_fps"]` times a second.
         seed: seed of the episodes until `reset` is given one; none: a random one.
         overrides: fields of `Scenario` to change.
 
     Raises:
-        ConfigError: unknown preset, field or render mode, or an invalid value.
+        ConfigError: unknown preset, field or render mode, an invalid value, or no matplotlib or no
+            display to draw on.
         TypeError: ``scenario`` or ``seed`` is of another type.
         ValueError: ``seed`` is out of range.
     """
@@ -70,7 +76,7 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
 
     metadata: ClassVar[dict[str, Any]] = {
         "name": "innerattn_v0",
-        "render_modes": ["rgb_array"],
+        "render_modes": ["human", "rgb_array"],
         "is_parallelizable": True,
         "render_fps": 10,
     }
@@ -78,7 +84,9 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
     def __init__(self, scenario: Scenario, render_mode: str | None, seed: int | None) -> None:
         """See `parallel_env`."""
         if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ConfigError(f"render_mode = {render_mode!r}: must be None or 'rgb_array'")
+            raise ConfigError(
+                f"render_mode = {render_mode!r}: must be None, 'human' or 'rgb_array'"
+            )
         if render_mode is not None and find_spec("matplotlib") is None:
             raise ConfigError(
                 f"render_mode = {render_mode!r}: needs matplotlib; install innerattn[figures]"
@@ -92,6 +100,11 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         self.possible_agents = list(self._env.robot_names)
         self.agents: list[str] = []
         self._started = False
+        self._window = (
+            Window(f"innerattn, {scenario.situation}", self.metadata["render_fps"])
+            if render_mode == "human"
+            else None
+        )
         width = self._env.obs_width
         self.observation_spaces = {
             name: spaces.Box(-np.inf, np.inf, (width,), np.float32) for name in self.possible_agents
@@ -126,6 +139,7 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         obs = self._env.reset(seed)
         self._started = True
         self.agents = self.possible_agents.copy()
+        self._show()
         return self._by_agent(obs[0]), {agent: {} for agent in self.agents}
 
     def step(
@@ -152,6 +166,7 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         terminated, truncated = bool(step.terminated[0]), bool(step.truncated[0])
         if terminated or truncated:
             self.agents = []
+        self._show()
         return (
             self._by_agent(step.obs[0]),
             dict(zip(agents, step.reward[0].tolist(), strict=True)),
@@ -193,7 +208,9 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         return np.concatenate([np.ravel(part) for part in parts], dtype=np.float32)
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The world as an (H, W, 3) picture, or none where `render_mode` is none.
+        """The world as an (H, W, 3) picture where `render_mode` is "rgb_array", else none.
+
+        With "human" it brings the window up to date, as `reset` and `step` do by themselves.
 
         Raises:
             gymnasium.error.ResetNeeded: no episode has started yet.
@@ -201,19 +218,31 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         if self.render_mode is None:
             return None
         self._need_start("render")
-        env = self._env
-        return draw_world(
-            self.scenario,
-            env.positions()[0],
-            env.velocities()[0],
-            env.victims()[0],
-            env.obstacles()[0],
-            title=f"step {int(env.step_counts()[0])} of {self.scenario.episode_steps}",
-        )
+        self._show()
+        if self.render_mode == "human":
+            return None
+        return draw_world(self.scenario, *self._drawn(), title=self._title())
 
     def close(self) -> None:
-        """Free the world; the environment cannot be used afterwards."""
+        """Free the world and close the window; the environment cannot be used afterwards."""
         self._env.close()
+        if self._window is not None:
+            self._window.close()
+
+    def _show(self) -> None:
+        """Bring the window up to date, if there is one."""
+        if self._window is not None:
+            self._window.update(self._paint)
+
+    def _paint(self, figure: Figure) -> None:
+        paint_figure(figure, self.scenario, *self._drawn(), title=self._title())
+
+    def _drawn(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
+        env = self._env
+        return env.positions()[0], env.velocities()[0], env.victims()[0], env.obstacles()[0]
+
+    def _title(self) -> str:
+        return f"step {int(self._env.step_counts()[0])} of {self.scenario.episode_steps}"
 
     def _need_start(self, what: str) -> None:
         if not self._started:

@@ -154,7 +154,13 @@ class InteractiveWorld:
             return
         self._obs = step.obs
         self._blocked = blocked_between(
-            self.scenario, before, env.positions(), velocities, self._actions, faults, env.obstacles()
+            self.scenario,
+            before,
+            env.positions(),
+            velocities,
+            self._actions,
+            faults,
+            env.obstacles(),
         )[0]
         self._note(step.rescues)
         self._choose()

@@ -14,6 +14,7 @@ from innerattn.config import Scenario
 from innerattn.evaluate.interactive import InteractiveWorld, endless
 from innerattn.evaluate.trained import load_trained
 from innerattn.policies import scripted_policy
+from innerattn.report.worlds import worlds_document
 
 HOSTILE = "</script><img src=x onerror='window.struck=1'>"
 
@@ -99,7 +100,9 @@ def test_a_dragged_robot_is_where_it_was_dropped(browser: Browser, team: Any) ->
     with played(team) as server, visit(browser, server.address) as seen:
         page = seen.page
         ready(page)
-        drag(page, canvas_point(page, "play.run.now.positions[2]"), canvas_point(page, "[0.3, -0.6]"))
+        drag(
+            page, canvas_point(page, "play.run.now.positions[2]"), canvas_point(page, "[0.3, -0.6]")
+        )
         found = state(page)
         assert found["positions"][2] == pytest.approx([0.3, -0.6], abs=0.01)
         assert found["velocities"][2] == [0, 0]
@@ -135,16 +138,6 @@ def test_victims_are_dragged_and_added(browser: Browser) -> None:
         page.get_by_role("alert").get_by_text("All 4 places are taken").wait_for()
 
 
-def way_of_pushed(page: Page) -> float:
-    """Metres that robot 0 goes in ten steps of its policy."""
-    x, y = state(page)["positions"][0]
-    for _ in range(10):
-        page.keyboard.press(".")
-    settle(page)
-    there = state(page)["positions"][0]
-    return float(((there[0] - x) ** 2 + (there[1] - y) ** 2) ** 0.5)
-
-
 def test_a_broken_motor_slows_a_robot(browser: Browser) -> None:
     def driven(page: Page) -> float:
         """How far the robot comes that somebody drives to the right for ten steps."""
@@ -161,7 +154,9 @@ def test_a_broken_motor_slows_a_robot(browser: Browser) -> None:
         healthy = driven(page)
         page.get_by_role("button", name="Break motor").click()
         settle(page)
-        assert page.get_by_role("button", name="Break motor").get_attribute("aria-pressed") == "true"
+        assert (
+            page.get_by_role("button", name="Break motor").get_attribute("aria-pressed") == "true"
+        )
         assert page.locator("#events").get_by_text("fault: food_0, motor gain").is_visible()
         assert 0.0 < driven(page) < 0.4 * healthy
         page.get_by_role("button", name="Break motor").click()
@@ -175,11 +170,16 @@ def test_a_robot_is_blinded_and_taken_out_and_comes_back(browser: Browser) -> No
         page = seen.page
         ready(page)
         page.keyboard.press("r")
+        page.evaluate("play.send({ do: 'move_robot', robot: 1, x: 0.9, y: 0.9 })")
         page.keyboard.press("b")
         page.keyboard.press("o")
         settle(page)
         assert state(page)["faults"][1] == {"blackout": 1, "unavailable": 1}
         assert page.evaluate("play.run.isAway(0, play.run.last, 1)")
+        assert "Nobody offers" not in page.locator("#now").inner_text(), "food_0 offers food"
+        page.evaluate("play.send({ do: 'faults', robot: 0, values: { unavailable: 1 } })")
+        settle(page)
+        assert "Nobody offers food now: victims of task_" in page.locator("#now").inner_text()
         before = state(page)["positions"][1]
         for _ in range(4):
             page.keyboard.press(".")
@@ -216,7 +216,7 @@ def test_one_robot_is_steered_by_keys_and_pushed(browser: Browser) -> None:
         page.keyboard.press("Shift+ArrowDown")
         settle(page)
         assert state(page)["velocities"][0] == [0, -1.5]
-        page.get_by_label("push").check()
+        page.get_by_role("radio", name="push").check()
         start = canvas_point(page, "play.run.now.positions[1]")
         drag(page, start, (start[0] + 60, start[1] - 30))
         vx, vy = state(page)["velocities"][1]
@@ -265,8 +265,7 @@ def test_another_policy_acts_on_the_same_state(browser: Browser, team: Any) -> N
         after = state(page)
         assert (after["positions"], after["attention"]) == (before["positions"], None)
         assert page.get_by_text("This policy has no attention.").is_visible()
-        for _ in range(3):
-            page.keyboard.press(".")
+        page.get_by_role("button", name="Step", exact=True).click()
         page.keyboard.press("p")
         page.keyboard.press("p")
         settle(page)
@@ -314,13 +313,6 @@ def lone(**fields: Any) -> Scenario:
     return Scenario(robots=[robot], tasks=[{"name": "t", "needs": ["food"]}], **fields)
 
 
-def named() -> Scenario:
-    scenario = Scenario.preset("mixed")
-    names = (HOSTILE, "Ärztin 医者 🚑", "__proto__", "medical_0")
-    pairs = zip(scenario.robots, names, strict=True)
-    return scenario.replace(robots=[one.model_dump() | {"name": name} for one, name in pairs])
-
-
 @pytest.mark.parametrize(
     "scenario", [Scenario.preset("mixed-16"), lone(), lone(situation="single")], ids=str
 )
@@ -345,14 +337,27 @@ def test_mappo_has_no_attention(browser: Browser, tmp_path: Path) -> None:
         assert seen.page.get_by_text("This policy has no attention.").is_visible()
 
 
-def test_hostile_and_foreign_names_are_text(browser: Browser) -> None:
-    make = scripted_world(named())
-    with played(make, HOSTILE) as server, visit(browser, server.address) as seen:
+def test_hostile_and_foreign_names_are_text(
+    browser: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def described(scenario: Scenario) -> dict[str, Any]:
+        document = worlds_document(scenario)  # a scenario refuses such names
+        robots = document["robots"]
+        robots[0]["name"], robots[1]["name"], robots[2]["kind"] = (
+            HOSTILE,
+            "Ärztin 医者 🚑",
+            "__proto__",
+        )
+        document["tasks"][0]["name"] = HOSTILE
+        return document
+
+    monkeypatch.setattr("innerattn.report.play.state.worlds_document", described)
+    with played(scripted_world(), HOSTILE) as server, visit(browser, server.address) as seen:
         page = seen.page
         ready(page)
         assert page.get_by_role("heading", level=1).inner_text() == f"Play with {HOSTILE}"
         names = page.locator("#robots strong").all_inner_texts()
-        assert names[:3] == [HOSTILE, "Ärztin 医者 🚑", "__proto__"]
+        assert names[:2] == [HOSTILE, "Ärztin 医者 🚑"]
         page.keyboard.press("o")
         page.keyboard.press(".")
         settle(page)

@@ -57,7 +57,7 @@ def test_a_page_gets_a_world_and_its_state(sessions: Sessions) -> None:
     status, document = sent(sessions, "sessions", {})
     assert status == 200
     assert len(document["session"]) >= 16
-    assert [robot["name"] for robot in document["worlds"]["robots"]][0] == "food_0"
+    assert document["worlds"]["robots"][0]["name"] == "food_0"
     assert document["policies"] == ["hungarian", "greedy"]
     assert (document["episode"], document["step"], document["rescued"]) == (0, 0, 0)
     path = f"sessions/{document['session']}"
@@ -128,7 +128,9 @@ json_values = st.recursive(
     max_leaves=6,
 )
 fields = st.sampled_from(["robot", "x", "y", "vx", "vy", "slot", "task", "name", "values"])
-kinds = st.sampled_from(["step", "move_robot", "push_robot", "faults", "add_victim", "steer", "policy"])
+kinds = st.sampled_from(
+    ["step", "move_robot", "push_robot", "faults", "add_victim", "steer", "policy"]
+)
 
 
 @settings(max_examples=150, deadline=None)
@@ -216,7 +218,7 @@ def test_a_world_that_fails_starts_anew(
     path = opened(sessions)
     step = InteractiveWorld.step
 
-    def fail(self: InteractiveWorld) -> None:
+    def fail(_: InteractiveWorld) -> None:
         monkeypatch.setattr(InteractiveWorld, "step", step)
         raise WorldError("env 0: it failed in this step", [0])
 

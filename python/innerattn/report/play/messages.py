@@ -1,4 +1,4 @@
-"""What a page may ask of its world: each message is checked here, by form; the world checks values."""
+"""What a page may ask of its world. Forms are checked here; the world checks values."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class Sessions:
             return len(self._open)
 
     def take(self, path: str, body: bytes) -> Answer:
-        """Answer a message: to ``sessions`` it opens a page, to ``sessions/ID`` it is that page's."""
+        """Answer a message: to ``sessions`` it opens a page, to ``sessions/ID`` it is its own."""
         name, _, session = path.partition("/")
         if name != "sessions":
             return _problem(HTTPStatus.NOT_FOUND, "no such page")

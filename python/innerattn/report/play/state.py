@@ -19,8 +19,8 @@ _DECIMALS = 5
 def opening_document(session: str, world: InteractiveWorld) -> dict[str, Any]:
     """What a page gets first: its session, the world, the policies, and the state."""
     scenario = world.scenario
-    reach = float(np.float32(scenario.arena_half_width_m) - np.float32(scenario.wall_clearance_m))
-    known = {"most_push_mps": MOST_PUSH_MPS, "victim_reach_m": reach}
+    reach = np.float32(scenario.arena_half_width_m) - np.float32(scenario.wall_clearance_m)
+    known = {"most_push_mps": MOST_PUSH_MPS, "victim_reach_m": float(str(reach))}
     return state_document(world.moment()) | {
         "session": session,
         "worlds": worlds_document(scenario) | known | {"num_victims": scenario.num_victims},
@@ -63,4 +63,6 @@ def _rounded(values: NDArray[np.float32]) -> list[list[float]]:
 def _wrong(robot: np.void) -> dict[str, float]:
     """What is wrong with a robot, by kind."""
     values = {kind: float(robot[kind]) for kind in HEALTHY}
-    return {kind: round(v, _DECIMALS) for kind, v in values.items() if v != np.float32(HEALTHY[kind])}
+    return {
+        kind: round(v, _DECIMALS) for kind, v in values.items() if v != np.float32(HEALTHY[kind])
+    }

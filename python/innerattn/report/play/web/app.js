@@ -17,6 +17,8 @@ class App {
     this.policies = policies;
     this.run = new LiveRun(document.title, this.worlds);
     this.look = { robot: 0, all: false, head: -1, trails: true };
+    // Only this page changes them: what was asked for last is so, though the answer is on its way.
+    Object.assign(this, { steered: opened.steered, policy: opened.policy });
     Object.assign(this, { running: false, due: 0, arrived: 0, charted: 0, times: [], drive: [], moving: null });
     this.events = new EventLog($("events"), $("no-events"), (robot) => this.choose(robot));
     this.charts = new Charts($("charts"), () => {});
@@ -73,7 +75,7 @@ class App {
     on("step", "click", () => this.step());
     on("restart", "click", () => this.restart());
     on("speed", "change", () => this.setSpeed(Number($("speed").value)));
-    on("policy", "change", () => this.send({ do: "policy", name: $("policy").value }));
+    on("policy", "change", () => this.choosePolicy($("policy").value));
     on("head", "change", () => this.setLook({ head: Number($("head").value) }));
     on("all", "change", () => this.setLook({ all: $("all").checked }));
     on("trails", "change", () => this.setLook({ trails: $("trails").checked }));
@@ -113,7 +115,7 @@ class App {
 
   /** Whether the chosen robot is steered by hand. */
   get steers() {
-    return this.run.now.steered === this.look.robot;
+    return this.steered === this.look.robot;
   }
 
   async send(message) {
@@ -152,7 +154,7 @@ class App {
     this.events.add(events, this.worlds.dt_s);
     if (isStep) this.arrived = performance.now();
     this.happened = events.length ? events : this.happened?.filter((one) => state.step - one.step < 10) ?? [];
-    this.fresh = this.stale = true;
+    this.fresh = this.stale = this.chartsAreOld = true;
   }
 
   /** Moves a robot as fast as the server takes it; the last place counts. */
@@ -198,8 +200,14 @@ class App {
 
   toggleSteering() {
     this.drive = [];
-    this.send({ do: "steer", robot: this.steers ? null : this.look.robot });
-    if (!this.steers) this.setRunning(true);
+    this.steered = this.steers ? null : this.look.robot;
+    this.send({ do: "steer", robot: this.steered });
+    if (this.steered !== null) this.setRunning(true);
+  }
+
+  choosePolicy(name) {
+    this.policy = name;
+    this.send({ do: "policy", name });
   }
 
   /** Drives the steered robot that way until the key is released; the latest key counts. */
@@ -216,8 +224,8 @@ class App {
   }
 
   sendDrive() {
-    const robot = this.run.now.steered, [x, y] = this.drive.at(-1)?.way ?? [0, 0];
-    if (robot !== null) this.send({ do: "steer", robot, x, y });
+    const [x, y] = this.drive.at(-1)?.way ?? [0, 0];
+    if (this.steered !== null) this.send({ do: "steer", robot: this.steered, x, y });
   }
 
   stayAlive() {
@@ -232,7 +240,7 @@ class App {
     Object.assign(this.look, look);
     $("all").checked = this.look.all;
     this.charted = 0;
-    this.fresh = this.stale = true;
+    this.fresh = this.stale = this.chartsAreOld = true;
   }
 
   setTool(tool) {
@@ -273,7 +281,8 @@ class App {
     }
     const share = Math.min((performance.now() - this.arrived) / this.period, 1);
     const at = this.run.last - (this.run.moments.length > 1 ? 1 - share : 0);
-    if (this.stale || at !== this.hands.step) {
+    const chartsAreDue = this.chartsAreOld && now - this.charted > CHART_MS;
+    if (this.stale || chartsAreDue || at !== this.hands.step) {
       this.stale = false;
       this.draw(at, now);
     }
@@ -289,8 +298,8 @@ class App {
     if (this.fresh) {
       this.fresh = false;
       this.showTexts();
-    } else if (now - this.charted > CHART_MS) {
-      this.charted = now;
+    } else if (this.chartsAreOld && now - this.charted > CHART_MS) {
+      Object.assign(this, { charted: now, chartsAreOld: false });
       this.showCharts();
     }
     this.times.push(performance.now() - begin);
@@ -308,12 +317,13 @@ class App {
     if (String(run.heads) !== $("head").dataset.heads) this.showHeads();
     look.head = Math.min(look.head, run.heads - 1);
     $("head").value = String(look.head);
-    $("policy").value = now.policy;
+    $("policy").value = this.policy;
     this.robots.show(run, 0, now.step, look);
-    this.panel.show(run, look.robot, now.steered);
+    this.panel.show(run, look.robot, this.steered);
     this.victims.show(now.victims);
     $("clock").textContent = `${(now.step * worlds.dt_s).toFixed(1)} s · ${counted(now.rescued, "rescue")}`;
     const says = this.happened.map(({ text }) => `${text}.`);
+    says.push(...run.hopeless().map(([need, tasks]) => `Nobody offers ${need} now: ${listed(tasks)} must wait.`));
     says.push(worlds.robots.length > 1 ? attentionText(run, 0, now.step, look.head, look.robot) : "");
     $("now").textContent = says.filter(Boolean).join(" ");
   }
@@ -341,7 +351,7 @@ function pressed(app, event) {
     n: () => app.restart(),
     r: () => app.choose((look.robot + 1) % app.worlds.robots.length),
     s: () => app.toggleSteering(),
-    p: () => app.send({ do: "policy", name: next(app.policies, app.run.now.policy) }),
+    p: () => app.choosePolicy(next(app.policies, app.policy)),
     h: () => app.setLook({ head: ((look.head + 2) % (app.run.heads + 1)) - 1 }),
     a: () => app.setLook({ all: !look.all }),
     "-": () => faster(-1),
@@ -351,7 +361,7 @@ function pressed(app, event) {
   let action = actions[key];
   if (way) {
     if (event.shiftKey) action = () => event.repeat || app.push(way);
-    else action = app.run.now.steered !== null ? () => app.hold(key, way) : () => app.nudge(way);
+    else action = app.steered !== null ? () => app.hold(key, way) : () => app.nudge(way);
   }
   if (!action || (event.repeat && !way)) return;
   event.preventDefault();

@@ -141,6 +141,19 @@ class LiveRun {
     return robot < 0 ? this.now.rescued : this.now.helped[robot];
   }
 
+  /** Abilities that victims need and no robot offers that is not out, with the victims' tasks. */
+  hopeless() {
+    const { robots, tasks } = this.worlds, found = new Map();
+    const there = robots.filter(({ index }) => !this.isAway(0, this.last, index));
+    for (const { task } of this.now.victims) {
+      for (const need of tasks[task].needs) {
+        if (there.some(({ abilities }) => abilities.includes(need))) continue;
+        found.set(need, (found.get(need) ?? new Set()).add(`victims of ${tasks[task].name}`));
+      }
+    }
+    return [...found].map(([need, waiting]) => [need, [...waiting]]);
+  }
+
   /** The last steps as a run of its own, for charts. */
   recent(steps) {
     const from = Math.max(this.first, this.last + 1 - steps), { worlds, size, heads, attention } = this;
