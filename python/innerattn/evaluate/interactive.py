@@ -306,7 +306,8 @@ class InteractiveWorld:
         rescues, found = [], []
         for event in events:
             helpers = tuple(int(event[name]) for name in names if event[name] >= 0)
-            rescue = Rescue(*(int(event[name]) for name in ("step", "victim", "task")), helpers)
+            step, victim, task = (int(event[name]) for name in ("step", "victim", "task"))
+            rescue = Rescue(step, victim, task, helpers)
             rescues.append(rescue)
             for robot in helpers:
                 self._helped[robot] += 1

@@ -97,10 +97,16 @@ def blocked(record: Record) -> NDArray[np.bool_]:
     if positions.shape[1] < 2:
         return found
     going_on = np.arange(1, positions.shape[1]) < record.lengths[:, None]
-    places = obstacle_places(record)[:, None]
-    driven = (record.steps[name][:, :-1] for name in ("velocities", "actions", "faults"))
-    moved = positions[:, :-1], positions[:, 1:]
-    found[:, :-1] = blocked_between(record.scenario, *moved, *driven, places) & going_on[..., None]
+    stopped = blocked_between(
+        record.scenario,
+        positions[:, :-1],
+        positions[:, 1:],
+        record.steps["velocities"][:, :-1],
+        record.steps["actions"][:, :-1],
+        record.steps["faults"][:, :-1],
+        obstacle_places(record)[:, None],
+    )
+    found[:, :-1] = stopped & going_on[..., None]
     return found
 
 
@@ -129,10 +135,10 @@ def blocked_between(
     """
     way = _free_way(scenario, velocities, actions, faults)
     length = np.linalg.norm(way, axis=-1)
-    after = after.astype(np.float64)
-    along = ((after - before) * way).sum(-1) / np.maximum(length, 1e-9)
+    end = after.astype(np.float64)
+    along = ((end - before) * way).sum(-1) / np.maximum(length, 1e-9)
     stopped = (length > _LEAST_WAY_M) & (along < _FREE_SHARE * length)
-    return np.asarray(stopped & _touching(scenario, after, obstacles))
+    return np.asarray(stopped & _touching(scenario, end, obstacles))
 
 
 def _free_way(

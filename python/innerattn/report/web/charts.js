@@ -147,10 +147,10 @@ class Charts {
 
   /** Names of the lines at their ends, moved apart; of many lines, the thick or the uppermost. */
   addLabels(picture, lines, y, end) {
-    const last = (line) => line.values.findLast((value) => !Number.isNaN(value)) ?? 0;
+    const last = (line) => line.values.findLast((value) => !Number.isNaN(value));
     const { height, bottom, top } = CHART, gap = 13;
     const room = Math.floor((height - bottom - top) / gap) + 1;
-    const ends = lines.map((line) => ({ line, at: y(last(line)) })).sort((a, b) => a.at - b.at);
+    const ends = lines.filter((line) => last(line) !== undefined).map((line) => ({ line, at: y(last(line)) })).sort((a, b) => a.at - b.at);
     const chosen = ends.filter(({ line }) => line.thick);
     const shown = lines.length > MANY_LINES && chosen.length ? chosen : ends.slice(0, room);
     shown.forEach((one, index) => {
