@@ -59,7 +59,7 @@ def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
         nobody = "nobody: neither a run's folder nor one of greedy, hungarian, oracle, random"
         cases = [
             (1, ["nobody"], nobody),
-            (1, [str(tmp_path)], f"{tmp_path}: "),
+            (1, [str(tmp_path)], f"{tmp_path}/run.json: missing"),
             (2, ["greedy", "--port", "70000"], "--port 70000: must be 0 to 65,535"),
             (2, ["greedy", "--seed", "-1"], "--seed -1: must be 0 to 2**64 - 1"),
             (1, ["greedy", "--port", port], f"--port {port}: is taken"),

@@ -8,7 +8,8 @@ from fresh_run import config_of_team, make_run, run_config
 
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
-from innerattn.evaluate.interactive import Handoff, InteractiveWorld, endless
+from innerattn.evaluate.interactive import InteractiveWorld, endless
+from innerattn.evaluate.moment import Handoff
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
 from innerattn.measures.moments import blocked, handoffs_of_all_robots

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from innerattn import _core
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
+from innerattn.evaluate.moment import Handoff, Moment, Rescue
 from innerattn.evaluate.play import Attentive
 from innerattn.measures.moments import blocked_between
 from innerattn.policies import Policy, PolicyInput, WorldState
@@ -24,64 +24,6 @@ MOST_PUSH_MPS = 5.0
 
 HEALTHY = {name: healthy for name, _, _, _, healthy, _ in _core.FAULT_KINDS}
 """The value of each kind of fault that means that nothing is wrong."""
-
-
-class Rescue(NamedTuple):
-    """A rescue: the step in which it happened, the victim, its task, and who helped."""
-
-    step: int
-    victim: int
-    task: int
-    helpers: tuple[int, ...]
-
-
-class Handoff(NamedTuple):
-    """A robot's partners in two rescues of different tasks that follow each other, and steps."""
-
-    robot: int
-    before: int
-    after: int
-    first: int
-    second: int
-
-
-@dataclass(frozen=True)
-class Moment:
-    """A world now, and what happened in the step that led to it.
-
-    Attributes:
-        episode: number of the episode, from 0.
-        step: steps done in it.
-        policy: name of the policy that acts.
-        steered: the robot that a person steers; none: the policy drives all.
-        positions: (R, 2) float32 [m].
-        velocities: (R, 2) float32 [m/s].
-        victims: (V,) structured, the fields of `BatchEnv.victims`.
-        faults: (R,) structured, the fields of `BatchEnv.fault_state`.
-        obstacles: (O, 2) float32 [m].
-        blocked: (R,) bool, whether something stopped the robot in the last step.
-        attention: (H, R, R) float32 for the actions that come next; none: there is none.
-        rescues: of the last step.
-        handoffs: that were completed in the last step.
-        rescued: victims rescued in this episode.
-        helped: (R,) rescues of this episode in which each robot helped.
-    """
-
-    episode: int
-    step: int
-    policy: str
-    steered: int | None
-    positions: NDArray[np.float32]
-    velocities: NDArray[np.float32]
-    victims: NDArray[np.void]
-    faults: NDArray[np.void]
-    obstacles: NDArray[np.float32]
-    blocked: NDArray[np.bool_]
-    attention: NDArray[np.float32] | None
-    rescues: tuple[Rescue, ...]
-    handoffs: tuple[Handoff, ...]
-    rescued: int
-    helped: tuple[int, ...]
 
 
 def endless(scenario: Scenario) -> Scenario:

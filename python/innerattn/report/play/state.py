@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.evaluate.interactive import HEALTHY, MOST_PUSH_MPS, InteractiveWorld, Moment
+from innerattn.evaluate.interactive import HEALTHY, MOST_PUSH_MPS, InteractiveWorld
+from innerattn.evaluate.moment import Moment
 from innerattn.report.worlds import worlds_document
 
 SCHEMA_VERSION = 1
