@@ -136,6 +136,20 @@ class Batch:
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
         """Put the robots at positions (E, R, 2), m, with velocities (E, R, 2), m/s."""
 
+    def set_victims(self, present: ArrayLike, tasks: ArrayLike, places: ArrayLike) -> None:
+        """Move victims, and let new ones appear in empty slots.
+
+        Args:
+            present: (E, V) bool; true for a slot that has or gets a victim.
+            tasks: (E, V) integers.
+            places: (E, V, 2), m.
+
+        Raises:
+            ValueError: wrong shape, a victim that is taken away, or a task or a place that no
+                victim of the slot can have (field, env and slot are named). Nothing has changed
+                then.
+        """
+
     def fault_state(self) -> NDArray[np.float32]:
         """Levels of the faults in effect, (E, R, K)."""
 

@@ -3,6 +3,7 @@
 
 mod buffers;
 mod shard;
+mod victims;
 
 use std::iter::zip;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -53,6 +53,20 @@ pub enum Error {
         /// What is allowed.
         rule: String,
     },
+    /// A victim that a caller puts somewhere cannot be that victim.
+    #[error("victims[{field}, env {env}, slot {slot}] = {value}: {rule}")]
+    Victim {
+        /// Field of the victim.
+        field: &'static str,
+        /// Index of the env in the batch.
+        env: usize,
+        /// Slot of the victim.
+        slot: usize,
+        /// The value given.
+        value: String,
+        /// What is allowed.
+        rule: String,
+    },
     /// A step was asked of a world whose episode is over, while autoreset is disabled.
     #[error("env {env}: its episode is over; reset it before the next step (autoreset is disabled)")]
     EpisodeOver {

@@ -72,10 +72,16 @@ impl Placing {
         at.amax() <= (self.arena - solid.reach()).max(0.0)
     }
 
+    /// How far a victim may be from the centre on each axis, m.
+    #[must_use]
+    pub fn victim_reach(&self) -> f32 {
+        self.arena - self.wall_clearance
+    }
+
     /// Whether a victim may be there.
     #[must_use]
     pub fn may_be_victim(&self, at: Vec2) -> bool {
-        at.amax() <= self.arena - self.wall_clearance
+        at.amax() <= self.victim_reach()
     }
 
     /// A place for a robot, without overlap with solids and the `others` already placed.
@@ -95,7 +101,7 @@ impl Placing {
 
     /// A place for a victim: away from walls and solids, and from every robot.
     pub fn victim(&self, stream: &mut Stream, robots: &[Vec2], solids: &[Placed]) -> Place {
-        draw(stream, self.arena - self.wall_clearance, |at| {
+        draw(stream, self.victim_reach(), |at| {
             let robots = robots.iter().map(|robot| (at - robot).norm() - self.spawn_clearance);
             let solids =
                 solids.iter().map(|(solid, centre)| solid.distance(at - centre) - self.wall_clearance);

@@ -1,6 +1,8 @@
 //! What appears where: obstacles and robots when an episode starts, victims when the situation wants them.
 //! Everything is drawn from the streams given, in a fixed order.
 
+use std::ops::RangeInclusive;
+
 use crate::geometry::{Solid, Vec2};
 use crate::place::{DRAWS, Placed, Placing};
 use crate::rng::{Purpose, Stream};
@@ -107,14 +109,25 @@ impl Spawn {
             })
     }
 
+    /// Tasks that a victim of this slot may have.
+    #[must_use]
+    pub fn tasks_of_slot(&self, slot: usize) -> RangeInclusive<usize> {
+        if self.situation == Situation::Double { slot..=slot } else { 0..=self.num_tasks - 1 }
+    }
+
+    /// How far a victim may be from the centre on each axis, m.
+    #[must_use]
+    pub fn victim_reach(&self) -> f32 {
+        self.placing.victim_reach()
+    }
+
     /// Whether these victims may be present after `step` steps of an episode in which `appeared` have come.
     #[must_use]
     pub fn may_be_victims(&self, slots: &[Option<Victim>], step: u32, appeared: u32) -> bool {
         let known = |slot: usize, victim: &Victim| {
-            let task = victim.task as usize;
-            let fits = if self.situation == Situation::Double { task == slot } else { task < self.num_tasks };
             let earlier = slots[..slot].iter().flatten();
-            fits && victim.id < appeared
+            self.tasks_of_slot(slot).contains(&(victim.task as usize))
+                && victim.id < appeared
                 && victim.appeared_step <= step
                 && earlier.clone().all(|other| other.id != victim.id)
                 && self.placing.may_be_victim(victim.position)

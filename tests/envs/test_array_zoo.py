@@ -63,6 +63,19 @@ def places(env: BatchEnv) -> np.ndarray:
     return env.positions()
 
 
+def present(env: BatchEnv) -> np.ndarray:
+    return np.ones((env.num_envs, env.scenario.num_victims), bool)
+
+
+def tasks(env: BatchEnv) -> np.ndarray:
+    return np.maximum(env.victims()["task"], 0)
+
+
+def spots(env: BatchEnv) -> np.ndarray:
+    victims = env.victims()
+    return np.stack([victims["x"], victims["y"]], -1)
+
+
 ENTRANCES = {
     "step": Entrance("actions", actions, BatchEnv.step, "iu", 8),
     "step, continuous": Entrance("actions", forces, BatchEnv.step, "f", 8, continuous),
@@ -84,6 +97,19 @@ ENTRANCES = {
     "core.reset": Entrance("mask", mask, lambda env, x: core(env).reset(None, x), "b", 1),
     "core.set_faults": Entrance(
         "faults", levels, lambda env, x: core(env).set_faults(x, None), "iuf", 8
+    ),
+    "core.set_victims' presence": Entrance(
+        "victims", present, lambda env, x: core(env).set_victims(x, tasks(env), spots(env)), "b", 1
+    ),
+    "core.set_victims' tasks": Entrance(
+        "victims", tasks, lambda env, x: core(env).set_victims(present(env), x, spots(env)), "iu", 8
+    ),
+    "core.set_victims' places": Entrance(
+        "victims",
+        spots,
+        lambda env, x: core(env).set_victims(present(env), tasks(env), x),
+        "iuf",
+        8,
     ),
     "core.set_motion": Entrance(
         "positions", places, lambda env, x: core(env).set_motion(x, env.velocities()), "iuf", 8

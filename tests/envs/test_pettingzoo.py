@@ -45,19 +45,6 @@ def test_length_and_pictures() -> None:
     render_test(lambda render_mode: env("double", render_mode=render_mode))
 
 
-def test_a_window_is_opened_once_and_closed() -> None:
-    from matplotlib import pyplot
-
-    world = parallel_env(render_mode="human", seed=0)
-    before = pyplot.get_fignums()
-    world.reset()
-    assert world.render() is None
-    world.step(dict.fromkeys(world.agents, 1))
-    assert len(pyplot.get_fignums()) == len(before) + 1
-    world.close()
-    assert pyplot.get_fignums() == before
-
-
 def test_all_robots_have_equal_spaces_of_their_own() -> None:
     world = parallel_env(FAULTY)
     spaces = [world.observation_space(agent) for agent in world.possible_agents]

@@ -63,11 +63,18 @@ class Visit:
 
 @contextmanager
 def visit(
-    browser: Browser, path: Path, size: tuple[int, int] = WIDE, theme: str = "light"
+    browser: Browser,
+    path: Path | str,
+    size: tuple[int, int] = WIDE,
+    theme: str = "light",
+    **options: Any,
 ) -> Iterator[Visit]:
-    """Opens a file without any network; nothing may go wrong on it."""
+    """Opens a file without any network, or an address; nothing may go wrong on it."""
     context: Any = browser.new_context(
-        viewport={"width": size[0], "height": size[1]}, color_scheme=theme, offline=True
+        viewport={"width": size[0], "height": size[1]},
+        color_scheme=theme,
+        offline=isinstance(path, Path),
+        **options,
     )
     found = Visit(context.new_page())
     found.page.on(
@@ -77,7 +84,7 @@ def visit(
         ),
     )
     found.page.on("pageerror", lambda error: found.problems.append(str(error)))
-    found.page.goto(path.as_uri())
+    found.page.goto(path.as_uri() if isinstance(path, Path) else path)
     yield found
     context.close()
     assert not found.problems

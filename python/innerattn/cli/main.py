@@ -21,6 +21,7 @@ import tyro
 from innerattn.cli.evaluate import Evaluate
 from innerattn.cli.info import Info
 from innerattn.cli.options import UsageError
+from innerattn.cli.play import Play
 from innerattn.cli.replay import Replay
 from innerattn.cli.report import Report
 from innerattn.cli.reproduce import Reproduce
@@ -119,6 +120,7 @@ def _parse(argv: list[str]) -> Any:
         | Annotated[Replay, tyro.conf.subcommand("replay")]
         | Annotated[Report, tyro.conf.subcommand("report")]
         | Annotated[Watch, tyro.conf.subcommand("watch")]
+        | Annotated[Play, tyro.conf.subcommand("play")]
         | Annotated[Robustness, tyro.conf.subcommand("robustness")]
         | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
         | Annotated[Info, tyro.conf.subcommand("info")]

@@ -39,8 +39,8 @@ class Watch(Command):
         """
         self._check()
         from innerattn.experiments.live import read_live
+        from innerattn.report.local_server import LocalServer
         from innerattn.report.watch.pages import watch_pages
-        from innerattn.report.watch.server import LocalServer
 
         folders = [Path(run) for run in self.runs]
         for folder in folders:

@@ -283,6 +283,39 @@ class BatchEnv(Shown):
         """
         self._core.set_motion(positions, velocities)
 
+    def set_victims(self, victims: NDArray[np.void]) -> None:
+        """Move victims, change their tasks, and let new ones appear in empty slots.
+
+        A victim that is present stays until it is rescued; it keeps its id. A new one gets the next
+        id. Obstacles and robots are not looked at.
+
+        Args:
+            victims: (E, V) structured with the fields of `victims`: take that array, change what is
+                to change, and give it back. ``present``, ``task``, ``x`` and ``y`` [m] are used.
+
+        Raises:
+            TypeError: other fields or dtypes, or a masked array.
+            ValueError: wrong shape, a victim that is taken away, a task that the slot cannot have,
+                or a place outside the arena or nearer to a wall than `wall_clearance_m` (field, env
+                and slot are named). Nothing has changed then.
+        """
+        slots = self.scenario.num_victims
+        wanted = f"must have shape ({self.num_envs}, {slots}) and the fields of victims()"
+        if isinstance(victims, np.ma.MaskedArray):
+            raise TypeError(f"victims is a masked array, whose mask would be lost: it {wanted}")
+        if not isinstance(victims, np.ndarray) or victims.dtype.names != _VICTIM_DTYPE.names:
+            given = isinstance(victims, np.ndarray)
+            found = f"has dtype {victims.dtype}" if given else "is no array"
+            raise TypeError(f"victims {found}: {wanted}")
+        for name, kinds in (("present", "b"), ("task", "iu"), ("x", "iuf"), ("y", "iuf")):
+            field = victims.dtype[name]
+            if field.kind not in kinds or field.itemsize > 8:
+                raise TypeError(f"victims[{name!r}] has dtype {field}: {wanted}")
+        if victims.shape != (self.num_envs, slots):
+            raise ValueError(f"victims has shape {victims.shape}: {wanted}")
+        places = np.stack([victims["x"], victims["y"]], -1, dtype=np.float64, casting="same_kind")
+        self._core.set_victims(np.asarray(victims["present"]), np.asarray(victims["task"]), places)
+
     def snapshot(self) -> bytes:
         """Image of all worlds, with a checksum; `restore` continues from it bit for bit."""
         return self._core.snapshot()

@@ -15,6 +15,7 @@ from innerattn.config import Scenario
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Okabe & Ito's palette, told apart with every common colour blindness.
 _KIND_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#F0E442")
@@ -52,13 +53,27 @@ def draw_world(
 
     figure = Figure(figsize=(8, 6), dpi=pixels / 6)
     canvas = FigureCanvasAgg(figure)
+    paint_figure(figure, scenario, positions, velocities, victims, obstacles, title=title)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    pixels_rgba = canvas.buffer_rgba()  # type: ignore[no-untyped-call]
+    return np.asarray(pixels_rgba, np.uint8)[..., :3].copy()
+
+
+def paint_figure(
+    figure: Figure,
+    scenario: Scenario,
+    positions: NDArray[np.float32],
+    velocities: NDArray[np.float32],
+    victims: NDArray[np.void],
+    obstacles: NDArray[np.float32],
+    *,
+    title: str = "",
+) -> None:
+    """Paint one world with its legend on an empty figure; arguments as in `draw_world`."""
     axes = figure.add_axes((0.1, 0.1, 0.63, 0.84))
     axes.set_title(title)
     legend = paint_world(axes, scenario, positions, velocities, victims, obstacles)
     figure.legend(legend.values(), legend.keys(), loc=(0.74, 0.6), frameon=False, labelspacing=0.9)
-    canvas.draw()  # type: ignore[no-untyped-call]
-    pixels_rgba = canvas.buffer_rgba()  # type: ignore[no-untyped-call]
-    return np.asarray(pixels_rgba, np.uint8)[..., :3].copy()
 
 
 def paint_world(

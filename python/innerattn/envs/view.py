@@ -9,13 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config.scenario import Scenario
-from innerattn.envs.render import draw_world
+from innerattn.envs.render import draw_world, paint_figure
+from innerattn.envs.window import Window
 from innerattn.errors import ConfigError, MissingLibraryError
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from matplotlib.image import AxesImage
-
     from innerattn.envs.batch import BatchEnv
 
 STEPS_PER_SECOND = 10
@@ -75,7 +73,7 @@ class Screen:
             )
         self.mode = mode
         self._modes = modes
-        self._window: tuple[Figure, AxesImage] | None = None
+        self._window: Window | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle: a copy opens a window of its own."""
@@ -85,17 +83,18 @@ class Screen:
         """The picture of a world, (H, W, 3); none where it goes to the window or nowhere."""
         if self.mode is None:
             return None
-        picture = draw_world(
-            env.scenario,
+        drawn = (
             env.positions()[world],
             env.velocities()[world],
             env.victims()[world],
             env.obstacles()[world],
-            title=f"step {int(env.step_counts()[world])} of {env.scenario.episode_steps}",
         )
+        title = f"step {int(env.step_counts()[world])} of {env.scenario.episode_steps}"
         if self.mode == "rgb_array":
-            return picture
-        self._put_into_window(picture)
+            return draw_world(env.scenario, *drawn, title=title)
+        if self._window is None:
+            self._window = Window(f"innerattn, {env.scenario.situation}", STEPS_PER_SECOND)
+        self._window.update(lambda figure: paint_figure(figure, env.scenario, *drawn, title=title))
         return None
 
     def follow(self, env: BatchEnv) -> None:
@@ -106,21 +105,5 @@ class Screen:
     def close(self) -> None:
         """Close the window, if there is one."""
         if self._window is not None:
-            from matplotlib import pyplot
-
-            pyplot.close(self._window[0])
+            self._window.close()
             self._window = None
-
-    def _put_into_window(self, picture: NDArray[np.uint8]) -> None:
-        """Show a picture in the window, if the system has a display."""
-        from matplotlib import pyplot
-
-        if self._window is None:
-            figure = pyplot.figure(figsize=(8, 6), num="innerattn", clear=True)
-            axes = figure.add_axes((0, 0, 1, 1))
-            axes.set_axis_off()
-            self._window = figure, axes.imshow(picture)
-        figure, image = self._window
-        image.set_data(picture)
-        if getattr(figure.canvas, "required_interactive_framework", None) is not None:
-            pyplot.pause(1 / STEPS_PER_SECOND)

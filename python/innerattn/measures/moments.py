@@ -5,10 +5,13 @@ They are read off a record; nothing is played.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from innerattn import _core
+from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.measures.sharing.handoff import HANDOFF, handoffs
@@ -89,28 +92,64 @@ def blocked(record: Record) -> NDArray[np.bool_]:
     missing = {"actions", "positions", "velocities", "faults"} - set(record.steps)
     if missing:
         raise ValueError(f"record of {record.policy!r} lacks {', '.join(sorted(missing))}")
-    positions = record.steps["positions"].astype(np.float64)
+    positions = record.steps["positions"]
     found = np.zeros(positions.shape[:3], np.bool_)
     if positions.shape[1] < 2:
         return found
-    way = _free_way(record)[:, :-1]
-    length = np.linalg.norm(way, axis=-1)
-    moved = np.diff(positions, axis=1)
-    along = (moved * way).sum(-1) / np.maximum(length, 1e-9)
-    stopped = (length > _LEAST_WAY_M) & (along < _FREE_SHARE * length)
     going_on = np.arange(1, positions.shape[1]) < record.lengths[:, None]
-    found[:, :-1] = stopped & _touching(record, positions)[:, 1:] & going_on[..., None]
+    stopped = blocked_between(
+        record.scenario,
+        positions[:, :-1],
+        positions[:, 1:],
+        record.steps["velocities"][:, :-1],
+        record.steps["actions"][:, :-1],
+        record.steps["faults"][:, :-1],
+        obstacle_places(record)[:, None],
+    )
+    found[:, :-1] = stopped & going_on[..., None]
     return found
 
 
-def _free_way(record: Record) -> NDArray[np.float64]:
-    """Where each robot's drive alone would have moved it within a step, (E, T, R, 2) [m]."""
-    scenario, actions, faults = (
-        record.scenario,
-        record.steps["actions"],
-        record.steps["faults"],
-    )
-    drive = actions.astype(np.float64) if actions.ndim == 4 else _DIRECTIONS[actions]
+def blocked_between(
+    scenario: Scenario,
+    before: NDArray[np.float32],
+    after: NDArray[np.float32],
+    velocities: NDArray[np.float32],
+    actions: NDArray[Any],
+    faults: NDArray[np.void],
+    obstacles: NDArray[np.float32],
+) -> NDArray[np.bool_]:
+    """Whether something stopped each robot in a step; see `blocked`.
+
+    Args:
+        scenario: the world.
+        before: (..., R, 2) places when the step began [m].
+        after: (..., R, 2) places when it ended [m].
+        velocities: (..., R, 2) when it began [m/s].
+        actions: (..., R) integers, or (..., R, 2) where actions are continuous.
+        faults: (..., R) structured, in effect in the step.
+        obstacles: (..., O, 2) places of the obstacles [m].
+
+    Returns:
+        (..., R) bool.
+    """
+    way = _free_way(scenario, velocities, actions, faults)
+    length = np.linalg.norm(way, axis=-1)
+    end = after.astype(np.float64)
+    along = ((end - before) * way).sum(-1) / np.maximum(length, 1e-9)
+    stopped = (length > _LEAST_WAY_M) & (along < _FREE_SHARE * length)
+    return np.asarray(stopped & _touching(scenario, end, obstacles))
+
+
+def _free_way(
+    scenario: Scenario,
+    velocities: NDArray[np.float32],
+    actions: NDArray[Any],
+    faults: NDArray[np.void],
+) -> NDArray[np.float64]:
+    """Where each robot's drive alone would have moved it within a step, (..., R, 2) [m]."""
+    continuous = scenario.actions == "continuous"
+    drive = actions.astype(np.float64) if continuous else _DIRECTIONS[actions]
     drive = drive / np.maximum(np.linalg.norm(drive, axis=-1, keepdims=True), 1.0)
     turn = faults["heading_bias"].astype(np.float64)
     cos, sin = np.cos(turn), np.sin(turn)
@@ -118,7 +157,7 @@ def _free_way(record: Record) -> NDArray[np.float64]:
     drive = np.stack([cos * x - sin * y, sin * x + cos * y], -1)
     drive *= (faults["motor_gain"] * (faults["unavailable"] == 0.0))[..., None]
     gain = np.array([robot.drive_force_n / robot.mass_kg for robot in scenario.robots])
-    velocity = record.steps["velocities"] * (1.0 - scenario.damping)
+    velocity = velocities * (1.0 - scenario.damping)
     velocity = velocity + drive * (gain * scenario.dt_s)[:, None]
     cap = np.array([robot.max_speed_mps for robot in scenario.robots]) * faults["speed_limit"]
     speed = np.linalg.norm(velocity, axis=-1)
@@ -127,9 +166,10 @@ def _free_way(record: Record) -> NDArray[np.float64]:
     return np.asarray(velocity * driving[..., None] * scenario.dt_s)
 
 
-def _touching(record: Record, positions: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether each robot touches a robot, a wall or an obstacle, (E, T, R)."""
-    scenario = record.scenario
+def _touching(
+    scenario: Scenario, positions: NDArray[np.float64], obstacles: NDArray[np.float32]
+) -> NDArray[np.bool_]:
+    """Whether each robot touches a robot, a wall or an obstacle, (..., R)."""
     radius = np.array([robot.radius_m for robot in scenario.robots])
     touching = np.asarray(
         scenario.arena_half_width_m - np.abs(positions).max(-1) - radius < _TOUCH_M
@@ -138,9 +178,8 @@ def _touching(record: Record, positions: NDArray[np.float64]) -> NDArray[np.bool
     gaps -= radius[:, None] + radius + _TOUCH_M
     gaps[..., np.arange(len(radius)), np.arange(len(radius))] = np.inf
     touching |= (gaps < 0.0).any(-1)
-    places = obstacle_places(record)
     for number, shape in enumerate(scenario.obstacles):
-        away = positions - places[:, number, None, None]
+        away = positions - obstacles[..., number, None, :]
         if shape.half_extents_m is not None:
             half = np.array(shape.half_extents_m)
             away = away - np.clip(away, -half, half)

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import json
 from html import escape
+from importlib.resources import files
 
 from innerattn.report.table import Column, Row, Table
+
+_SHARED = files("innerattn.report") / "web"
+
+
+def shared_text(*names: str) -> str:
+    """Styles or scripts that several pages share, one after the other."""
+    return "\n".join((_SHARED / name).read_text("utf-8") for name in names)
 
 
 def fill(template: str, **values: str) -> str:

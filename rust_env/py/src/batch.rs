@@ -223,6 +223,22 @@ impl Batch {
         self.worlds.set_motion(&places, &speeds).map_err(|error| raised(py, &error))
     }
 
+    fn set_victims(
+        &mut self,
+        py: Python,
+        present: &Bound<PyAny>,
+        tasks: &Bound<PyAny>,
+        places: &Bound<PyAny>,
+    ) -> PyResult<()> {
+        self.check_process()?;
+        let (envs, slots) = (self.worlds.num_envs(), self.worlds.rules().scenario.num_victims());
+        let (mut numbers, mut metres) = (vec![], vec![]);
+        let present = Door::flags("victims[present]", &[envs, slots]).read_flags(present)?;
+        Door::integers("victims[task]", &[envs, slots]).read_i64(tasks, &mut numbers)?;
+        Door::numbers("victims[place]", &[envs, slots, 2]).read_f32(places, &mut metres)?;
+        self.worlds.set_victims(&present, &numbers, &metres).map_err(|error| raised(py, &error))
+    }
+
     fn fault_state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let [envs, robots, _] = self.obs_shape();
         let of =

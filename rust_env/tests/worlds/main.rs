@@ -14,3 +14,4 @@ mod fuzz;
 mod snapshot;
 mod speed;
 mod structure;
+mod victims;

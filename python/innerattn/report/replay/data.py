@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn import _core
 from innerattn.errors import RunError
 from innerattn.measures.moments import (
     blocked,
@@ -19,6 +18,7 @@ from innerattn.measures.moments import (
     obstacle_places,
 )
 from innerattn.records.record import Record
+from innerattn.report.worlds import worlds_document
 
 SCHEMA_VERSION = 1
 
@@ -122,35 +122,13 @@ def _difference(one: Record, other: Record) -> str | None:
 
 
 def _worlds(record: Record, arrays: _Arrays) -> dict[str, Any]:
-    scenario = record.scenario
-    return {
-        "situation": scenario.situation,
+    unit = _unit(record.scenario)
+    return worlds_document(record.scenario) | {
         "seed": str(record.seed),  # may be more than a number of JavaScript holds
         "first_episode": record.first_episode,
         "episodes": record.num_episodes,
-        "dt_s": scenario.dt_s,
-        "half_width_m": scenario.arena_half_width_m,
-        "rescue_radius_m": scenario.rescue_radius_m,
-        "tasks": [{"name": task.name, "needs": list(task.needs)} for task in scenario.tasks],
-        "robots": [
-            {
-                "name": robot.name,
-                "kind": robot.kind,
-                "abilities": list(robot.abilities),
-                "radius_m": robot.radius_m,
-            }
-            for robot in scenario.robots
-        ],
-        "fault_kinds": [
-            {"name": name, "unit": unit, "healthy": healthy}
-            for name, unit, _, _, healthy, _ in _core.FAULT_KINDS
-        ],
-        "obstacles": [
-            {"radius_m": one.radius_m, "half_extents_m": one.half_extents_m}
-            for one in scenario.obstacles
-        ],
-        "obstacle_places": arrays.add(_quantised(obstacle_places(record), _unit(scenario))),
-        "position_unit_m": _unit(scenario),
+        "obstacle_places": arrays.add(_quantised(obstacle_places(record), unit)),
+        "position_unit_m": unit,
     }
 
 

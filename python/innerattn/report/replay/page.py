@@ -8,11 +8,12 @@ from importlib.resources import files
 from typing import Any
 
 from innerattn.records.record import Record
-from innerattn.report.html import fill, json_text
+from innerattn.report.html import fill, json_text, shared_text
 from innerattn.report.replay.data import replay_document
 
 _WEB = files("innerattn.report.replay") / "web"
-_SCRIPTS = ("data.js", "story.js", "scene.js", "marks.js", "charts.js", "panel.js", "app.js")
+_SHARED = ("dom.js", "worlds.js", "story.js", "scene.js", "marks.js", "charts.js", "panel.js")
+_SCRIPTS = ("data.js", "app.js")
 
 
 def replay_page(records: Sequence[Record], names: Sequence[str]) -> str:
@@ -36,8 +37,8 @@ def page_of(document: dict[str, Any], names: Sequence[str]) -> str:
     return fill(
         _text("page.html"),
         title=escape(_listed(names)),
-        style=_text("style.css"),
-        script="\n".join(_text(name) for name in _SCRIPTS),
+        style=f"{shared_text('arena.css')}\n{_text('replay.css')}",
+        script="\n".join([shared_text(*_SHARED), *map(_text, _SCRIPTS)]),
         data=json_text(document),
     )
 

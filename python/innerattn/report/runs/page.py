@@ -19,7 +19,7 @@ from innerattn.experiments.paper.table2 import table2
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import FinishedRun, by_method, read_run, refuse_unlike
 from innerattn.records.run_folder import read_config
-from innerattn.report.html import fill, html_table, json_text
+from innerattn.report.html import fill, html_table, json_text, shared_text
 from innerattn.report.paper.fig4 import entropy_table
 from innerattn.report.paper.fig5 import evidence_summary
 from innerattn.report.paper.table2 import sharing_summary
@@ -109,7 +109,7 @@ def runs_page(
         _text("report.html"),
         title=escape(title),
         subtitle=escape(f"{count}; {versions_text(runs)}"),
-        style=_text("report.css"),
+        style=shared_text("page.css"),
         library=plotly_script(),
         script=f"{plot_script()}\n{_text('report.js')}",
         parts="\n".join(parts),

@@ -12,11 +12,11 @@ from typing import Any
 
 from innerattn.experiments.live import LiveRun, read_live
 from innerattn.records.record import Record
-from innerattn.report.html import fill
+from innerattn.report.html import fill, shared_text
+from innerattn.report.local_server import Answer
 from innerattn.report.plotly import plot_script, plotly_script
 from innerattn.report.replay.page import replay_page
 from innerattn.report.runs.plots import COLOURS, Plot
-from innerattn.report.watch.server import Answer
 
 _WEB = files("innerattn.report.watch") / "web"
 
@@ -51,7 +51,7 @@ class NewestEpisodes:
 def watch_pages(
     folders: Sequence[Path], scripts: Mapping[str, float], play: PlayNewest
 ) -> dict[str, Callable[[], Answer]]:
-    """All pages by name, for `innerattn.report.watch.server.LocalServer`.
+    """All pages by name, for `innerattn.report.local_server.LocalServer`.
 
     Args:
         folders: of the runs.
@@ -64,8 +64,8 @@ def watch_pages(
     library = plotly_script()
     first = fill(
         _text("watch.html"),
-        style=_text("watch.css"),
-        script=f"{plot_script()}\n{_text('watch.js')}",
+        style=f"{shared_text('page.css')}\n{_text('watch.css')}",
+        script=f"{shared_text('dom.js')}\n{plot_script()}\n{_text('watch.js')}",
     )
     pages: dict[str, Callable[[], Answer]] = {
         "": partial(Answer, "text/html", first),

@@ -1,11 +1,11 @@
 // The page: what is chosen, what is shown, and what buttons, keys and the clock do.
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
-const $ = (id) => document.getElementById(id);
 
 class App {
   constructor(described, buffer) {
-    this.worlds = new Worlds(described.worlds, buffer);
+    const { obstacle_places: places, position_unit_m: unit } = described.worlds;
+    this.worlds = new Worlds(described.worlds, view(buffer, places), unit);
     this.runs = described.runs.map((run) => new Run(run, buffer, this.worlds));
     this.look = { robot: 0, all: false, head: -1, trails: true };
     Object.assign(this, { chosen: 0, step: 0, playing: false, hovered: -1, times: [] });

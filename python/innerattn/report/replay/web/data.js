@@ -26,60 +26,6 @@ function byEpisode(buffer, spec, episodes, toRow) {
   return lists;
 }
 
-/** What all policies of the page share: the arena, the team, the tasks. */
-class Worlds {
-  constructor(described, buffer) {
-    Object.assign(this, described);
-    this.unit = described.position_unit_m;
-    this.places = view(buffer, described.obstacle_places);
-    this.kinds = [...new Set(this.robots.map((robot) => robot.kind))];
-    this.robots.forEach((robot, index) => {
-      robot.index = index;
-      robot.kindIndex = this.kinds.indexOf(robot.kind);
-      robot.twin = this.robots.slice(0, index).filter((other) => other.kind === robot.kind).length;
-    });
-    this.abilities = [...new Set(this.robots.flatMap((robot) => robot.abilities))];
-    this.tasks.flatMap((task) => task.needs).forEach((need) => {
-      if (!this.abilities.includes(need)) this.abilities.push(need);
-    });
-    this.letters = shortNames(this.abilities);
-  }
-
-  /** The kind whose colour an ability has: the only one that offers it, or none. */
-  kindOf(ability) {
-    const kinds = new Set(
-      this.robots.filter((robot) => robot.abilities.includes(ability)).map((one) => one.kindIndex),
-    );
-    return kinds.size === 1 ? [...kinds][0] : -1;
-  }
-
-  canHelp(robot, task) {
-    return this.tasks[task].needs.some((need) => this.robots[robot].abilities.includes(need));
-  }
-
-  obstacle(episode, index) {
-    const at = 2 * (episode * this.obstacles.length + index);
-    return [this.places[at] * this.unit, this.places[at + 1] * this.unit];
-  }
-}
-
-/** The shortest beginnings that tell some names apart. */
-function shortNames(names) {
-  const found = {};
-  for (const name of names) {
-    const letters = [...name];
-    let length = 1;
-    while (
-      length < letters.length &&
-      names.some((other) => other !== name && [...other].slice(0, length).join("") ===
-        letters.slice(0, length).join(""))
-    ) length++;
-    const short = letters.slice(0, Math.min(length, 3)).join("");
-    found[name] = short.charAt(0).toUpperCase() + short.slice(1);
-  }
-  return found;
-}
-
 /** One policy's episodes. Positions are metres, velocities metres per second. */
 class Run {
   constructor(described, buffer, worlds) {
@@ -111,6 +57,11 @@ class Run {
     this.faults = lists(described.faults, ([, robot, kind, start, end], row) => (
       { robot, kind, start, end, value: values[row] }
     ));
+  }
+
+  /** The first step from which on a robot has moved by itself. */
+  firstOf() {
+    return 0;
   }
 
   /** Where a robot is at a step, which may lie between two. */
@@ -164,17 +115,8 @@ class Run {
     );
   }
 
-  /** Metres to the nearest victim that a robot can help; NaN: there is none. */
   distance(episode, step, robot) {
-    const [x, y] = this.place(episode, step, robot);
-    let least = NaN;
-    for (const victim of this.victims[episode]) {
-      if (step < victim.from || step >= victim.to) continue;
-      if (!this.worlds.canHelp(robot, victim.task)) continue;
-      const away = Math.hypot(victim.x - x, victim.y - y);
-      if (!(away >= least)) least = away;
-    }
-    return least;
+    return distanceToVictim(this, episode, step, robot);
   }
 
   /** Rescues up to and with a step that a robot helped in; of the whole team for robot -1. */

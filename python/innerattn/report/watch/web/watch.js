@@ -2,16 +2,8 @@
 
 const EVERY_MS = 2000;
 const SILENT_S = 60;
-const $ = (id) => document.getElementById(id);
 const shown = { run: 0, checkpoint: null };
 let state = { runs: [], plots: [] };
-
-function element(tag, attributes = {}, ...children) {
-  const node = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-  node.append(...children);
-  return node;
-}
 
 function clock(seconds) {
   if (seconds === null) return "–";

@@ -1,20 +1,5 @@
 // The lists beside the arena: robots, events, legend; and the marks on the scrubber.
 
-function element(tag, attributes = {}, ...children) {
-  const node = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-  node.append(...children);
-  return node;
-}
-
-function fillSelect(select, options, chosen) {
-  select.replaceChildren(...options.map(([value, text]) => {
-    const option = element("option", { value }, text);
-    option.selected = value === chosen;
-    return option;
-  }));
-}
-
 class RobotList {
   constructor(list, worlds, choose) {
     this.worlds = worlds;

@@ -38,28 +38,38 @@ function blockedSpells(run, episode) {
   return spells;
 }
 
+function rescueEvent(worlds, { step, task, helpers }) {
+  const names = helpers.map((robot) => worlds.robots[robot].name);
+  const verb = helpers.length === 1 ? "rescues" : "rescue";
+  return {
+    step, type: "rescue", robots: helpers,
+    text: `${listed(names)} ${verb} a victim of ${worlds.tasks[task].name}`,
+  };
+}
+
+function handoffEvent(worlds, { robot, before, after, second }) {
+  const name = (one) => worlds.robots[one].name;
+  return {
+    step: second, type: "handoff", robots: [robot],
+    text: `handoff: ${name(robot)} worked with ${name(before)} before, now with ${name(after)}`,
+  };
+}
+
+function faultEvent(worlds, fault) {
+  const { start, robot } = fault;
+  return {
+    step: start, type: "fault", robots: [robot],
+    text: `fault: ${worlds.robots[robot].name}, ${faultText(worlds, fault)}`,
+  };
+}
+
 /** Everything worth a mark on the scrubber: {step, type, text, robots}, in the order of time. */
 function eventsOf(run, episode) {
   const { worlds } = run, name = (robot) => worlds.robots[robot].name, events = [];
-  for (const one of run.rescues[episode]) {
-    const verb = one.helpers.length === 1 ? "rescues" : "rescue";
-    events.push({
-      step: one.step, type: "rescue", robots: one.helpers,
-      text: `${listed(one.helpers.map(name))} ${verb} a victim of ${worlds.tasks[one.task].name}`,
-    });
-  }
-  for (const one of run.handoffs[episode]) {
-    events.push({
-      step: one.second, type: "handoff", robots: [one.robot],
-      text: `handoff: ${name(one.robot)} worked with ${name(one.before)} before, ` +
-        `now with ${name(one.after)}`,
-    });
-  }
+  for (const one of run.rescues[episode]) events.push(rescueEvent(worlds, one));
+  for (const one of run.handoffs[episode]) events.push(handoffEvent(worlds, one));
   for (const one of run.faults[episode]) {
-    events.push({
-      step: one.start, type: "fault", robots: [one.robot],
-      text: `fault: ${name(one.robot)}, ${faultText(worlds, one)}`,
-    });
+    events.push(faultEvent(worlds, one));
     if (one.end < run.lengths[episode]) {
       events.push({
         step: one.end, type: "recovery", robots: [one.robot],

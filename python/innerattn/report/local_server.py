@@ -7,6 +7,7 @@ neither another user of the network nor a foreign page in the same browser can r
 from __future__ import annotations
 
 import errno
+import json
 import secrets
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
@@ -17,6 +18,8 @@ from urllib.parse import urlsplit
 from innerattn.errors import InnerattnError, RunError, one_line
 
 HOST = "127.0.0.1"
+MOST_BODY_BYTES = 4096
+"""Longest message that a page may send."""
 
 _POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'self' 'unsafe-inline'; "
@@ -33,10 +36,20 @@ _HEADERS = {
 
 
 class Answer(NamedTuple):
-    """What a page is: its type, such as "text/html", and its text."""
+    """What a page is: its type, such as "text/html", its text, and a status."""
 
     kind: str
     text: str
+    status: HTTPStatus = HTTPStatus.OK
+
+
+Take = Callable[[str, bytes], Answer]
+"""Takes a message: the path that it was sent to, and its body."""
+
+
+def problem(status: HTTPStatus, text: str) -> Answer:
+    """The answer to a message that is refused: JSON with one line, ``error``."""
+    return Answer("application/json", json.dumps({"error": text}), status)
 
 
 class LocalServer:
@@ -46,16 +59,20 @@ class LocalServer:
         pages: what gives each page, by its path without a slash in front ("" is the first one); an
             `InnerattnError` becomes a page of status 404 with its one line.
         port: of 127.0.0.1; 0: any that is free.
+        take: takes JSON messages (POST) of at most `MOST_BODY_BYTES`; none: nothing can be sent.
 
     Raises:
         RunError: the port is taken or may not be used.
     """
 
-    def __init__(self, pages: Mapping[str, Callable[[], Answer]], port: int = 0) -> None:
+    def __init__(
+        self, pages: Mapping[str, Callable[[], Answer]], port: int = 0, take: Take | None = None
+    ) -> None:
         self.word = secrets.token_urlsafe(16)
-        handler = type("Handler", (_Handler,), {"pages": pages, "word": self.word})
+        kind: type[_Handler] = _Handler if take is None else _TakingHandler
+        members = {"pages": pages, "word": self.word, "take": staticmethod(take or _nothing)}
         try:
-            self._server = ThreadingHTTPServer((HOST, port), handler)
+            self._server = ThreadingHTTPServer((HOST, port), type("Handler", (kind,), members))
         except OSError as error:
             why = "is taken" if error.errno == errno.EADDRINUSE else str(error.strerror)
             raise RunError(f"--port {port}: {why}") from error
@@ -83,29 +100,45 @@ class LocalServer:
         self._server.shutdown()
 
 
+def _nothing(path: str, body: bytes) -> Answer:
+    del path, body
+    return problem(HTTPStatus.NOT_FOUND, "no such page")
+
+
 class _Handler(BaseHTTPRequestHandler):
     pages: Mapping[str, Callable[[], Answer]]
     word: str
+    take: Take
     timeout = 30.0
+    protocol_version = "HTTP/1.1"
     server_version = "innerattn"
     sys_version = ""
+    wbufsize = -1  # an answer is one write, which nothing delays
+    disable_nagle_algorithm = True
 
     def do_GET(self) -> None:
         """Answer a request, or refuse it."""
+        name, refusal = self._asked()
+        if refusal is not None:
+            self._send(Answer("text/plain", refusal, HTTPStatus.FORBIDDEN))
+        elif name not in self.pages:
+            self._send(Answer("text/plain", "no such page", HTTPStatus.NOT_FOUND))
+        else:
+            try:
+                answer = self.pages[name]()
+            except (InnerattnError, OSError) as error:
+                answer = Answer("text/plain", one_line(error), HTTPStatus.NOT_FOUND)
+            self._send(answer)
+
+    def _asked(self) -> tuple[str, str | None]:
+        """The name that is asked for, and why nothing is given; none: it may be given."""
         path = urlsplit(self.path).path
         _, word, name = [*path.split("/", 2), "", ""][:3]
         if not self._is_local():
-            self._send(HTTPStatus.FORBIDDEN, Answer("text/plain", "not from this page"))
-        elif not secrets.compare_digest(word.encode(), self.word.encode()):
-            self._send(HTTPStatus.FORBIDDEN, Answer("text/plain", "not the address of this page"))
-        elif name not in self.pages:
-            self._send(HTTPStatus.NOT_FOUND, Answer("text/plain", "no such page"))
-        else:
-            try:
-                status, answer = HTTPStatus.OK, self.pages[name]()
-            except (InnerattnError, OSError) as error:
-                status, answer = HTTPStatus.NOT_FOUND, Answer("text/plain", one_line(error))
-            self._send(status, answer)
+            return name, "not from this page"
+        if not secrets.compare_digest(word.encode(), self.word.encode()):
+            return name, "not the address of this page"
+        return name, None
 
     def _is_local(self) -> bool:
         """Whether host and origin are this server's own."""
@@ -119,15 +152,44 @@ class _Handler(BaseHTTPRequestHandler):
             and site in ("same-origin", "none")
         )
 
-    def _send(self, status: HTTPStatus, answer: Answer) -> None:
+    def _send(self, answer: Answer) -> None:
         data = answer.text.encode()
-        self.send_response(status)
+        self.send_response(answer.status)
         self.send_header("Content-Type", f"{answer.kind}; charset=utf-8")
         self.send_header("Content-Length", str(len(data)))
         for name, value in _HEADERS.items():
             self.send_header(name, value)
+        if self.close_connection:
+            self.send_header("Connection", "close")
         self.end_headers()
         self.wfile.write(data)
 
     def log_message(self, format: str, *args: object) -> None:
         """Print nothing: the word in the address is a secret."""
+
+
+class _TakingHandler(_Handler):
+    def do_POST(self) -> None:
+        """Take a message, or refuse it before it is read."""
+        name, refusal = self._asked()
+        length = self.headers.get("Content-Length", "")
+        if refusal is not None:
+            self._refuse(HTTPStatus.FORBIDDEN, refusal)
+        elif self.headers.get_content_type() != "application/json":
+            self._refuse(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "a message must be application/json")
+        elif not (length.isascii() and length.isdigit()) or "Transfer-Encoding" in self.headers:
+            self._refuse(HTTPStatus.LENGTH_REQUIRED, "a message must have a Content-Length")
+        elif len(length) > 9 or int(length) > MOST_BODY_BYTES:
+            text = f"a message must be at most {MOST_BODY_BYTES:,} bytes"
+            self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, text)
+        else:
+            try:
+                answer = type(self).take(name, self.rfile.read(int(length)))
+            except (InnerattnError, OSError) as error:
+                answer = problem(HTTPStatus.BAD_REQUEST, one_line(error))
+            self._send(answer)
+
+    def _refuse(self, status: HTTPStatus, text: str) -> None:
+        """Refuse a message, whose body is never read: nothing else comes over this connection."""
+        self.close_connection = True
+        self._send(problem(status, text))

@@ -42,6 +42,11 @@ class Scene {
     return [this.side / 2 + x * this.scale, this.side / 2 - y * this.scale];
   }
 
+  /** The place of a point of the canvas in CSS pixels, m. */
+  metres(px, py) {
+    return [(px - this.side / 2) / this.scale, (this.side / 2 - py) / this.scale];
+  }
+
   /** The robot under a point of the canvas in CSS pixels, or -1. */
   robotAt(x, y, episode, step) {
     let found = -1, least = 14;
@@ -139,7 +144,8 @@ class Scene {
     context.lineWidth = 2.5;
     context.setLineDash([]);
     let [x, y] = this.spots[robot.index];
-    for (let past = Math.ceil(step) - 1; past >= 0 && past > step - TRAIL_STEPS; past--) {
+    const first = run.firstOf(episode, robot.index);
+    for (let past = Math.ceil(step) - 1; past >= first && past > step - TRAIL_STEPS; past--) {
       const [px, py] = this.at(...run.place(episode, past, robot.index));
       context.globalAlpha = 0.45 * (1 - (step - past) / TRAIL_STEPS);
       context.beginPath();

@@ -3,6 +3,11 @@
 const MANY_LINES = 8;
 const CHART = { width: 800, height: 112, left: 40, right: 118, top: 6, bottom: 18 };
 
+/** The values of some lines, without gaps. */
+function known(lines) {
+  return lines.flatMap((line) => line.values).filter((value) => !Number.isNaN(value));
+}
+
 /** Charts of one robot of one policy; picks a moment when one clicks or drags on them. */
 class Charts {
   constructor(box, pick) {
@@ -54,7 +59,7 @@ class Charts {
     ));
     const which = head < 0 ? `mean of ${counted(run.heads, "head")}` : `head ${head + 1}`;
     return this.chart(`Attention of ${this.name(robot)}`, `to each teammate, ${which}; dashed: even`, lines, {
-      low: 0, high: Math.max(1.5 * even, ...lines.flatMap((line) => line.values)), text: percent,
+      low: 0, high: Math.max(1.5 * even, ...known(lines)), text: percent,
       level: even, spans: this.handoffSpans(),
     });
   }
@@ -84,9 +89,8 @@ class Charts {
       ...this.lineOf(one.index, one.name, (step) => run.distance(episode, step, one.index)),
       thick: one.index === this.robot,
     }));
-    const known = lines.flatMap((line) => line.values).filter((value) => !Number.isNaN(value));
     return this.chart("Distance", "to the nearest victim that the robot can help, in m; dashed: rescue radius", lines, {
-      low: 0, high: Math.max(0.5, ...known), text: (value) => value.toFixed(1), level: run.worlds.rescue_radius_m,
+      low: 0, high: Math.max(0.5, ...known(lines)), text: (value) => value.toFixed(1), level: run.worlds.rescue_radius_m,
     });
   }
 
@@ -143,10 +147,10 @@ class Charts {
 
   /** Names of the lines at their ends, moved apart; of many lines, the thick or the uppermost. */
   addLabels(picture, lines, y, end) {
-    const last = (line) => line.values.findLast((value) => !Number.isNaN(value)) ?? 0;
+    const last = (line) => line.values.findLast((value) => !Number.isNaN(value));
     const { height, bottom, top } = CHART, gap = 13;
     const room = Math.floor((height - bottom - top) / gap) + 1;
-    const ends = lines.map((line) => ({ line, at: y(last(line)) })).sort((a, b) => a.at - b.at);
+    const ends = lines.filter((line) => last(line) !== undefined).map((line) => ({ line, at: y(last(line)) })).sort((a, b) => a.at - b.at);
     const chosen = ends.filter(({ line }) => line.thick);
     const shown = lines.length > MANY_LINES && chosen.length ? chosen : ends.slice(0, room);
     shown.forEach((one, index) => {

@@ -1,0 +1,67 @@
+"""What is known of a world at one moment, and of the step that led to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Rescue(NamedTuple):
+    """A rescue: the step in which it happened, the victim, its task, and who helped."""
+
+    step: int
+    victim: int
+    task: int
+    helpers: tuple[int, ...]
+
+
+class Handoff(NamedTuple):
+    """A robot's partners in two rescues of different tasks that follow each other, and steps."""
+
+    robot: int
+    before: int
+    after: int
+    first: int
+    second: int
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A world now, and what happened in the step that led to it.
+
+    Attributes:
+        episode: number of the episode, from 0.
+        step: steps done in it.
+        policy: name of the policy that acts.
+        steered: the robot that a person steers; none: the policy drives all.
+        positions: (R, 2) float32 [m].
+        velocities: (R, 2) float32 [m/s].
+        victims: (V,) structured, the fields of `BatchEnv.victims`.
+        faults: (R,) structured, the fields of `BatchEnv.fault_state`.
+        obstacles: (O, 2) float32 [m].
+        blocked: (R,) bool, whether something stopped the robot in the last step.
+        attention: (H, R, R) float32 for the actions that come next; none: there is none.
+        rescues: of the last step.
+        handoffs: that were completed in the last step.
+        rescued: victims rescued in this episode.
+        helped: (R,) rescues of this episode in which each robot helped.
+    """
+
+    episode: int
+    step: int
+    policy: str
+    steered: int | None
+    positions: NDArray[np.float32]
+    velocities: NDArray[np.float32]
+    victims: NDArray[np.void]
+    faults: NDArray[np.void]
+    obstacles: NDArray[np.float32]
+    blocked: NDArray[np.bool_]
+    attention: NDArray[np.float32] | None
+    rescues: tuple[Rescue, ...]
+    handoffs: tuple[Handoff, ...]
+    rescued: int
+    helped: tuple[int, ...]

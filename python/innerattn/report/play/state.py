@@ -1,0 +1,69 @@
+"""A world's present state as the JSON that a page gets after each message."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.evaluate.interactive import HEALTHY, MOST_PUSH_MPS, InteractiveWorld
+from innerattn.evaluate.moment import Moment
+from innerattn.report.worlds import worlds_document
+
+SCHEMA_VERSION = 1
+"""Version of what the server sends. A page refuses another one."""
+
+_DECIMALS = 5
+
+
+def opening_document(session: str, world: InteractiveWorld) -> dict[str, Any]:
+    """What a page gets first: its session, the world, the policies, and the state."""
+    scenario = world.scenario
+    reach = np.float32(scenario.arena_half_width_m) - np.float32(scenario.wall_clearance_m)
+    known = {"most_push_mps": MOST_PUSH_MPS, "victim_reach_m": float(str(reach))}
+    return state_document(world.moment()) | {
+        "session": session,
+        "worlds": worlds_document(scenario) | known | {"num_victims": scenario.num_victims},
+        "policies": list(world.policies),
+    }
+
+
+def state_document(moment: Moment) -> dict[str, Any]:
+    """A world now, and what happened in the step that led to it."""
+    attention = moment.attention
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "episode": moment.episode,
+        "step": moment.step,
+        "policy": moment.policy,
+        "steered": moment.steered,
+        "positions": _rounded(moment.positions),
+        "velocities": _rounded(moment.velocities),
+        "blocked": moment.blocked.tolist(),
+        "faults": [_wrong(robot) for robot in moment.faults],
+        "victims": [
+            {"slot": slot, "id": int(one["id"]), "task": int(one["task"])}
+            | {axis: round(float(one[axis]), _DECIMALS) for axis in ("x", "y")}
+            for slot, one in enumerate(moment.victims)
+            if one["present"]
+        ],
+        "obstacles": _rounded(moment.obstacles),
+        "attention": None if attention is None else np.round(attention, 3).tolist(),
+        "rescues": [rescue._asdict() for rescue in moment.rescues],
+        "handoffs": [handoff._asdict() for handoff in moment.handoffs],
+        "rescued": moment.rescued,
+        "helped": list(moment.helped),
+    }
+
+
+def _rounded(values: NDArray[np.float32]) -> list[list[float]]:
+    return np.round(values.astype(np.float64), _DECIMALS).tolist()  # type: ignore[no-any-return]
+
+
+def _wrong(robot: np.void) -> dict[str, float]:
+    """What is wrong with a robot, by kind."""
+    values = {kind: float(robot[kind]) for kind in HEALTHY}
+    return {
+        kind: round(v, _DECIMALS) for kind, v in values.items() if v != np.float32(HEALTHY[kind])
+    }

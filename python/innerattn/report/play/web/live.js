@@ -1,0 +1,173 @@
+// What the server told of a world that goes on: the newest moment and those shortly before it. It
+// answers the same questions as a recorded run, with the one episode 0.
+
+const KEPT_STEPS = 160;
+const FAR_M = 0.3; // nobody drives that far in a step
+
+class LiveRun {
+  constructor(name, worlds) {
+    Object.assign(this, { name, worlds, size: worlds.robots.length, rewards: [], held: null });
+    this.kindNumbers = Object.fromEntries(worlds.fault_kinds.map(({ name: kind }, index) => [kind, index]));
+    this.clear();
+  }
+
+  clear() {
+    Object.assign(this, { moments: [], first: 0, victims: [[]], rescues: [[]], handoffs: [[]] });
+    this.cuts = this.worlds.robots.map(() => 0);
+  }
+
+  /** Takes a state; gives what happened, as events. */
+  take(state) {
+    const before = this.now, again = Boolean(before) && before.episode === state.episode;
+    if (!again) this.clear();
+    if (again && state.step === before.step) this.moments[this.moments.length - 1] = state;
+    else this.moments.push(state);
+    if (this.moments.length > KEPT_STEPS) this.moments.shift();
+    this.first = this.moments[0].step;
+    this.worlds.places = state.obstacles.flat();
+    if (again) this.findCuts(before, state);
+    else this.cuts.fill(state.step);
+    this.takeVictims(state);
+    this.rescues[0].push(...state.rescues);
+    this.handoffs[0].push(...state.handoffs);
+    this.rescues[0] = this.rescues[0].filter((one) => one.step >= this.first);
+    this.handoffs[0] = this.handoffs[0].filter((one) => one.second >= this.first);
+    return this.eventsOf(again ? before : null, state);
+  }
+
+  get now() {
+    return this.moments[this.moments.length - 1];
+  }
+
+  get last() {
+    return this.now.step;
+  }
+
+  get attention() {
+    return this.now.attention;
+  }
+
+  get heads() {
+    return this.attention ? this.attention.length : 0;
+  }
+
+  /** Robots that somebody has put elsewhere leave no trail and do not slide there. */
+  findCuts(before, state) {
+    state.positions.forEach(([x, y], robot) => {
+      const [ax, ay] = before.positions[robot], far = Math.hypot(x - ax, y - ay);
+      if (far > (before.step === state.step ? 0 : FAR_M)) this.cuts[robot] = state.step;
+    });
+  }
+
+  takeVictims({ step, victims }) {
+    const list = this.victims[0];
+    for (const one of victims) {
+      const known = list.find((victim) => victim.id === one.id && victim.to > step);
+      if (!known) list.push({ ...one, from: step, to: Infinity });
+      else if (!known.held) Object.assign(known, one);
+    }
+    const present = new Set(victims.map((one) => one.id));
+    for (const one of list) if (!present.has(one.id)) one.to = Math.min(one.to, step);
+    this.victims[0] = list.filter((one) => one.to > this.first);
+  }
+
+  eventsOf(before, state) {
+    const { worlds } = this, events = [];
+    events.push(...state.rescues.map((one) => rescueEvent(worlds, one)));
+    events.push(...state.handoffs.map((one) => handoffEvent(worlds, one)));
+    if (!before) return events;
+    worlds.robots.forEach(({ index, name }) => {
+      const [old, now] = [before.faults[index], state.faults[index]];
+      for (const kind of new Set([...Object.keys(old), ...Object.keys(now)])) {
+        if (old[kind] === now[kind]) continue;
+        const fault = { robot: index, start: state.step, kind: this.kindNumbers[kind] };
+        if (kind in now) events.push(faultEvent(worlds, { ...fault, value: now[kind] }));
+        else {
+          const text = `end of a fault: ${name}, ${faultText(worlds, { ...fault, value: old[kind] })}`;
+          events.push({ step: state.step, type: "recovery", robots: [index], text });
+        }
+      }
+    });
+    return events;
+  }
+
+  moment(step) {
+    const index = Math.min(Math.max(Math.floor(step) - this.first, 0), this.moments.length - 1);
+    return this.moments[index];
+  }
+
+  firstOf(episode, robot) {
+    return Math.max(this.first, this.cuts[robot]);
+  }
+
+  place(episode, step, robot) {
+    if (this.held?.robot === robot) return [this.held.x, this.held.y];
+    const low = this.moment(step).positions[robot], high = this.moment(step + 1).positions[robot];
+    const share = step - Math.floor(step), isCut = this.cuts[robot] > Math.floor(step);
+    if (isCut || !share) return isCut ? high : low;
+    return [low[0] + (high[0] - low[0]) * share, low[1] + (high[1] - low[1]) * share];
+  }
+
+  velocity(episode, step, robot) {
+    return this.moment(step).velocities[robot];
+  }
+
+  isBlocked(episode, step, robot) {
+    return this.moment(step).blocked[robot];
+  }
+
+  weight(episode, step, head, robot, other) {
+    const { attention } = this.moment(step);
+    if (!attention) return NaN;
+    if (head >= 0) return attention[head][robot][other];
+    return attention.reduce((sum, one) => sum + one[robot][other], 0) / attention.length;
+  }
+
+  faultsAt(episode, step, robot) {
+    return Object.entries(this.now.faults[robot]).map(([kind, value]) => (
+      { robot, kind: this.kindNumbers[kind], value }
+    ));
+  }
+
+  isAway(episode, step, robot) {
+    return this.now.faults[robot].unavailable >= 1;
+  }
+
+  distance(episode, step, robot) {
+    return distanceToVictim(this, episode, step, robot);
+  }
+
+  rescuesUntil(episode, step, robot) {
+    return robot < 0 ? this.now.rescued : this.now.helped[robot];
+  }
+
+  /** Abilities that victims need and no robot offers that is not out, with the victims' tasks. */
+  hopeless() {
+    const { robots, tasks } = this.worlds, found = new Map();
+    const there = robots.filter(({ index }) => !this.isAway(0, this.last, index));
+    for (const { task } of this.now.victims) {
+      for (const need of tasks[task].needs) {
+        if (there.some(({ abilities }) => abilities.includes(need))) continue;
+        found.set(need, (found.get(need) ?? new Set()).add(`victims of ${tasks[task].name}`));
+      }
+    }
+    return [...found].map(([need, waiting]) => [need, [...waiting]]);
+  }
+
+  /** The last steps as a run of its own, for charts. */
+  recent(steps) {
+    const from = Math.max(this.first, this.last + 1 - steps), { worlds, size, heads, attention } = this;
+    const shift = (step) => step - from;
+    const rescues = this.rescues[0].filter((one) => one.step >= from);
+    const handoffs = this.handoffs[0].filter((one) => one.second >= from);
+    return {
+      worlds, size, heads, attention, rewards: [], lengths: [this.last + 1 - from],
+      rescues: [rescues.map((one) => ({ ...one, step: shift(one.step) }))],
+      handoffs: [handoffs.map((one) => (
+        { ...one, first: Math.max(shift(one.first), 0), second: shift(one.second) }
+      ))],
+      weight: (episode, step, ...rest) => this.weight(episode, step + from, ...rest),
+      distance: (episode, step, robot) => this.distance(episode, step + from, robot),
+    };
+  }
+}

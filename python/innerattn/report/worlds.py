@@ -1,0 +1,36 @@
+"""What pages that draw worlds know of them, as plain values."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from innerattn import _core
+from innerattn.config import Scenario
+
+
+def worlds_document(scenario: Scenario) -> dict[str, Any]:
+    """Everything about worlds that does not change while they are played."""
+    return {
+        "situation": scenario.situation,
+        "dt_s": scenario.dt_s,
+        "half_width_m": scenario.arena_half_width_m,
+        "rescue_radius_m": scenario.rescue_radius_m,
+        "tasks": [{"name": task.name, "needs": list(task.needs)} for task in scenario.tasks],
+        "robots": [
+            {
+                "name": robot.name,
+                "kind": robot.kind,
+                "abilities": list(robot.abilities),
+                "radius_m": robot.radius_m,
+            }
+            for robot in scenario.robots
+        ],
+        "fault_kinds": [
+            {"name": name, "unit": unit, "healthy": healthy, "least": least, "most": most}
+            for name, unit, least, most, healthy, _ in _core.FAULT_KINDS
+        ],
+        "obstacles": [
+            {"radius_m": one.radius_m, "half_extents_m": one.half_extents_m}
+            for one in scenario.obstacles
+        ],
+    }

@@ -1,0 +1,171 @@
+"""The server of live pages: who may read them or send messages, and what others get."""
+
+import http.client
+import json
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from innerattn.errors import RunError
+from innerattn.report.local_server import HOST, MOST_BODY_BYTES, Answer, LocalServer
+
+
+def damaged() -> Answer:
+    raise RunError("metrics.jsonl: damaged")
+
+
+PAGES: dict[str, Callable[[], Answer]] = {
+    "": lambda: Answer("text/html", "first"),
+    "state": lambda: Answer("application/json", "{}"),
+    "damaged": damaged,
+}
+
+
+def echo(path: str, body: bytes) -> Answer:
+    if path == "damaged":
+        damaged()
+    return Answer("application/json", json.dumps([path, body.decode()]))
+
+
+@contextmanager
+def served(server: LocalServer) -> Iterator[LocalServer]:
+    thread = threading.Thread(target=server.serve)
+    thread.start()
+    yield server
+    server.close()
+    thread.join()
+
+
+@pytest.fixture
+def server() -> Iterator[LocalServer]:
+    with served(LocalServer(PAGES)) as found:
+        yield found
+
+
+@pytest.fixture
+def taking() -> Iterator[LocalServer]:
+    with served(LocalServer(PAGES, take=echo)) as found:
+        yield found
+
+
+def asked(
+    server: LocalServer, path: str, method: str = "GET", body: bytes | None = None, **headers: str
+) -> Any:
+    """Status, headers and text of an answer."""
+    connection = http.client.HTTPConnection(HOST, server.port, timeout=10)
+    named = {k.replace("_", "-"): v for k, v in headers.items()}
+    connection.request(method, path, body, named)
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    return answer.status, dict(answer.getheaders()), text
+
+
+def test_the_address_gives_the_pages(server: LocalServer) -> None:
+    status, headers, text = asked(server, f"/{server.word}/")
+    assert (status, text, headers["Content-Type"]) == (200, "first", "text/html; charset=utf-8")
+    assert "default-src 'none'" in headers["Content-Security-Policy"]
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    assert asked(server, f"/{server.word}/state?after=1")[2] == "{}"
+    assert server.address == f"http://127.0.0.1:{server.port}/{server.word}/"
+    own = f"http://localhost:{server.port}"
+    assert asked(server, f"/{server.word}/state", Origin=own)[0] == 200
+
+
+@pytest.mark.parametrize(
+    ("path", "headers", "status"),
+    [
+        ("/", {}, 403),
+        ("/guessed/state", {}, 403),
+        ("/{word}x/state", {}, 403),
+        ("/{word}/../run.json", {}, 404),
+        ("/{word}/%2e%2e/run.json", {}, 404),
+        ("/{word}/nothing", {}, 404),
+        ("/{word}/state", {"Host": "evil.example"}, 403),
+        ("/{word}/state", {"Host": "127.0.0.1:1"}, 403),
+        ("/{word}/state", {"Origin": "http://evil.example"}, 403),
+        ("/{word}/state", {"Origin": "null"}, 403),
+        ("/{word}/state", {"Sec_Fetch_Site": "cross-site"}, 403),
+    ],
+)
+def test_others_get_nothing(
+    server: LocalServer, path: str, headers: dict[str, str], status: int
+) -> None:
+    found, _, text = asked(server, path.format(word=server.word), **headers)
+    assert found == status
+    assert text in ("not from this page", "not the address of this page", "no such page")
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS"])
+def test_nothing_can_be_sent(server: LocalServer, method: str) -> None:
+    assert asked(server, f"/{server.word}/state", method)[0] == 501
+
+
+def test_an_error_is_one_line(server: LocalServer) -> None:
+    status, _, text = asked(server, f"/{server.word}/damaged")
+    assert (status, text) == (404, "metrics.jsonl: damaged")
+
+
+def test_a_taken_port_and_two_words(server: LocalServer) -> None:
+    with pytest.raises(RunError, match=f"--port {server.port}: is taken"):
+        LocalServer(PAGES, server.port)
+    other = LocalServer(PAGES)
+    assert other.word != server.word
+    assert len(server.word) >= 20
+    other._server.server_close()
+
+
+JSON = {"Content_Type": "application/json"}
+
+
+def test_messages_are_taken(taking: LocalServer) -> None:
+    path = f"/{taking.word}/sessions/x?y"
+    status, headers, text = asked(taking, path, "POST", b"{}", **JSON)
+    assert (status, json.loads(text)) == (200, ["sessions/x", "{}"])
+    assert headers["Content-Type"] == "application/json; charset=utf-8"
+    largest = b"x" * MOST_BODY_BYTES
+    assert asked(taking, path, "POST", largest, **JSON)[0] == 200
+    assert asked(taking, f"/{taking.word}/")[2] == "first"
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "headers", "status"),
+    [
+        ("/guessed/sessions", b"{}", JSON, 403),
+        ("/{word}/sessions", b"{}", JSON | {"Host": "evil.example"}, 403),
+        ("/{word}/sessions", b"{}", JSON | {"Origin": "http://evil.example"}, 403),
+        ("/{word}/sessions", b"{}", JSON | {"Origin": "null"}, 403),
+        ("/{word}/sessions", b"{}", JSON | {"Sec_Fetch_Site": "same-site"}, 403),
+        ("/{word}/sessions", b"{}", {}, 415),
+        ("/{word}/sessions", b"{}", {"Content_Type": "text/plain"}, 415),
+        ("/{word}/sessions", b"x" * (MOST_BODY_BYTES + 1), JSON, 413),
+        ("/{word}/sessions", b"", JSON | {"Content_Length": "9" * 400}, 413),
+        ("/{word}/sessions", b"", JSON | {"Content_Length": "-1"}, 411),
+        ("/{word}/sessions", b"", JSON | {"Content_Length": "\u00b2"}, 411),
+        ("/{word}/sessions", b"{}", JSON | {"Transfer_Encoding": "chunked"}, 411),
+        ("/{word}/damaged", b"{}", JSON, 400),
+    ],
+)
+def test_messages_of_others_are_refused(
+    taking: LocalServer, path: str, body: bytes, headers: dict[str, str], status: int
+) -> None:
+    found, answered, text = asked(taking, path.format(word=taking.word), "POST", body, **headers)
+    assert found == status
+    assert answered["Content-Type"] == "application/json; charset=utf-8"
+    assert list(json.loads(text)) == ["error"]
+
+
+def test_a_message_without_a_length_is_not_waited_for(taking: LocalServer) -> None:
+    with socket.create_connection((HOST, taking.port), timeout=10) as connection:
+        head = f"POST /{taking.word}/sessions HTTP/1.1\r\nHost: {HOST}:{taking.port}\r\n"
+        connection.sendall(f"{head}Content-Type: application/json\r\n\r\n".encode())
+        assert b" 411 " in connection.recv(4096).split(b"\r\n")[0]
+
+
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS"])
+def test_nothing_else_can_be_asked_for(taking: LocalServer, method: str) -> None:
+    assert asked(taking, f"/{taking.word}/sessions", method, **JSON)[0] == 501
