@@ -2,6 +2,6 @@
 
 import sys
 
-from innerattn.cli.main import main
+from innerattn.cli.start import main
 
 sys.exit(main())

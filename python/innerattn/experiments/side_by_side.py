@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -27,11 +28,14 @@ class Run(Job):
         config: what is trained.
         folder: where.
         trained: it is trained already, and only measured.
+        begun: it was stopped in training, which goes on from its newest checkpoint, or begins anew
+            if there is none that can be read.
     """
 
     config: RunConfig
     folder: Path
     trained: bool = False
+    begun: bool = False
 
     @property
     def size(self) -> float:
@@ -47,22 +51,28 @@ class Run(Job):
     def do(self, report: Callable[[float], None]) -> Summary:
         """Train it, unless it is trained, and evaluate it."""
         from innerattn.evaluate import evaluate_run
-        from innerattn.train import train
 
         report(0.0)
         before = 0.0 if self.trained else _TRAINING
         if not self.trained:
-            train(
-                self.config,
-                self.folder,
-                progress=lambda p: report(before * trained_share(self.config, p)),
-            )
+            self._train(lambda p: report(before * trained_share(self.config, p)))
         evaluation = evaluate_run(
             self.folder,
             progress=lambda done, total: report(before + done / total * (1.0 - before)),
         )
         evaluation.write(self.folder / "evaluation")
         return evaluation.summary
+
+    def _train(self, progress: Callable[[Progress], None]) -> None:
+        from innerattn.train import DamagedCheckpointError, NothingToResumeError, resume, train
+
+        if self.begun:
+            try:
+                resume(self.folder, progress=progress)
+                return
+            except (NothingToResumeError, DamagedCheckpointError):
+                shutil.rmtree(self.folder)
+        train(self.config, self.folder, progress=progress)
 
 
 def refuse_what_cannot_run(runs: Sequence[Run]) -> None:
@@ -77,7 +87,7 @@ def refuse_what_cannot_run(runs: Sequence[Run]) -> None:
     from innerattn.train.checkpoint import refuse_existing
 
     for run in runs:
-        if not run.trained:
+        if not run.trained and not run.begun:
             refuse_existing(run.folder)
     config = runs[0].config
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:

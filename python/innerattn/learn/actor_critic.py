@@ -18,7 +18,9 @@ from innerattn.learn import losses
 from innerattn.learn.adam import AdamStepper, Forward, Stepper
 from innerattn.learn.compiled import traced
 from innerattn.learn.gradients import average_over_robots
+from innerattn.learn.interruptions import Interruptions, NoInterruptions
 from innerattn.learn.networks import DrawNetworks, draw_networks
+from innerattn.learn.resume import State, take, take_generator
 from innerattn.learn.types import Team
 from innerattn.nn import CriticOutput, action_noise, robots_of_each_kind, sample_actions
 
@@ -40,6 +42,7 @@ class ActorCritic:
         actor: The trained policies.
         critic: The trained critics.
         actor_frozen: While set, updates leave the policies as they are; see `Learner`.
+        interruptions: Asked between updates whether training is to stop.
     """
 
     _update_networks: Callable[..., Tensor]
@@ -107,6 +110,9 @@ class ActorCritic:
         self._acted: tuple[Tensor, Tensor] | None = None
         self._team = team
         self._updates = 0
+        self.interruptions: Interruptions = NoInterruptions()
+        self._compiled_for: set[int] | None = None
+        self._rows: list[Tensor] = []
 
     @property
     def updates(self) -> int:
@@ -121,6 +127,7 @@ class ActorCritic:
         self._update_networks = torch.compile(
             self._update_networks, fullgraph=True, dynamic=False, backend=backend
         )
+        self._compiled_for = set()
 
     def seed_draws(self, seed: int) -> None:
         """Let the next actions be drawn from ``seed``; see `Learner.seed_draws`."""
@@ -216,6 +223,51 @@ class ActorCritic:
             metrics = self._update_networks(self._networks, *tensors, _as_tensor(self._rate))
         self._updates += 1
         return metrics
+
+    def _do_update(self, batch_size: int, update: Callable[[], Tensor]) -> None:
+        """Do one update of a call of `learn`, as a whole or, where it is interrupted, not at all.
+
+        The metrics are kept until `_take_metrics`, so that `learn` can go on in a later call.
+        """
+        self.interruptions.check()
+        if self._compiled_for is None or batch_size in self._compiled_for:
+            self._rows.append(update())
+            return
+        # The compiler works now, for up to a minute. Who asks it to stop shall not wait.
+        weights = self.state()
+        draws = [generator.get_state() for generator in self._generators()]
+        try:
+            with self.interruptions.at_once():
+                self._rows.append(update())
+        except BaseException:
+            self.load(weights)
+            for generator, draw in zip(self._generators(), draws, strict=True):
+                generator.set_state(draw)
+            self.interruptions.check()  # the compiler may have made another error of it
+            raise
+        self._compiled_for.add(batch_size)
+
+    def _take_metrics(self) -> list[float]:
+        """Means over the updates of a call of `learn`, which is done now."""
+        means: list[float] = torch.stack(self._rows).mean(dim=0).tolist()
+        self._rows = []
+        return means
+
+    def _generators(self) -> list[torch.Generator]:
+        """What an update draws from."""
+        return [self._noise]
+
+    def _resume_state(self) -> dict[str, Tensor]:
+        """What every learner needs to go on, beside `state`; see `Resumable`."""
+        state = {"noise": self._noise.get_state()}
+        return state | ({"rows": torch.stack(self._rows)} if self._rows else {})
+
+    def _load_resume_state(self, state: State) -> None:
+        """Go on from what `_resume_state` gave."""
+        take_generator(state, "noise", self._noise)
+        self._rows = []
+        if "rows" in state:
+            self._rows = list(take(state, "rows", self._dtype, None, None).to(self._device))
 
     def _log_probs_of(self, obs: Tensor) -> Tensor | None:
         """(R, A, E) log-probabilities with which `act` drew actions for just these observations."""

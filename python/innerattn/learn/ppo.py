@@ -6,6 +6,7 @@ Sources: Schulman et al. 2017; the baseline of Iqbal & Sha 2019, section 3.3.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 
 import torch
@@ -18,6 +19,16 @@ from innerattn.learn.adam import Forward
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
 from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
 from innerattn.learn.networks import draw_networks
+from innerattn.learn.resume import (
+    State,
+    inside,
+    take_generator,
+    take_whole,
+    take_within,
+    under,
+    whole,
+)
+from innerattn.learn.ring import Ring
 from innerattn.learn.rollout import Rollout, RolloutBuffer, rows_of, standardised, steps_of
 from innerattn.learn.types import Scheduled, Team, Transitions
 from innerattn.nn import sample_actions
@@ -34,6 +45,23 @@ _METRICS = (
 )
 _CHUNK = 1024
 """Rows whose values are computed at a time."""
+
+
+@dataclass
+class _Passes:
+    """The passes over a rollout, as far as they are done.
+
+    Attributes:
+        rollout: What is trained on.
+        epoch: Passes that are done.
+        order: (B,) the rows of the present pass in their order; None before it has begun.
+        done: Minibatches of the present pass that are done.
+    """
+
+    rollout: Rollout
+    epoch: int = 0
+    order: Tensor | None = None
+    done: int = 0
 
 
 class PPO(ActorCritic):
@@ -78,6 +106,7 @@ class PPO(ActorCritic):
         self._shuffle = torch.Generator().manual_seed(self._data_seed)
         self._buffer = RolloutBuffer(ppo.rollout_steps, team, device, dtype)
         self._steps_of_frozen = False
+        self._passes: _Passes | None = None
         self._gamma, self._entropy_weight = ppo.gamma, ppo.entropy_weight
         self.scale = ReturnScale(team.num_robots, ppo.gamma, device)
 
@@ -107,24 +136,36 @@ class PPO(ActorCritic):
             of `TD.learn`, and `kl`, the mean divergence from the policy that acted [nats], and
             `clip_share`, the share of actions whose ratio was clipped.
         """
-        if not self._buffer.full:
-            return None
-        rollout = self._rollout()
-        self._buffer.clear()
-        rows = []
-        stop = self._config.stop_at_kl
-        for _ in range(self._config.epochs):
-            order = torch.randperm(rollout.obs.shape[1], generator=self._shuffle)
-            epoch = [
-                self.update(rollout.take(chosen.to(self._device)))
-                for chosen in torch.split(order, self._config.minibatch_size)
-            ]
-            rows += epoch
-            kl = torch.stack(epoch)[:, _METRICS.index("kl")].mean()
+        if self._passes is None:
+            if not self._buffer.full:
+                return None
+            self._passes = _Passes(self._rollout())
+            self._buffer.clear()
+        while self._passes.epoch < self._config.epochs:
+            minibatches = self._pass(self._passes)
+            kl = torch.stack(self._rows[-minibatches:])[:, _METRICS.index("kl")].mean()
+            stop = self._config.stop_at_kl
             if stop is not None and float(kl) > stop:
                 break
-        means = torch.stack(rows).mean(dim=0).tolist()
-        return dict(zip(_METRICS, means, strict=True))
+        self._passes = None
+        return dict(zip(_METRICS, self._take_metrics(), strict=True))
+
+    def _pass(self, passes: _Passes) -> int:
+        """Do the rest of the present pass.
+
+        Returns:
+            The number of its minibatches.
+        """
+        rollout = passes.rollout
+        if passes.order is None:
+            passes.order = torch.randperm(rollout.obs.shape[1], generator=self._shuffle)
+        minibatches = torch.split(passes.order, self._config.minibatch_size)
+        for chosen in minibatches[passes.done :]:
+            rows = rollout.take(chosen.to(self._device))
+            self._do_update(len(chosen), partial(self.update, rows))
+            passes.done += 1
+        passes.epoch, passes.order, passes.done = passes.epoch + 1, None, 0
+        return len(minibatches)
 
     @torch.no_grad()
     def update(self, rows: Rollout) -> Tensor:
@@ -286,6 +327,41 @@ class PPO(ActorCritic):
         if self._config.advantage == "counterfactual":
             return losses.gather_actions(q, actions)
         return q.squeeze(1)
+
+    def rings(self) -> dict[str, Ring]:
+        """None: a rollout is small; see `ResumableLearner.rings`."""
+        return {}
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """All but `state`; see `ResumableLearner`."""
+        state = self._resume_state() | {
+            "shuffle": self._shuffle.get_state(),
+            "frozen": whole(self._steps_of_frozen),
+            **under("scale", self.scale.resume_state()),
+            **under("buffer", self._buffer.resume_state()),
+        }
+        if self._passes is not None:
+            passes = self._passes
+            state |= under("rollout", passes.rollout._asdict())
+            state |= {"epoch": whole(passes.epoch), "done": whole(passes.done)}
+            state |= {} if passes.order is None else {"order": passes.order}
+        return state
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `ResumableLearner`."""
+        self._load_resume_state(state)
+        take_generator(state, "shuffle", self._shuffle)
+        self._steps_of_frozen = bool(take_whole(state, "frozen", 0, 1))
+        self.scale.load_resume_state(inside("scale", state))
+        self._buffer.load_resume_state(inside("buffer", state))
+        self._passes = None
+        if "epoch" in state:
+            rollout = Rollout.taken_from(inside("rollout", state), self._team, self._number(0.0))
+            size = rollout.obs.shape[1]
+            self._passes = _Passes(rollout, take_whole(state, "epoch", 0, self._config.epochs))
+            if "order" in state:
+                self._passes.order = take_within(state, "order", torch.int64, 0, size - 1, size)
+                self._passes.done = take_whole(state, "done", 0, size)
 
     def _running(self) -> dict[str, Tensor]:
         return {f"scale.{name}": tensor for name, tensor in self.scale.tensors().items()}

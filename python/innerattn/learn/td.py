@@ -18,6 +18,8 @@ from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward, Network
 from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
 from innerattn.learn.replay import Replay
+from innerattn.learn.resume import State, inside, take_whole, under, whole
+from innerattn.learn.ring import Ring
 from innerattn.learn.types import Scheduled, Team, Transitions
 from innerattn.nn import sample_actions
 
@@ -141,12 +143,11 @@ class TD(ActorCritic):
             `critic_grad_norm` and `actor_grad_norm` (its mean over robots) are before clipping.
         """
         every = self._config.update_every_env_steps
-        due, self._pending_env_steps = divmod(self._pending_env_steps, every)
-        if not due:
-            return None
-        rows = [self.update(self.replay.sample(self._config.batch_size)) for _ in range(due)]
-        means = torch.stack(rows).mean(dim=0).tolist()
-        return dict(zip(_METRICS, means, strict=True))
+        size = self._config.batch_size
+        while self._pending_env_steps >= every:
+            self._do_update(size, lambda: self.update(self.replay.sample(size)))
+            self._pending_env_steps -= every
+        return dict(zip(_METRICS, self._take_metrics(), strict=True)) if self._rows else None
 
     @torch.no_grad()
     def update(self, batch: Transitions) -> Tensor:
@@ -173,6 +174,24 @@ class TD(ActorCritic):
             self._draw(shape),
             self._number(self._temperature),
         )
+
+    def rings(self) -> dict[str, Ring]:
+        """The rows of the replay; see `ResumableLearner.rings`."""
+        return {"replay": self.replay.ring}
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """All but `state` and `rings`; see `ResumableLearner`."""
+        replay = under("replay", self.replay.resume_state())
+        return self._resume_state() | replay | {"pending": whole(self._pending_env_steps)}
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `ResumableLearner`."""
+        self._load_resume_state(state)
+        self.replay.load_resume_state(inside("replay", state))
+        self._pending_env_steps = take_whole(state, "pending")
+
+    def _generators(self) -> list[torch.Generator]:
+        return [*super()._generators(), self.replay.generator]
 
     def _new_replay(self, reward_parts: int) -> Replay:
         capacity = self._config.replay_capacity
