@@ -164,6 +164,11 @@ class TrainConfig(Model):
     keep_checkpoints: Annotated[int, ADDED_LATER] = Field(
         2, ge=1, le=1_000, description="newest checkpoints that stay during training"
     )
+    on_divergence: Annotated[Literal["stop", "skip"], ADDED_LATER] = Field(
+        "stop",
+        description="an update with a loss or gradient that is not finite: stop training before "
+        "it, or skip it; metrics count skipped_updates",
+    )
     keep_best: Annotated[bool, ADDED_LATER] = Field(
         True,
         description="keep the weights of the logging interval with the most rescues per training "

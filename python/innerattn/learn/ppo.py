@@ -17,7 +17,7 @@ from innerattn.learn import losses
 from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
-from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
+from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot, finite
 from innerattn.learn.networks import draw_networks
 from innerattn.learn.resume import (
     State,
@@ -56,12 +56,14 @@ class _Passes:
         epoch: Passes that are done.
         order: (B,) the rows of the present pass in their order; None before it has begun.
         done: Minibatches of the present pass that are done.
+        learnt: Those of them that were learnt from.
     """
 
     rollout: Rollout
     epoch: int = 0
     order: Tensor | None = None
     done: int = 0
+    learnt: int = 0
 
 
 class PPO(ActorCritic):
@@ -74,6 +76,8 @@ class PPO(ActorCritic):
     Attributes:
         scale: Running standard deviation of returns, by which rewards are divided.
     """
+
+    _metric_names = _METRICS
 
     def __init__(
         self,
@@ -142,19 +146,16 @@ class PPO(ActorCritic):
             self._passes = _Passes(self._rollout())
             self._buffer.clear()
         while self._passes.epoch < self._config.epochs:
-            minibatches = self._pass(self._passes)
-            kl = torch.stack(self._rows[-minibatches:])[:, _METRICS.index("kl")].mean()
-            stop = self._config.stop_at_kl
-            if stop is not None and float(kl) > stop:
+            if self._pass(self._passes):
                 break
         self._passes = None
-        return dict(zip(_METRICS, self._take_metrics(), strict=True))
+        return self._take_metrics()
 
-    def _pass(self, passes: _Passes) -> int:
+    def _pass(self, passes: _Passes) -> bool:
         """Do the rest of the present pass.
 
         Returns:
-            The number of its minibatches.
+            Whether it is to be the last.
         """
         rollout = passes.rollout
         if passes.order is None:
@@ -162,10 +163,14 @@ class PPO(ActorCritic):
         minibatches = torch.split(passes.order, self._config.minibatch_size)
         for chosen in minibatches[passes.done :]:
             rows = rollout.take(chosen.to(self._device))
-            self._do_update(len(chosen), partial(self.update, rows))
+            passes.learnt += self._do_update(len(chosen), partial(self.update, rows))
             passes.done += 1
-        passes.epoch, passes.order, passes.done = passes.epoch + 1, None, 0
-        return len(minibatches)
+        found = self._rows[len(self._rows) - passes.learnt :]
+        passes.epoch, passes.order, passes.done, passes.learnt = passes.epoch + 1, None, 0, 0
+        stop = self._config.stop_at_kl
+        if stop is None or not found:
+            return False
+        return float(torch.stack(found)[:, _METRICS.index("kl")].mean()) > stop
 
     @torch.no_grad()
     def update(self, rows: Rollout) -> Tensor:
@@ -193,7 +198,7 @@ class PPO(ActorCritic):
     ) -> Tensor:
         critic_metrics = self._update_critic(nets, obs, actions, value, target, rate)
         actor_metrics = self._update_actor(
-            nets, obs, actions, log_prob, advantage, entropy_weight, rate
+            nets, obs, actions, log_prob, advantage, entropy_weight, rate, finite(*critic_metrics)
         )
         return torch.stack([*critic_metrics, *actor_metrics])
 
@@ -224,7 +229,7 @@ class PPO(ActorCritic):
         gradients, (loss, mean) = nets.critic.gradients(loss_of)
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norm = clip_norm(gradients, config.critic_grad_clip)
-        nets.critic.step(gradients, rate)
+        nets.critic.step(gradients, rate, finite(loss, norm))
         return loss, mean, norm
 
     def _update_actor(
@@ -236,6 +241,7 @@ class PPO(ActorCritic):
         advantage: Tensor,
         entropy_weight: Tensor,
         rate: Tensor,
+        critic_is_sound: Tensor,
     ) -> tuple[Tensor, ...]:
         """One step of the policies: loss, entropy, mean gradient norm, KL, clipped share."""
         config = self._config
@@ -252,7 +258,7 @@ class PPO(ActorCritic):
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norms = clip_norm_by_robot(gradients, config.actor_grad_clip)
         if not self.actor_frozen:
-            nets.actor.step(gradients, rate)
+            nets.actor.step(gradients, rate, critic_is_sound & finite(loss, norms))
         ratio = change.exp()
         kl = (ratio - 1.0 - change).mean()
         clipped = ((ratio - 1.0).abs() > config.clip).to(kl.dtype).mean()
@@ -344,6 +350,7 @@ class PPO(ActorCritic):
             passes = self._passes
             state |= under("rollout", passes.rollout._asdict())
             state |= {"epoch": whole(passes.epoch), "done": whole(passes.done)}
+            state |= {"learnt": whole(passes.learnt)}
             state |= {} if passes.order is None else {"order": passes.order}
         return state
 
@@ -362,6 +369,8 @@ class PPO(ActorCritic):
             if "order" in state:
                 self._passes.order = take_within(state, "order", torch.int64, 0, size - 1, size)
                 self._passes.done = take_whole(state, "done", 0, size)
+                most = min(self._passes.done, len(self._rows))
+                self._passes.learnt = take_whole(state, "learnt", 0, most)
 
     def _running(self) -> dict[str, Tensor]:
         return {f"scale.{name}": tensor for name, tensor in self.scale.tensors().items()}

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from innerattn.envs import BatchEnv
+from innerattn.learn.divergence import refuse_not_finite_reward
 from innerattn.learn.resume import State, take, take_within
 from innerattn.learn.types import Learner, Transitions
 from innerattn.train.schedule import Schedule
@@ -78,6 +79,7 @@ class Collector:
         )
         if self._schedule is not None:
             transitions = self._schedule.weigh(transitions, step)
+        refuse_not_finite_reward(transitions.reward)
         self._obs = self._tensor(step.obs)
         np.add.at(self._open_rescues, step.rescues["env"], 1)
         self._count(step.terminated | step.truncated)

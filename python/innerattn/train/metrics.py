@@ -25,6 +25,7 @@ from innerattn.learn.resume import State, inside, take
 from innerattn.train.collect import Tally
 
 _MOST_BYTES = 1 << 30
+_COUNTS = ("skipped_updates",)
 Metrics = Mapping[str, Any]
 """One line: env_steps, episodes, updates, seconds, env_steps_per_s, updates_per_s, losses by name,
 rescues_per_episode (none where no episode ended) and attention_entropy by robot and head [nats],
@@ -110,9 +111,13 @@ class MetricsFile:
             line = self._unwritten[0]
             with self.path.open("ab", buffering=0) as file:
                 before = file.tell()
-                if file.write(line) < len(line):  # the disk is full, say
-                    file.truncate(before)
-                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
+                try:
+                    if file.write(line) < len(line):  # the disk is full, say
+                        file.truncate(before)
+                        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+                except OSError as error:
+                    error.filename = str(self.path)
+                    raise
             self._digest.update(line)
             self.bytes += len(line)
             del self._unwritten[0]
@@ -174,13 +179,18 @@ class Interval:
             "seconds": round(seconds, 3),
             "env_steps_per_s": round((env_steps - self._env_steps) / elapsed, 1),
             "updates_per_s": round((updates - self._updates) / elapsed, 2),
-            "losses": {name: sum(all_) / len(all_) for name, all_ in self._losses.items()},
+            "losses": {name: _summary(name, all_) for name, all_ in self._losses.items()},
             "rescues_per_episode": tally.rescues / tally.episodes if tally.episodes else None,
             "attention_entropy": dict(entropy),
         }
         self._seconds, self._env_steps, self._updates = seconds, env_steps, updates
         self._losses = {}
         return line
+
+
+def _summary(name: str, values: list[float]) -> float:
+    """The mean, or the sum of what counts."""
+    return sum(values) if name in _COUNTS else sum(values) / len(values)
 
 
 def refuse_divergence(metrics: Mapping[str, Any], env_steps: int) -> None:

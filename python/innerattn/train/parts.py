@@ -8,6 +8,7 @@ from torch import Tensor
 
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
+from innerattn.learn.actor_critic import ActorCritic
 from innerattn.learn.framed import FramedLearner
 from innerattn.learn.resume import Resumable, State, inside, take, under
 from innerattn.learn.ring import Ring
@@ -53,6 +54,9 @@ class Parts:
         self.imitation = Imitation(config, env, self.learner, self.collector) if warm else None
         self.attention = AttentionLog(env.robot_names, env.scenario.episode_steps)
         self.interval = Interval()
+        within = self.learner.learner if isinstance(self.learner, FramedLearner) else self.learner
+        if isinstance(within, ActorCritic):
+            within.skips_divergence = config.train.on_divergence == "skip"
 
     @property
     def resumable(self) -> ResumableLearner | None:

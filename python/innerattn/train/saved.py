@@ -164,7 +164,10 @@ class Checkpoints:
         """Remove all checkpoints but those ``kept``, and the files that only they need."""
         folders, rows, bests = set(), set(), set()
         for number in kept:
-            info = checkpoint_info((self.folder / str(number) / INFO).read_bytes())
+            try:
+                info = checkpoint_info((self.folder / str(number) / INFO).read_bytes())
+            except ValueError:  # damaged, and of no use to anybody
+                continue
             folders.add(str(number))
             rows |= files_of(info.rows)
             bests |= set() if info.counters.best is None else {best_name(info.counters.best)}

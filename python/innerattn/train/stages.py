@@ -10,10 +10,11 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 
 from torch import Tensor
 
+from innerattn.errors import RunError
+from innerattn.learn.divergence import DivergenceError
 from innerattn.learn.types import Transitions
 from innerattn.records.run_folder import State
 from innerattn.train.checkpoint import RunFolder
@@ -55,7 +56,7 @@ class Stages:
         if saved is not None:
             self._metrics = self._file.go_on_after(saved.metrics_bytes, saved.metrics_sha256)
         self._saved_at = time.monotonic()
-        self._disk_is_full = False
+        self._disk_is_full = self._is_told = False
         self._known_rows = {} if saved is None else saved.rows
         self._row_files: dict[str, RowFiles] = {}
         self._in_step = False
@@ -67,7 +68,7 @@ class Stages:
         after an error, the newest checkpoint is the last good one.
 
         Raises:
-            RunError: training diverged.
+            RunError: training diverged; the message names step, tensor and robot.
             OSError: the run is at its end, and cannot be saved.
             KeyboardInterrupt: after the run is saved, unless somebody asked twice.
         """
@@ -84,10 +85,19 @@ class Stages:
                 with self._interruptions.deferred():
                     self._save_what_is_there()
             raise
+        except DivergenceError as error:
+            self._give_up()
+            text = error.text(self._parts.env.robot_names)
+            raise RunError(
+                f"training diverged at env_steps = {self._at.env_steps}: {text}"
+            ) from error
         except BaseException:
-            with suppress(OSError):
-                self._mark("interrupted")
+            self._give_up()
             raise
+
+    def _give_up(self) -> None:
+        with suppress(OSError):
+            self._mark("interrupted")
 
     def _run_stages(self) -> None:
         if self._at.stage == "imitating":
@@ -219,6 +229,7 @@ class Stages:
         self._disk_is_full = False
         what = f"the checkpoint at {self._at.env_steps:,} env-steps"
         self._try(what, self._save)
+        self._is_told = self._disk_is_full
         self._saved_at = time.monotonic()
 
     def _save(self) -> None:
@@ -272,14 +283,11 @@ class Stages:
             write()
         except OSError as error:
             self._disk_is_full = True
-            where = error.filename or self._folder.path
-            _log.warning(
-                "innerattn: warning: %s: cannot be written (%s); %s is not saved, and training "
-                "goes on",
-                Path(str(where)),
-                error.strerror,
-                what,
-            )
+            if not self._is_told:  # once, until something is saved again
+                self._is_told = True
+                where = error.filename or self._folder.path
+                text = "innerattn: warning: %s: cannot be written (%s); %s is not saved for now"
+                _log.warning(text, where, error.strerror, what)
 
     def _mark(self, state: State) -> None:
         parts = self._parts
