@@ -23,6 +23,7 @@ from innerattn.config.sections import WarmStart
 from innerattn.cores import usable_cores
 from innerattn.experiments.side_by_side import Run, refuse_what_cannot_run, train_side_by_side
 from innerattn.report.tables.evaluation import print_seeds, print_summary
+from innerattn.signals import leave, requests_handled_by
 
 if TYPE_CHECKING:
     Preset: TypeAlias = str
@@ -126,7 +127,8 @@ class _Train(_Sources):
         return self._train_several(console, configs)
 
     def _train_one(self, console: Console, config: RunConfig) -> int:
-        from innerattn.train import train
+        with requests_handled_by(leave):
+            from innerattn.train import train
 
         run_dir = self.run_dir or self._new_run_dir(config, _stamp())
         console.print(f"{_what(config)}, seed {config.train.seed}")
@@ -140,8 +142,9 @@ class _Train(_Sources):
         return self._measure(console, config, run_dir)
 
     def _resume(self, console: Console, run_dir: Path) -> int:
-        from innerattn.records.run_folder import read_config, read_info
-        from innerattn.train import resume
+        with requests_handled_by(leave):
+            from innerattn.records.run_folder import read_config, read_info
+            from innerattn.train import resume
 
         config, info = read_config(run_dir), read_info(run_dir)
         measured = (run_dir / "evaluation" / "summary.json").exists()

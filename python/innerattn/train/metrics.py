@@ -21,7 +21,7 @@ from torch import Tensor
 
 from innerattn.config.untrusted import parse_json, read_plain
 from innerattn.errors import RunError
-from innerattn.learn.resume import State, inside, take
+from innerattn.learn.resume import State, inside, take, take_within
 from innerattn.train.collect import Tally
 
 _MOST_BYTES = 1 << 30
@@ -152,7 +152,8 @@ class Interval:
 
     def load_resume_state(self, state: State) -> None:
         """Go on from a state; see `Resumable`. The time until now does not count."""
-        self._env_steps, self._updates = take(state, "before", torch.int64, 2).tolist()
+        before = take_within(state, "before", torch.int64, 0, 2**62, 2)
+        self._env_steps, self._updates = before.tolist()
         seconds, self._seconds = take(state, "seconds", torch.float64, 2).tolist()
         self._start = time.perf_counter() - seconds
         losses = inside("losses", state)
