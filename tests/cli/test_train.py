@@ -16,7 +16,7 @@ import pytest
 import torch
 
 from innerattn.cli.main import main
-from innerattn.cli.progress import Training
+from innerattn.cli.progress import Evaluating, Training
 from innerattn.config import RunConfig, Scenario, load_run_config, read_toml
 from innerattn.errors import RunError
 from innerattn.learn import TD
@@ -322,8 +322,8 @@ def test_a_request_to_end_keeps_the_weights(
     with logged(path, tiny, hangup=signal.SIG_DFL) as process:
         process.send_signal(sent)
         _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert f"what was learnt is kept in {path}" in err
+    assert process.returncode == 128 + sent
+    assert f"go on with: innerattn train --resume {path}" in err
     assert json.loads((path / "run.json").read_text())["state"] == "interrupted"
 
 
@@ -337,7 +337,7 @@ def test_nohup_outlives_the_terminal(tiny: list[str], tmp_path: Path) -> None:
             time.sleep(0.05)
         process.terminate()
         process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == 143
 
 
 def test_existing_folder_is_refused(
@@ -365,3 +365,33 @@ def test_interruption_keeps_the_weights(
     assert json.loads((path / "run.json").read_text())["state"] == "interrupted"
     assert (path / "checkpoints" / "8" / "weights.safetensors").exists()
     assert tomllib.loads((path / "config.toml").read_text())["train"]["num_envs"] == 8
+    monkeypatch.undo()
+
+    assert main(["train", "--run-dir", str(path), *tiny]) == 1
+    ended = "interrupted after 8 env-steps"
+    expected = f"{path}: exists already, {ended}; go on with: innerattn train --resume {path}"
+    assert expected in capsys.readouterr().err
+    assert main(["train", "--resume", str(path), "--seed", "4"]) == 2
+    assert "the run has its own configuration; leave out --seed" in capsys.readouterr().err
+
+    assert main(["train", "--resume", str(path)]) == 0
+    assert f"Going on with {path} from env-step 8" in capsys.readouterr().out
+    assert json.loads((path / "run.json").read_text())["state"] == "done"
+    assert (path / "evaluation" / "summary.json").exists()
+    assert main(["train", "--resume", str(path)]) == 1
+    assert f"{path}: is done" in capsys.readouterr().err
+
+
+def test_a_run_that_was_stopped_in_its_evaluation_is_measured(
+    tmp_path: Path, tiny: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    path = tmp_path / "run"
+    with monkeypatch.context() as patched:
+        patched.setattr(Evaluating, "__call__", stop)
+        assert main(["train", "--run-dir", str(path), *tiny]) == 130
+    assert json.loads((path / "run.json").read_text())["state"] == "done"
+    assert main(["train", "--resume", str(path)]) == 0
+    assert (path / "evaluation" / "summary.json").exists()

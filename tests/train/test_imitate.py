@@ -64,12 +64,16 @@ class Watched:
         return {"critic_loss": 0.5}
 
 
+def one_step(imitation: Imitation, share: float) -> dict[str, float]:
+    return imitation.collect(share)[1] | imitation.learn(share)
+
+
 def watch(config: RunConfig, steps: int) -> tuple[Watched, list[dict[str, float]]]:
     learner = Watched()
     with BatchEnv(config.scenario, 12, seed=0, num_threads=1) as env:
         imitation = Imitation(config, env, learner, Collector(env, learner, torch.device("cpu")))
         assert imitation.env_steps == 1200
-        figures = [imitation.step(step * 12 / 1200)[1] for step in range(steps)]
+        figures = [one_step(imitation, step * 12 / 1200) for step in range(steps)]
     assert not learner.actor_frozen
     return learner, figures
 
@@ -188,7 +192,7 @@ def test_agreement_with_the_script_grows(small_config: Configure) -> None:
     with BatchEnv(config.scenario, 96, seed=0, num_threads=1) as env:
         learner = build_learner(config, env)
         imitation = Imitation(config, env, learner, Collector(env, learner, torch.device("cpu")))
-        agreement = [imitation.step(step / 500)[1]["agreement"] for step in range(500)]
+        agreement = [one_step(imitation, step / 500)["agreement"] for step in range(500)]
     assert sum(agreement[:5]) / 5 < 0.3
     assert sum(agreement[-50:]) / 50 > 0.5
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from innerattn.config import load_run_config
+from innerattn.signals import Interrupted, exit_code
 from innerattn.train import Progress, train
 from innerattn.train.interruption import remembered_interruptions
 
@@ -30,21 +31,40 @@ def swallowed() -> None:
 
 
 def test_what_was_swallowed_is_raised_when_asked_for() -> None:
-    with remembered_interruptions() as check:
-        check()
+    with remembered_interruptions() as interruptions:
+        interruptions.check()
         swallowed()
         for _ in range(2):
             with pytest.raises(KeyboardInterrupt):
-                check()
+                interruptions.check()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_one_waits_for_a_good_moment_and_a_second_one_does_not() -> None:
+    with remembered_interruptions() as interruptions:
+        with interruptions.deferred():
+            signal.raise_signal(signal.SIGINT)
+            assert not interruptions.urgent
+            with pytest.raises(KeyboardInterrupt):
+                interruptions.check()
+            with pytest.raises(KeyboardInterrupt), interruptions.at_once():
+                pytest.fail("an interruption that was asked for comes first")
+            with pytest.raises(Interrupted) as caught:
+                signal.raise_signal(signal.SIGINT)
+        assert interruptions.urgent
+        assert exit_code(caught.value) == 130
+    with remembered_interruptions() as interruptions, interruptions.deferred():
+        with pytest.raises(KeyboardInterrupt), interruptions.at_once():
+            signal.raise_signal(signal.SIGINT)
+        assert not interruptions.urgent
 
 
 def test_other_handlers_and_threads_stay_as_they_are() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with remembered_interruptions() as check:
+    with remembered_interruptions() as interruptions:
         assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
         signal.raise_signal(signal.SIGINT)
-        check()
+        interruptions.check()
     assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
 
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -13,7 +13,7 @@ from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError, RunError
 from innerattn.learn.types import Learner
 from innerattn.records.run_folder import read_info
-from innerattn.train import Progress, load_policy, loop, train
+from innerattn.train import Progress, load_policy, parts, train
 from innerattn.train.build import build_learner, thread_count
 
 Configure = Callable[..., RunConfig]
@@ -21,6 +21,13 @@ Configure = Callable[..., RunConfig]
 
 def files(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def best_line(run: Path) -> int:
+    """Env-steps of the first line of metrics with the most rescues."""
+    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    found = [line for line in lines if line["rescues_per_episode"] is not None]
+    return int(max(found, key=lambda line: line["rescues_per_episode"])["env_steps"])
 
 
 def test_a_finished_run_holds_what_is_promised(finished_run: Path) -> None:
@@ -31,6 +38,7 @@ def test_a_finished_run_holds_what_is_promised(finished_run: Path) -> None:
         "metrics.jsonl",
         "checkpoints/latest",
         "checkpoints/600/weights.safetensors",
+        f"checkpoints/best-{best_line(finished_run)}.safetensors",
     }
     info = read_info(finished_run)
     assert (info.state, info.env_steps, info.seed, info.threads) == ("done", 600, 0, 1)
@@ -123,7 +131,7 @@ def test_broken_weights_are_never_saved(
         if interrupted:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(loop, "build_learner", poisoned)
+    monkeypatch.setattr(parts, "build_learner", poisoned)
     # The run ends before the first update: no loss tells.
     config = small_config(**{"train.env_steps": 120})
     with pytest.raises(RunError, match=r"a value of actor\.\S+ is nan: must be finite"):

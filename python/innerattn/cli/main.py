@@ -1,19 +1,17 @@
 """The command `innerattn`: picks the command, runs it and turns errors into exit codes.
 
-0 done, 1 failed with one line on standard error, 2 wrong usage, 130 interrupted,
-by Ctrl-C or by a signal that asks for the end.
+0 done, 1 failed with one line on standard error, 2 wrong usage; 130, 143 and 129 interrupted by
+Ctrl-C (SIGINT), SIGTERM and SIGHUP.
 """
 
 from __future__ import annotations
 
 import io
 import os
-import signal
 import sys
-import threading
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Annotated, Any
 
 import tyro
@@ -30,6 +28,7 @@ from innerattn.cli.train import command_type
 from innerattn.cli.watch import Watch
 from innerattn.cores import let_waiting_threads_sleep
 from innerattn.errors import UnsealedRunWarning, missing_library, needs_no_traceback, one_line
+from innerattn.signals import exit_code, interrupt, requests_handled_by
 
 _DESCRIPTION = (
     "Train teams of unlike robots to rescue together, and measure how they do it. "
@@ -55,11 +54,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # better a "?" than no table at all
     let_waiting_threads_sleep()
     try:
-        with _stopped_like_by_hand(), _plain_warnings():
+        with requests_handled_by(interrupt), _plain_warnings():
             return int(_parse(argv).run())
-    except KeyboardInterrupt:
-        print("innerattn: interrupted", file=sys.stderr)
-        return 130
+    except KeyboardInterrupt as request:
+        with suppress(OSError):  # a lost terminal
+            print("innerattn: interrupted", file=sys.stderr)
+        return exit_code(request)
     except BrokenPipeError:  # the reader of our output has left, e.g. `innerattn info | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
@@ -69,22 +69,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print(f"innerattn: error: {one_line(error)}", file=sys.stderr)
         return 2 if isinstance(error, UsageError) else 1
-
-
-@contextmanager
-def _stopped_like_by_hand() -> Iterator[None]:
-    """Let a request to end, and the end of the terminal, do what Ctrl-C does: save and leave."""
-    signals = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    changed = []
-    if threading.current_thread() is threading.main_thread():
-        changed = [one for one in signals if signal.getsignal(one) == signal.SIG_DFL]
-    for one in changed:
-        signal.signal(one, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        for one in changed:
-            signal.signal(one, signal.SIG_DFL)
 
 
 @contextmanager

@@ -1,4 +1,7 @@
-"""Where the command `innerattn` begins: its version, and what to install if it cannot start."""
+"""Where the command `innerattn` begins: it is ready for Ctrl-C before anything slow is loaded.
+
+It prints the version, and says what to install if it cannot start.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from innerattn.errors import missing_library
+from innerattn.signals import handle_requests, interrupt, leave
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -17,6 +21,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit code, as of `innerattn.cli.main.main`; 1 if a library is missing.
     """
+    handle_requests(leave)
     arguments = list(sys.argv[1:] if argv is None else argv)
     if arguments == ["--version"]:
         from innerattn import __version__
@@ -31,4 +36,5 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print(f"innerattn: error: {missing}", file=sys.stderr)
         return 1
+    handle_requests(interrupt)
     return run(arguments)

@@ -16,6 +16,7 @@ from innerattn.cli.options import Command, UsageError, changed, run_options
 from innerattn.cli.progress import Evaluating, SeveralRuns, Training
 from innerattn.cli.replay import write_replay
 from innerattn.cli.seeds import parse_seeds
+from innerattn.cli.streams import droppable_output
 from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
 from innerattn.config.registry import methods
 from innerattn.config.sections import WarmStart
@@ -28,6 +29,7 @@ from innerattn.experiments.side_by_side import (
 )
 from innerattn.loggers import LOGGERS, Opened, RunLoggers
 from innerattn.report.tables.evaluation import print_seeds, print_summary
+from innerattn.signals import leave, requests_handled_by
 
 if TYPE_CHECKING:
     Preset: TypeAlias = str
@@ -81,12 +83,20 @@ class _Choice(_Sources):
         return self.load({key: value for key, value in chosen.items() if value is not None})
 
 
+_WITH_RESUME = ("--resume", "--log", "--debug")
+
+
 @dataclass(kw_only=True)
 class _Train(_Sources):
     """Train a team, then measure it against scripted teams."""
 
     defaults: ClassVar[RunConfig]
 
+    given: ClassVar[Sequence[str]] = ()
+
+    resume: Path | None = None
+    """Go on with a run that was stopped, from its newest checkpoint, as if it had not been; all
+    other options are those of the run."""
     run_dir: Path | None = None
     """Folder to make for the run; with --seeds one for each, RUN_DIR-s0, RUN_DIR-s1, ...; None:
     runs/SITUATION-METHOD[-from-SCRIPT]-BUDGET-sSEED-TIME, where a scenario's file gives its name
@@ -109,6 +119,21 @@ class _Train(_Sources):
             InnerattnError: wrong configuration, or a run's folder exists.
             KeyboardInterrupt: the user stopped it; what was learnt is saved.
         """
+        with droppable_output():
+            return self._run()
+
+    def _run(self) -> int:
+        if self.resume is not None:
+            others = [word for word in self.given if word.startswith("--")]
+            others = [
+                w for w in others if w.partition("=")[0] not in ("--resume", "--log", "--debug")
+            ]
+            if others:
+                raise UsageError(
+                    f"--resume {self.resume}: the run has its own configuration; leave out "
+                    f"{others[0]}"
+                )
+            return self._resume(Console(markup=False, highlight=False), self.resume)
         train = self.defaults.train
         chosen: dict[str, object] = {
             "train.method": train.method,
@@ -126,23 +151,51 @@ class _Train(_Sources):
         return self._train_several(console, configs)
 
     def _train_one(self, console: Console, config: RunConfig) -> int:
-        from innerattn.evaluate import evaluate_run
-        from innerattn.train import train
+        with requests_handled_by(leave):
+            from innerattn.train import train
 
         run_dir = self.run_dir or self._new_run_dir(config, _stamp())
         console.print(f"{_what(config)}, seed {config.train.seed}")
         console.print(f"Run folder: {run_dir}", soft_wrap=True)
-        try:
-            with RunLoggers(self.log, Opened(run_dir, config), failed=say_not_logged) as loggers:
+        return self._finish(
+            console, config, run_dir, lambda report: train(config, run_dir, progress=report)
+        )
+
+    def _resume(self, console: Console, run_dir: Path) -> int:
+        with requests_handled_by(leave):
+            from innerattn.records.run_folder import read_config, read_info
+            from innerattn.train import resume
+
+        config, info = read_config(run_dir), read_info(run_dir)
+        measured = (run_dir / "evaluation" / "summary.json").exists()
+        if info.state == "done" and not measured:
+            return self._finish(console, config, run_dir, lambda _: None)
+        console.print(f"Going on with {run_dir} from env-step {info.env_steps:,}", soft_wrap=True)
+        return self._finish(
+            console, config, run_dir, lambda report: resume(run_dir, progress=report)
+        )
+
+    def _finish(
+        self,
+        console: Console,
+        config: RunConfig,
+        run_dir: Path,
+        learn: Callable[[Callable[[Progress], None]], object],
+    ) -> int:
+        """Learn what is left, measure, and print."""
+        from innerattn.evaluate import evaluate_run
+
+        with RunLoggers(self.log, Opened(run_dir, config), failed=say_not_logged) as loggers:
+            try:
                 with Training() as progress:
-                    train(config, run_dir, progress=_both(progress, loggers))
-                with Evaluating() as evaluating:
-                    evaluation = evaluate_run(run_dir, progress=evaluating)
-                evaluation.write(run_dir / "evaluation")
-                loggers.log_scores(evaluation.summary)
-        except KeyboardInterrupt:
-            _say_what_is_kept([run_dir])
-            raise
+                    learn(_both(progress, loggers))
+            except KeyboardInterrupt:
+                _say_what_is_kept([run_dir])
+                raise
+            with Evaluating() as evaluating:
+                evaluation = evaluate_run(run_dir, progress=evaluating)
+            evaluation.write(run_dir / "evaluation")
+            loggers.log_scores(evaluation.summary)
         _say_if_nothing_was_learnt([run_dir])
         print_summary(console, evaluation.summary, config.scenario)
         console.print(f"Measure it again with: innerattn evaluate {run_dir}", soft_wrap=True)
@@ -220,7 +273,11 @@ def _say_why(run: Run) -> None:
 def _say_what_is_kept(folders: Sequence[Path]) -> None:
     for folder in folders:
         if (folder / "checkpoints" / "latest").exists():
-            print(f"innerattn: what was learnt is kept in {folder}", file=sys.stderr)
+            print(
+                f"innerattn: what was learnt is kept in {folder}; go on with: "
+                f"innerattn train --resume {folder}",
+                file=sys.stderr,
+            )
 
 
 def _say_if_nothing_was_learnt(folders: Sequence[Path]) -> None:
@@ -250,4 +307,5 @@ def command_type(argv: Sequence[str]) -> Any:
     train: Any = make_dataclass("Train", options, bases=(_Train,), kw_only=True)
     train.__doc__ = _Train.__doc__
     train.defaults = defaults
+    train.given = tuple(argv)
     return train

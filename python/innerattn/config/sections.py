@@ -150,6 +150,30 @@ class TrainConfig(Model):
         le=MOST_STEPS,
         description="steps of all worlds per line of metrics [env-steps]",
     )
+    checkpoint_every_env_steps: Annotated[int, ADDED_LATER] = Field(
+        250_000,
+        ge=0,
+        le=MOST_STEPS,
+        description="steps of all worlds per checkpoint [env-steps]; 0: by time alone",
+    )
+    checkpoint_every_minutes: Annotated[float, ADDED_LATER] = Field(
+        1.0,
+        ge=0.0,
+        description="longest time between checkpoints [min]; 0: by env-steps alone",
+    )
+    keep_checkpoints: Annotated[int, ADDED_LATER] = Field(
+        2, ge=1, le=1_000, description="newest checkpoints that stay during training"
+    )
+    on_divergence: Annotated[Literal["stop", "skip"], ADDED_LATER] = Field(
+        "stop",
+        description="an update with a loss or gradient that is not finite: stop training before "
+        "it, or skip it; metrics count skipped_updates",
+    )
+    keep_best: Annotated[bool, ADDED_LATER] = Field(
+        True,
+        description="keep the weights of the logging interval with the most rescues per training "
+        "episode, too",
+    )
     episode_steps: Annotated[int | None, ADDED_LATER] = Field(
         None,
         ge=1,

@@ -30,7 +30,7 @@ State = Literal[
 whole evaluation. A folder of one of the last two states is neither used nor changed."""
 
 TO_TRAIN: frozenset[State] = frozenset({"missing", "unfinished", "failed"})
-"""What is trained, from the beginning."""
+"""What is trained, from its newest checkpoint or from the beginning."""
 _MOST_KEYS, _MOST_LETTERS = 3, 60
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -29,12 +30,15 @@ class Run(Job):
         folder: where.
         trained: it is trained already, and only measured.
         log: where its metrics go beside the run folder, names of `innerattn.loggers.LOGGERS`.
+        begun: it was stopped in training, which goes on from its newest checkpoint, or begins anew
+            if there is none that can be read.
     """
 
     config: RunConfig
     folder: Path
     trained: bool = False
     log: tuple[str, ...] = ()
+    begun: bool = False
 
     @property
     def size(self) -> float:
@@ -51,20 +55,18 @@ class Run(Job):
         """Train it, unless it is trained, and evaluate it."""
         from innerattn.evaluate import evaluate_run
         from innerattn.loggers import Opened, RunLoggers
-        from innerattn.train import train
 
         report(0.0)
         before = 0.0 if self.trained else _TRAINING
-        with RunLoggers(
-            self.log, Opened(self.folder, self.config), failed=say_not_logged
-        ) as loggers:
+        run = Opened(self.folder, self.config)
+        with RunLoggers(self.log, run, failed=say_not_logged) as loggers:
 
             def progress(newest: Progress) -> None:
                 report(before * trained_share(self.config, newest))
                 loggers(newest)
 
             if not self.trained:
-                train(self.config, self.folder, progress=progress)
+                self._train(progress)
             evaluation = evaluate_run(
                 self.folder,
                 progress=lambda done, total: report(before + done / total * (1.0 - before)),
@@ -72,6 +74,17 @@ class Run(Job):
             evaluation.write(self.folder / "evaluation")
             loggers.log_scores(evaluation.summary)
         return evaluation.summary
+
+    def _train(self, progress: Callable[[Progress], None]) -> None:
+        from innerattn.train import DamagedCheckpointError, NothingToResumeError, resume, train
+
+        if self.begun:
+            try:
+                resume(self.folder, progress=progress)
+                return
+            except (NothingToResumeError, DamagedCheckpointError):
+                shutil.rmtree(self.folder)
+        train(self.config, self.folder, progress=progress)
 
 
 def refuse_what_cannot_run(runs: Sequence[Run]) -> None:
@@ -86,7 +99,7 @@ def refuse_what_cannot_run(runs: Sequence[Run]) -> None:
     from innerattn.train.checkpoint import refuse_existing
 
     for run in runs:
-        if not run.trained:
+        if not run.trained and not run.begun:
             refuse_existing(run.folder)
     config = runs[0].config
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:

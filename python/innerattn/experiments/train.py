@@ -33,7 +33,7 @@ def train_missing(
     failed: Callable[[PlannedRun, str], None],
     debug: bool = False,
 ) -> None:
-    """Train and measure what is missing; what was left in training is removed and begun again.
+    """Train and measure what is missing; what was stopped in training goes on where it was saved.
 
     A run that fails is written down and leaves the others alone; runs of other configurations and
     what cannot be read stay as they are.
@@ -54,10 +54,11 @@ def train_missing(
     measure, train = to_measure(found), to_train(found)
     if not measure and not train:
         return
-    _remove([one.folder for one in train])
+    begun = {one.folder for one in train if _can_go_on(one.folder)}
+    _remove([one.folder for one in train if one.folder not in begun])
     by_folder = {one.folder: one for one in (*measure, *train)}
     runs = [Run(one.config, one.folder, trained=True) for one in measure]
-    runs += [Run(one.config, one.folder) for one in train]
+    runs += [Run(one.config, one.folder, begun=one.folder in begun) for one in train]
     refuse_what_cannot_run(runs)
 
     def note(run: Run) -> None:
@@ -71,6 +72,11 @@ def train_missing(
         )
     finally:
         forget_failures(out, [by_folder[run.folder] for run in runs if run.state == "done"])
+
+
+def _can_go_on(folder: Path) -> bool:
+    """Whether a run has a checkpoint that its training may go on from."""
+    return any(folder.glob("checkpoints/*/checkpoint.json"))
 
 
 def _remove(folders: Sequence[Path]) -> None:

@@ -5,9 +5,10 @@ It acts, imitates, reports attention, saves and loads. Each learner decides when
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from functools import partial
+from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 import torch
@@ -17,8 +18,11 @@ from innerattn.config import NetworkConfig
 from innerattn.learn import losses
 from innerattn.learn.adam import AdamStepper, Forward, Stepper
 from innerattn.learn.compiled import traced
+from innerattn.learn.divergence import DivergenceError, not_finite, refuse_not_finite_gradients
 from innerattn.learn.gradients import average_over_robots
+from innerattn.learn.interruptions import Interruptions, NoInterruptions
 from innerattn.learn.networks import DrawNetworks, draw_networks
+from innerattn.learn.resume import State, take, take_generator, take_whole, whole
 from innerattn.learn.types import Team
 from innerattn.nn import CriticOutput, action_noise, robots_of_each_kind, sample_actions
 
@@ -40,6 +44,9 @@ class ActorCritic:
         actor: The trained policies.
         critic: The trained critics.
         actor_frozen: While set, updates leave the policies as they are; see `Learner`.
+        interruptions: Asked between updates whether training is to stop.
+        skips_divergence: Leave out updates with numbers that are not finite, and count them,
+            instead of raising a `DivergenceError`.
     """
 
     _update_networks: Callable[..., Tensor]
@@ -47,6 +54,8 @@ class ActorCritic:
 
     It calls networks only through `Networks`, so that `compile` can put other forms in their place.
     """
+    _metric_names: ClassVar[Sequence[str]] = ()
+    """Names of the metrics of an update, for messages."""
 
     def __init__(
         self,
@@ -107,6 +116,12 @@ class ActorCritic:
         self._acted: tuple[Tensor, Tensor] | None = None
         self._team = team
         self._updates = 0
+        self.interruptions: Interruptions = NoInterruptions()
+        self.skips_divergence = False
+        self._skipped = 0
+        self._plain_networks: Networks | None = None
+        self._compiled_for: set[int] | None = None
+        self._rows: list[Tensor] = []
 
     @property
     def updates(self) -> int:
@@ -117,10 +132,11 @@ class ActorCritic:
         """Do updates as one compiled graph from now on; see `Learner.compile`."""
         plain = self._networks
         forms: Any = {field.name: traced(getattr(plain, field.name)) for field in fields(plain)}
-        self._networks = type(plain)(**forms)
+        self._networks, self._plain_networks = type(plain)(**forms), plain
         self._update_networks = torch.compile(
             self._update_networks, fullgraph=True, dynamic=False, backend=backend
         )
+        self._compiled_for = set()
 
     def seed_draws(self, seed: int) -> None:
         """Let the next actions be drawn from ``seed``; see `Learner.seed_draws`."""
@@ -214,8 +230,95 @@ class ActorCritic:
         """Do `_update_networks` with matrix products in `network.precision`, and count it."""
         with torch.autocast(self._device.type, torch.bfloat16, enabled=self._bfloat16):
             metrics = self._update_networks(self._networks, *tensors, _as_tensor(self._rate))
+            if not bool(metrics.isfinite().all()):
+                self._refuse(metrics, tensors)
         self._updates += 1
         return metrics
+
+    def _refuse(self, metrics: Tensor, tensors: Sequence[Tensor]) -> NoReturn:
+        """Find out which gradient of an update is not finite, by its plain form; learn nothing.
+
+        Raises:
+            DivergenceError: Always.
+        """
+        plain = self._networks if self._plain_networks is None else self._plain_networks
+        robots, what = self._team.num_robots, not_finite(metrics, self._metric_names)
+        names = {"critic": self._critic_adam, "actor": self._actor_adam}
+        for name, adam in names.items():
+            adam.watch = partial(refuse_not_finite_gradients, what, name, robots)
+        try:
+            type(self)._update_networks(self, plain, *tensors, _as_tensor(self._rate))
+        finally:
+            for adam in names.values():
+                adam.watch = None
+        raise DivergenceError(what)
+
+    def _do_update(self, batch_size: int, update: Callable[[], Tensor]) -> bool:
+        """Do one update of a call of `learn`, as a whole or, where it is interrupted, not at all.
+
+        The metrics are kept until `_take_metrics`, so that `learn` can go on in a later call.
+
+        Returns:
+            Whether something was learnt.
+
+        Raises:
+            DivergenceError: A number is not finite, and that is not to be skipped.
+        """
+        self.interruptions.check()
+        try:
+            self._compile_or_do(batch_size, update)
+        except DivergenceError:
+            if not self.skips_divergence:
+                raise
+            self._skipped += 1
+            return False
+        return True
+
+    def _compile_or_do(self, batch_size: int, update: Callable[[], Tensor]) -> None:
+        if self._compiled_for is None or batch_size in self._compiled_for:
+            self._rows.append(update())
+            return
+        # The compiler works now, for up to a minute. Who asks it to stop shall not wait.
+        weights = self.state()
+        draws = [generator.get_state() for generator in self._generators()]
+        try:
+            with self.interruptions.at_once():
+                self._rows.append(update())
+        except BaseException:
+            self.load(weights)
+            for generator, draw in zip(self._generators(), draws, strict=True):
+                generator.set_state(draw)
+            self.interruptions.check()  # the compiler may have made another error of it
+            raise
+        self._compiled_for.add(batch_size)
+
+    def _take_metrics(self) -> dict[str, float] | None:
+        """Means over the updates of a call of `learn`, which is done now; None if none was due."""
+        found: dict[str, float] = {}
+        if self._rows:
+            means = torch.stack(self._rows).mean(dim=0).tolist()
+            found |= dict(zip(self._metric_names, means, strict=True))
+        if self._skipped:
+            found["skipped_updates"] = float(self._skipped)
+        self._rows, self._skipped = [], 0
+        return found or None
+
+    def _generators(self) -> list[torch.Generator]:
+        """What an update draws from."""
+        return [self._noise]
+
+    def _resume_state(self) -> dict[str, Tensor]:
+        """What every learner needs to go on, beside `state`; see `Resumable`."""
+        state = {"noise": self._noise.get_state(), "skipped": whole(self._skipped)}
+        return state | ({"rows": torch.stack(self._rows)} if self._rows else {})
+
+    def _load_resume_state(self, state: State) -> None:
+        """Go on from what `_resume_state` gave."""
+        take_generator(state, "noise", self._noise)
+        self._skipped = take_whole(state, "skipped")
+        self._rows = []
+        if "rows" in state:
+            self._rows = list(take(state, "rows", self._dtype, None, None).to(self._device))
 
     def _log_probs_of(self, obs: Tensor) -> Tensor | None:
         """(R, A, E) log-probabilities with which `act` drew actions for just these observations."""

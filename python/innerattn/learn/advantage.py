@@ -9,6 +9,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from innerattn.learn.resume import State, take
+
 
 def generalised_advantage(
     reward: Tensor,
@@ -83,6 +85,17 @@ class ReturnScale:
     def tensors(self) -> dict[str, Tensor]:
         """Live tensors by name, to be saved."""
         return {"count": self.count, "mean": self.mean, "squares": self.squares}
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """The returns of episodes that have not ended; see `Resumable`."""
+        return {} if self._open is None else {"open": self._open}
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `Resumable`."""
+        self._open = None
+        if state:
+            found = take(state, "open", torch.float64, len(self.mean), None)
+            self._open = found.to(self.mean.device)
 
     def std(self, floor: float) -> Tensor:
         """(R,) float64, the standard deviation, at least ``floor``."""

@@ -10,7 +10,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from innerattn.learn.types import Learner, Transitions
+from innerattn.learn.interruptions import Interruptions
+from innerattn.learn.resume import State, inside, take_generator, under
+from innerattn.learn.ring import Ring
+from innerattn.learn.types import Learner, ResumableLearner, Transitions
 from innerattn.nn import NUM_ELEMENTS, SquareSymmetry
 
 
@@ -112,6 +115,35 @@ class FramedLearner:
     def load(self, state: dict[str, Tensor]) -> None:
         """Restore what `state` returned; see `Learner.load`."""
         self.learner.load(state)
+
+    @property
+    def interruptions(self) -> Interruptions:
+        """Asked between updates whether training is to stop; see `ResumableLearner`."""
+        return self._resumable.interruptions
+
+    @interruptions.setter
+    def interruptions(self, interruptions: Interruptions) -> None:
+        self._resumable.interruptions = interruptions
+
+    def rings(self) -> dict[str, Ring]:
+        """Those of the learner inside; see `ResumableLearner.rings`."""
+        return self._resumable.rings()
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """All but `state` and `rings`; see `ResumableLearner`."""
+        state = under("inside", self._resumable.resume_state())
+        return state | ({} if self._generator is None else {"turns": self._generator.get_state()})
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `ResumableLearner`."""
+        self._resumable.load_resume_state(inside("inside", state))
+        if self._generator is not None:
+            take_generator(state, "turns", self._generator)
+
+    @property
+    def _resumable(self) -> ResumableLearner:
+        assert isinstance(self.learner, ResumableLearner)  # as `resumable` finds out
+        return self.learner
 
     def _look(self, obs: Tensor) -> tuple[Tensor, Tensor]:
         """Elements (B, R) and the turned observations (B, R, D)."""

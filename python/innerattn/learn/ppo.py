@@ -6,6 +6,7 @@ Sources: Schulman et al. 2017; the baseline of Iqbal & Sha 2019, section 3.3.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 
 import torch
@@ -16,8 +17,18 @@ from innerattn.learn import losses
 from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
-from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
+from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot, finite
 from innerattn.learn.networks import draw_networks
+from innerattn.learn.resume import (
+    State,
+    inside,
+    take_generator,
+    take_whole,
+    take_within,
+    under,
+    whole,
+)
+from innerattn.learn.ring import Ring
 from innerattn.learn.rollout import Rollout, RolloutBuffer, rows_of, standardised, steps_of
 from innerattn.learn.types import Scheduled, Team, Transitions
 from innerattn.nn import sample_actions
@@ -36,6 +47,25 @@ _CHUNK = 1024
 """Rows whose values are computed at a time."""
 
 
+@dataclass
+class _Passes:
+    """The passes over a rollout, as far as they are done.
+
+    Attributes:
+        rollout: What is trained on.
+        epoch: Passes that are done.
+        order: (B,) the rows of the present pass in their order; None before it has begun.
+        done: Minibatches of the present pass that are done.
+        learnt: Those of them that were learnt from.
+    """
+
+    rollout: Rollout
+    epoch: int = 0
+    order: Tensor | None = None
+    done: int = 0
+    learnt: int = 0
+
+
 class PPO(ActorCritic):
     """The on-policy learner; its contract is `innerattn.learn.types.Learner`.
 
@@ -46,6 +76,8 @@ class PPO(ActorCritic):
     Attributes:
         scale: Running standard deviation of returns, by which rewards are divided.
     """
+
+    _metric_names = _METRICS
 
     def __init__(
         self,
@@ -78,6 +110,7 @@ class PPO(ActorCritic):
         self._shuffle = torch.Generator().manual_seed(self._data_seed)
         self._buffer = RolloutBuffer(ppo.rollout_steps, team, device, dtype)
         self._steps_of_frozen = False
+        self._passes: _Passes | None = None
         self._gamma, self._entropy_weight = ppo.gamma, ppo.entropy_weight
         self.scale = ReturnScale(team.num_robots, ppo.gamma, device)
 
@@ -107,24 +140,37 @@ class PPO(ActorCritic):
             of `TD.learn`, and `kl`, the mean divergence from the policy that acted [nats], and
             `clip_share`, the share of actions whose ratio was clipped.
         """
-        if not self._buffer.full:
-            return None
-        rollout = self._rollout()
-        self._buffer.clear()
-        rows = []
-        stop = self._config.stop_at_kl
-        for _ in range(self._config.epochs):
-            order = torch.randperm(rollout.obs.shape[1], generator=self._shuffle)
-            epoch = [
-                self.update(rollout.take(chosen.to(self._device)))
-                for chosen in torch.split(order, self._config.minibatch_size)
-            ]
-            rows += epoch
-            kl = torch.stack(epoch)[:, _METRICS.index("kl")].mean()
-            if stop is not None and float(kl) > stop:
+        if self._passes is None:
+            if not self._buffer.full:
+                return None
+            self._passes = _Passes(self._rollout())
+            self._buffer.clear()
+        while self._passes.epoch < self._config.epochs:
+            if self._pass(self._passes):
                 break
-        means = torch.stack(rows).mean(dim=0).tolist()
-        return dict(zip(_METRICS, means, strict=True))
+        self._passes = None
+        return self._take_metrics()
+
+    def _pass(self, passes: _Passes) -> bool:
+        """Do the rest of the present pass.
+
+        Returns:
+            Whether it is to be the last.
+        """
+        rollout = passes.rollout
+        if passes.order is None:
+            passes.order = torch.randperm(rollout.obs.shape[1], generator=self._shuffle)
+        minibatches = torch.split(passes.order, self._config.minibatch_size)
+        for chosen in minibatches[passes.done :]:
+            rows = rollout.take(chosen.to(self._device))
+            passes.learnt += self._do_update(len(chosen), partial(self.update, rows))
+            passes.done += 1
+        found = self._rows[len(self._rows) - passes.learnt :]
+        passes.epoch, passes.order, passes.done, passes.learnt = passes.epoch + 1, None, 0, 0
+        stop = self._config.stop_at_kl
+        if stop is None or not found:
+            return False
+        return float(torch.stack(found)[:, _METRICS.index("kl")].mean()) > stop
 
     @torch.no_grad()
     def update(self, rows: Rollout) -> Tensor:
@@ -152,7 +198,7 @@ class PPO(ActorCritic):
     ) -> Tensor:
         critic_metrics = self._update_critic(nets, obs, actions, value, target, rate)
         actor_metrics = self._update_actor(
-            nets, obs, actions, log_prob, advantage, entropy_weight, rate
+            nets, obs, actions, log_prob, advantage, entropy_weight, rate, finite(*critic_metrics)
         )
         return torch.stack([*critic_metrics, *actor_metrics])
 
@@ -183,7 +229,7 @@ class PPO(ActorCritic):
         gradients, (loss, mean) = nets.critic.gradients(loss_of)
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norm = clip_norm(gradients, config.critic_grad_clip)
-        nets.critic.step(gradients, rate)
+        nets.critic.step(gradients, rate, finite(loss, norm))
         return loss, mean, norm
 
     def _update_actor(
@@ -195,6 +241,7 @@ class PPO(ActorCritic):
         advantage: Tensor,
         entropy_weight: Tensor,
         rate: Tensor,
+        critic_is_sound: Tensor,
     ) -> tuple[Tensor, ...]:
         """One step of the policies: loss, entropy, mean gradient norm, KL, clipped share."""
         config = self._config
@@ -211,7 +258,7 @@ class PPO(ActorCritic):
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norms = clip_norm_by_robot(gradients, config.actor_grad_clip)
         if not self.actor_frozen:
-            nets.actor.step(gradients, rate)
+            nets.actor.step(gradients, rate, critic_is_sound & finite(loss, norms))
         ratio = change.exp()
         kl = (ratio - 1.0 - change).mean()
         clipped = ((ratio - 1.0).abs() > config.clip).to(kl.dtype).mean()
@@ -286,6 +333,44 @@ class PPO(ActorCritic):
         if self._config.advantage == "counterfactual":
             return losses.gather_actions(q, actions)
         return q.squeeze(1)
+
+    def rings(self) -> dict[str, Ring]:
+        """None: a rollout is small; see `ResumableLearner.rings`."""
+        return {}
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """All but `state`; see `ResumableLearner`."""
+        state = self._resume_state() | {
+            "shuffle": self._shuffle.get_state(),
+            "frozen": whole(self._steps_of_frozen),
+            **under("scale", self.scale.resume_state()),
+            **under("buffer", self._buffer.resume_state()),
+        }
+        if self._passes is not None:
+            passes = self._passes
+            state |= under("rollout", passes.rollout._asdict())
+            state |= {"epoch": whole(passes.epoch), "done": whole(passes.done)}
+            state |= {"learnt": whole(passes.learnt)}
+            state |= {} if passes.order is None else {"order": passes.order}
+        return state
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `ResumableLearner`."""
+        self._load_resume_state(state)
+        take_generator(state, "shuffle", self._shuffle)
+        self._steps_of_frozen = bool(take_whole(state, "frozen", 0, 1))
+        self.scale.load_resume_state(inside("scale", state))
+        self._buffer.load_resume_state(inside("buffer", state))
+        self._passes = None
+        if "epoch" in state:
+            rollout = Rollout.taken_from(inside("rollout", state), self._team, self._number(0.0))
+            size = rollout.obs.shape[1]
+            self._passes = _Passes(rollout, take_whole(state, "epoch", 0, self._config.epochs))
+            if "order" in state:
+                self._passes.order = take_within(state, "order", torch.int64, 0, size - 1, size)
+                self._passes.done = take_whole(state, "done", 0, size)
+                most = min(self._passes.done, len(self._rows))
+                self._passes.learnt = take_whole(state, "learnt", 0, most)
 
     def _running(self) -> dict[str, Tensor]:
         return {f"scale.{name}": tensor for name, tensor in self.scale.tensors().items()}

@@ -10,6 +10,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from innerattn.learn.resume import State, take, take_generator
+from innerattn.learn.ring import Ring
 from innerattn.learn.types import Team, Transitions
 
 
@@ -18,6 +20,10 @@ class Replay:
 
     A row is obs, next_obs, actions, reward or its parts, terminated, all float32 (actions are small
     integers, which float32 holds exactly), so that a batch is one gather of whole rows.
+
+    Attributes:
+        ring: The rows, for who saves them.
+        generator: Source of the draws.
     """
 
     def __init__(
@@ -51,9 +57,8 @@ class Replay:
         rows = np.empty((capacity, sum(self._splits)), np.float32)
         self._rows = torch.from_numpy(rows).to(device or "cpu")
         self._reward = slice(2 * width + robots, 2 * width + (1 + reward_parts) * robots)
-        self._generator = torch.Generator(self._rows.device).manual_seed(seed)
-        self._start = 0  # where the next row goes
-        self._size = 0
+        self.generator = torch.Generator(self._rows.device).manual_seed(seed)
+        self.ring = Ring(rows=self._rows)
         # Of rewards, or of each product of two parts: enough for the moments under any weights.
         self._sum = torch.zeros(robots, reward_parts, dtype=torch.float64, device=device)
         self._sum_of_products = self._sum.new_zeros(robots, reward_parts, reward_parts)
@@ -64,12 +69,12 @@ class Replay:
 
     def __len__(self) -> int:
         """Transitions held."""
-        return self._size
+        return self.ring.held
 
     @property
     def capacity(self) -> int:
         """Transitions held at most."""
-        return self._rows.shape[0]
+        return self.ring.capacity
 
     @property
     def parts(self) -> int:
@@ -79,13 +84,13 @@ class Replay:
     @property
     def reward_mean(self) -> Tensor:
         """(R,) float64, mean reward of each robot over the transitions held; 0 when empty."""
-        return self._sum @ self._weights.double() / max(self._size, 1)
+        return self._sum @ self._weights.double() / max(len(self), 1)
 
     @property
     def reward_std(self) -> Tensor:
         """(R,) float64, its population standard deviation; 0 when empty."""
         weights = self._weights.double()
-        mean_of_squares = self._sum_of_products @ weights @ weights / max(self._size, 1)
+        mean_of_squares = self._sum_of_products @ weights @ weights / max(len(self), 1)
         return (mean_of_squares - self.reward_mean.square()).clamp_min(0.0).sqrt()
 
     def add(self, batch: Transitions) -> None:
@@ -106,10 +111,9 @@ class Replay:
         parts = (batch.obs, batch.next_obs, batch.actions, reward, terminated)
         rows = torch.cat([part.flatten(1).to(self._rows) for part in parts], dim=1)
         rows = rows[-self.capacity :]
-        fits = min(len(rows), self.capacity - self._start)
-        self._write(self._start, rows[:fits])
-        self._write(0, rows[fits:])
-        self._start = (self._start + len(rows)) % self.capacity
+        fits = min(len(rows), self.capacity - self.ring.seen % self.capacity)
+        self._write(rows[:fits])
+        self._write(rows[fits:])
 
     def sample(self, batch_size: int) -> Transitions:
         """Draw transitions, each with equal chance; the same one may come twice.
@@ -120,10 +124,10 @@ class Replay:
         Raises:
             ValueError: Nothing is held.
         """
-        if not self._size:
+        if not len(self):
             raise ValueError("replay is empty: add transitions before sampling")
         device = self._rows.device
-        index = torch.randint(self._size, (batch_size,), generator=self._generator, device=device)
+        index = torch.randint(len(self), (batch_size,), generator=self.generator, device=device)
         rows = self._rows.index_select(0, index)
         obs, next_obs, actions, reward, terminated = torch.split_with_sizes(
             rows, self._splits, dim=1
@@ -139,15 +143,37 @@ class Replay:
             terminated.squeeze(1) > 0.5,
         )
 
-    def _write(self, start: int, rows: Tensor) -> None:
-        """Put rows at `start`, where they fit, and keep the statistics true to what is held."""
+    def resume_state(self) -> dict[str, Tensor]:
+        """All but the rows; see `Resumable`."""
+        return {
+            "sum": self._sum,
+            "sum_of_products": self._sum_of_products,
+            "generator": self.generator.get_state(),
+        }
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state, once the rows are in `ring`; see `Resumable`."""
+        robots, parts = self._team.num_robots, self._parts
+        self._sum.copy_(take(state, "sum", torch.float64, robots, parts))
+        products = take(state, "sum_of_products", torch.float64, robots, parts, parts)
+        self._sum_of_products.copy_(products)
+        take_generator(state, "generator", self.generator)
+        held = self._rows[: len(self)]
+        actions = held[:, self._splits[0] * 2 : self._reward.start]
+        known = (actions >= 0) & (actions < self._team.num_actions) & (actions == actions.round())
+        if not bool(held.isfinite().all()) or not bool(known.all()):
+            raise ValueError("rows: must be finite, with actions that there are")
+
+    def _write(self, rows: Tensor) -> None:
+        """Put the next rows where they fit, and keep the statistics true to what is held."""
+        start = self.ring.seen % self.capacity
         place = self._rows[start : start + len(rows)]
-        replaced = self._moments(place[: max(0, self._size - start)])
+        replaced = self._moments(place[: max(0, len(self) - start)])
         added = self._moments(rows)
         self._sum += added[0] - replaced[0]
         self._sum_of_products += added[1] - replaced[1]
         place.copy_(rows)
-        self._size = max(self._size, start + len(rows))
+        self.ring.seen += len(rows)
 
     def _moments(self, rows: Tensor) -> tuple[Tensor, Tensor]:
         """Sums (R, P) of the parts of rewards, and (R, P, P) of their products."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
 
+from innerattn.learn.resume import State, take, take_within
 from innerattn.learn.types import Team, Transitions
 
 
@@ -102,6 +103,56 @@ class RolloutBuffer:
             after=torch.cat(self._after).transpose(0, 1),
         )
 
+    def resume_state(self) -> dict[str, Tensor]:
+        """The steps held; see `Resumable`."""
+        if not self._filled:
+            return {}
+        held = self._filled
+        state = {
+            "obs": self._obs[:, :held],
+            "actions": self._actions[:, :held],
+            "reward": self._reward[:held],
+            "terminated": self._terminated[:held].to(torch.uint8),
+            "ended": self._ended[:held].to(torch.uint8),
+            "after": torch.cat(self._after),
+        }
+        return state | ({"log_probs": self._log_probs[:, :, :held]} if self._all_known else {})
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `Resumable`."""
+        self.clear()
+        if not state:
+            return
+        robots, width, actions = self._team[:3]
+        found = take(state, "obs", self._dtype, robots, None, None, width)
+        held, envs = found.shape[1:3]
+        if not (0 < held <= self._num_steps and envs):
+            raise ValueError(
+                f"'obs' has {held} steps of {envs} worlds: must be 1 to {self._num_steps}"
+            )
+        self._reserve(envs)
+        self._obs[:, :held] = found
+        most = actions - 1
+        chosen = take_within(state, "actions", torch.int64, 0, most, robots, held, envs)
+        self._actions[:, :held] = chosen
+        self._reward[:held] = take(state, "reward", torch.float32, held, robots, envs)
+        flags = {
+            name: take_within(state, name, torch.uint8, 0, 1, held, envs)
+            for name in ("terminated", "ended")
+        }
+        self._terminated[:held] = flags["terminated"].bool()
+        self._ended[:held] = flags["ended"].bool()
+        self._all_known = "log_probs" in state
+        if self._all_known:
+            known = take(state, "log_probs", self._dtype, robots, actions, held, envs)
+            self._log_probs[:, :, :held] = known
+        self._filled = held
+        cut = int(flags["ended"].sum())
+        if self.full:
+            cut += int((flags["ended"][-1] == 0).sum())
+        after = take(state, "after", self._dtype, cut, robots, width)
+        self._after = [after.to(self._device)]
+
     def _reserve(self, envs: int) -> None:
         """Make the memory for E worlds; what is held is dropped."""
         robots, steps = self._team.num_robots, self._num_steps
@@ -138,6 +189,27 @@ class Rollout(NamedTuple):
     def take(self, rows: Tensor) -> Rollout:
         """Some rows, by their indices (n,) int64."""
         return Rollout._make(tensor.index_select(1, rows) for tensor in self)
+
+    @classmethod
+    def taken_from(cls, state: State, team: Team, like: Tensor) -> Rollout:
+        """The rollout whose fields are in a state by name.
+
+        Args:
+            state: By name.
+            team: Sizes of the team.
+            like: Has the dtype and the device of all but the actions.
+
+        Raises:
+            ValueError: As in `take`.
+        """
+        robots, width, actions = team[:3]
+        obs = take(state, "obs", like.dtype, robots, None, width)
+        shape = (robots, obs.shape[1])
+        found: dict[str, Any] = {"obs": obs}
+        found["actions"] = take_within(state, "actions", torch.int64, 0, actions - 1, *shape)
+        for name in ("log_prob", "value", "advantage", "target"):
+            found[name] = take(state, name, like.dtype, *shape)
+        return cls(**{name: tensor.to(like.device) for name, tensor in found.items()})
 
 
 def rows_of(steps: Tensor) -> Tensor:

@@ -16,8 +16,10 @@ from innerattn.config import NetworkConfig, TDConfig
 from innerattn.learn import losses
 from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward, Network
-from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
+from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot, finite
 from innerattn.learn.replay import Replay
+from innerattn.learn.resume import State, inside, take_whole, under, whole
+from innerattn.learn.ring import Ring
 from innerattn.learn.types import Scheduled, Team, Transitions
 from innerattn.nn import sample_actions
 
@@ -52,6 +54,8 @@ class TD(ActorCritic):
         target_critic: Slow copy of the critics.
         replay: Past transitions.
     """
+
+    _metric_names = _METRICS
 
     def __init__(
         self,
@@ -141,12 +145,11 @@ class TD(ActorCritic):
             `critic_grad_norm` and `actor_grad_norm` (its mean over robots) are before clipping.
         """
         every = self._config.update_every_env_steps
-        due, self._pending_env_steps = divmod(self._pending_env_steps, every)
-        if not due:
-            return None
-        rows = [self.update(self.replay.sample(self._config.batch_size)) for _ in range(due)]
-        means = torch.stack(rows).mean(dim=0).tolist()
-        return dict(zip(_METRICS, means, strict=True))
+        size = self._config.batch_size
+        while self._pending_env_steps >= every:
+            self._do_update(size, lambda: self.update(self.replay.sample(size)))
+            self._pending_env_steps -= every
+        return self._take_metrics()
 
     @torch.no_grad()
     def update(self, batch: Transitions) -> Tensor:
@@ -174,6 +177,24 @@ class TD(ActorCritic):
             self._number(self._temperature),
         )
 
+    def rings(self) -> dict[str, Ring]:
+        """The rows of the replay; see `ResumableLearner.rings`."""
+        return {"replay": self.replay.ring}
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """All but `state` and `rings`; see `ResumableLearner`."""
+        replay = under("replay", self.replay.resume_state())
+        return self._resume_state() | replay | {"pending": whole(self._pending_env_steps)}
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `ResumableLearner`."""
+        self._load_resume_state(state)
+        self.replay.load_resume_state(inside("replay", state))
+        self._pending_env_steps = take_whole(state, "pending")
+
+    def _generators(self) -> list[torch.Generator]:
+        return [*super()._generators(), self.replay.generator]
+
     def _new_replay(self, reward_parts: int) -> Replay:
         capacity = self._config.replay_capacity
         return Replay(capacity, self._team, self._data_seed, self._device, reward_parts)
@@ -193,7 +214,8 @@ class TD(ActorCritic):
     ) -> Tensor:
         target = self._targets(nets, reward, next_obs, discount, next_noise, temperature)
         critic_metrics = self._update_critic(nets, obs, actions, target, rate)
-        actor_metrics = self._update_actor(nets, obs, noise, temperature, rate)
+        sound = finite(*critic_metrics)
+        actor_metrics = self._update_actor(nets, obs, noise, temperature, rate, sound)
         for slow, fast in ((nets.target_actor, nets.actor), (nets.target_critic, nets.critic)):
             torch._foreach_lerp_(
                 list(slow.values.values()), list(fast.values.values()), self._config.polyak
@@ -235,7 +257,7 @@ class TD(ActorCritic):
         gradients, (loss, q_mean) = nets.critic.gradients(loss_of)
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norm = clip_norm(gradients, config.critic_grad_clip)
-        nets.critic.step(gradients, rate)
+        nets.critic.step(gradients, rate, finite(loss, norm))
         return loss, q_mean, norm
 
     def _update_actor(
@@ -245,6 +267,7 @@ class TD(ActorCritic):
         noise: Tensor,
         temperature: Tensor,
         rate: Tensor,
+        critic_is_sound: Tensor,
     ) -> tuple[Tensor, ...]:
         """One step of the policies by the new critic: loss, entropy, mean gradient norm."""
 
@@ -261,7 +284,7 @@ class TD(ActorCritic):
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norms = clip_norm_by_robot(gradients, self._config.actor_grad_clip)
         if not self.actor_frozen:
-            nets.actor.step(gradients, rate)
+            nets.actor.step(gradients, rate, critic_is_sound & finite(loss, norms))
         return loss, entropy, norms.mean()
 
     def _modules(self) -> dict[str, nn.Module]:

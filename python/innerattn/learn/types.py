@@ -8,6 +8,9 @@ import torch
 from torch import Tensor
 
 from innerattn.config import NetworkConfig
+from innerattn.learn.interruptions import Interruptions
+from innerattn.learn.resume import State
+from innerattn.learn.ring import Ring
 from innerattn.nn import EntityColumns
 
 
@@ -167,6 +170,33 @@ class ScheduledLearner(Protocol):
 
     def follow(self, scheduled: Scheduled) -> None:
         """Take over numbers, for what is observed and learnt from now on."""
+
+
+@runtime_checkable
+class ResumableLearner(Protocol):
+    """A learner whose training can go on in another process, to the bit.
+
+    `learn` asks `interruptions` between two updates. Where that raises, no update is half done, and
+    the next call of `learn` does the rest, in this process or, after a checkpoint, in another one.
+
+    Attributes:
+        interruptions: Says that training is to stop.
+    """
+
+    interruptions: Interruptions
+
+    def rings(self) -> dict[str, Ring]:
+        """Large memories by name, which checkpoints store by what is new in them."""
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """All else that `Learner.state` does not have: what is collected, random generators."""
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from what `resume_state` gave, once `Learner.load` and the rings are filled.
+
+        Raises:
+            ValueError: The state is not that of an equal learner.
+        """
 
 
 class LearnerClass(Protocol):

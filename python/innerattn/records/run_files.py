@@ -28,6 +28,8 @@ _MOST_FILES = 100_000
 _MOST_MANIFEST_BYTES = 32 << 20
 _MOST_INFO_BYTES = 1 << 20
 _CHUNK_BYTES = 1 << 20
+_ROWS = "checkpoints/rows/"
+"""Large files whose digests are in the checkpoints that need them."""
 _DIGITS = frozenset("0123456789abcdef")
 
 
@@ -201,14 +203,18 @@ def _write_manifest(run: Path, entries: dict[str, _Entry]) -> None:
 
 
 def _names(run: Path) -> Iterable[str]:
-    """Names of the plain files in a run folder but the two that are written last; no link."""
+    """Names of the plain files in a run folder; no link.
+
+    Those that are written last are left out, and those that checkpoints hold the digests of.
+    """
     names = []
     for folder, _, files in os.walk(run):  # does not follow links
         for file in files:
             path = Path(folder, file)
             name = path.relative_to(run).as_posix()
             partial = file.startswith(".")
-            if not partial and name not in (MANIFEST, "run.json") and _is_plain(path):
+            elsewhere = name in (MANIFEST, "run.json") or name.startswith(_ROWS)
+            if not partial and not elsewhere and _is_plain(path):
                 names.append(name)
     if len(names) > _MOST_FILES:
         raise RunError(f"{run}: has {len(names)} files: must have at most {_MOST_FILES}")

@@ -21,7 +21,8 @@ class RunInfo:
 
     ``weights_sha256`` is the digest of its newest weights, see `innerattn.train.weights.digest_of`;
     runs made before it was written down have none. ``sealed`` says that ``manifest.json`` holds
-    the digests of all files, this one's too.
+    the digests of all files, this one's too. ``resumed`` counts how often
+    training went on from a checkpoint.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid", strict=True)
@@ -41,6 +42,7 @@ class RunInfo:
     warm_start: _Word = "none"
     weights_sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")] | None = None
     sealed: bool = False
+    resumed: _Count = 0
 
 
 _CHECK = TypeAdapter(RunInfo)

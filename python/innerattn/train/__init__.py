@@ -4,7 +4,21 @@ It writes the run's metrics, and neither evaluates nor prints.
 """
 
 from innerattn.records.run_folder import RunInfo, read_info
-from innerattn.train.checkpoint import RunFolder, load_policy
-from innerattn.train.loop import Progress, train
+from innerattn.train.checkpoint import RunFolder
+from innerattn.train.loop import Progress, resume, train
+from innerattn.train.policy import NewestPolicy, load_newest, load_policy
+from innerattn.train.resume import DamagedCheckpointError, NothingToResumeError
 
-__all__ = ["Progress", "RunFolder", "RunInfo", "load_policy", "read_info", "train"]
+__all__ = [
+    "DamagedCheckpointError",
+    "NewestPolicy",
+    "NothingToResumeError",
+    "Progress",
+    "RunFolder",
+    "RunInfo",
+    "load_newest",
+    "load_policy",
+    "read_info",
+    "resume",
+    "train",
+]

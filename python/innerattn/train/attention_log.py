@@ -14,6 +14,8 @@ from math import ceil
 import torch
 from torch import Tensor
 
+from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
+from innerattn.learn.resume import State, take, take_whole, take_within, whole
 from innerattn.learn.types import Learner
 from innerattn.measures.attention import attention_entropy
 
@@ -41,6 +43,25 @@ class AttentionLog:
         if self._steps % self._stride == 0:
             self._seen.append((obs[:_MOST_WORLDS].clone(), actions[:_MOST_WORLDS].clone()))
         self._steps += 1
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """The steps kept; see `Resumable`."""
+        state = {"steps": whole(self._steps)}
+        if self._seen:
+            obs, actions = (torch.stack(parts) for parts in zip(*self._seen, strict=True))
+            state |= {"obs": obs, "actions": actions}
+        return state
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `Resumable`."""
+        self._steps = take_whole(state, "steps")
+        self._seen.clear()
+        if "obs" in state:
+            robots = len(self._robot_names)
+            obs = take(state, "obs", torch.float32, None, None, robots, None)
+            most = NUM_DISCRETE_ACTIONS - 1
+            actions = take_within(state, "actions", torch.int64, 0, most, *obs.shape[:3])
+            self._seen.extend(zip(obs, actions, strict=True))
 
     def entropy(self, learner: Learner) -> dict[str, list[float]]:
         """Mean entropy by robot and head [nats] over the steps kept, with today's weights.

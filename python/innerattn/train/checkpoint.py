@@ -1,7 +1,6 @@
-"""The run folder: configuration, a record of how it was made, and weights; made, filled and read.
+"""The run folder that is being filled: configuration, a record of how it was made, and weights.
 
-A folder is made whole or not at all, and nothing in it is trusted when it is read: links and
-paths that lead out of it are refused, and no file is unpickled.
+A folder is made whole or not at all.
 """
 
 from __future__ import annotations
@@ -10,8 +9,9 @@ import os
 import platform
 import shutil
 import subprocess
+import warnings
 from collections.abc import Mapping
-from contextlib import closing
+from contextlib import suppress
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -20,13 +20,16 @@ from torch import Tensor
 
 from innerattn.config import RunConfig, write_toml
 from innerattn.config.files import write_whole
-from innerattn.envs import BatchEnv
-from innerattn.errors import RunError
-from innerattn.learn.types import Learner
-from innerattn.records.run_files import RunFiles, info_text, seal
-from innerattn.records.run_folder import SCHEMA_VERSION, RunInfo, State, config_of, weights_name
-from innerattn.train.build import build_learner
-from innerattn.train.weights import MOST_BYTES, digest_of, weights_in, write_weights
+from innerattn.errors import RunError, UnsealedRunWarning
+from innerattn.records.run_files import info_text, seal
+from innerattn.records.run_folder import (
+    SCHEMA_VERSION,
+    RunInfo,
+    State,
+    read_info,
+)
+from innerattn.train.saved import Checkpoints, Content, refuse_not_finite, whole_checkpoints
+from innerattn.train.weights import write_weights
 
 _PACKAGES = ("innerattn", "torch", "numpy")
 
@@ -56,7 +59,7 @@ class RunFolder:
         refuse_existing(path)
         info = RunInfo(
             schema_version=SCHEMA_VERSION,
-            versions=_versions(),
+            versions=versions(),
             seed=config.train.seed,
             commit=_commit(),
             threads=threads,
@@ -95,18 +98,21 @@ class RunFolder:
             RunError: a value is not finite, which means that training has diverged.
             OSError: the files cannot be written.
         """
-        for name, tensor in tensors.items():
-            if not bool(tensor.isfinite().all()):
-                raise RunError(
-                    f"training diverged at env_steps = {env_steps}: a value of {name} is "
-                    f"{_not_finite(tensor)}: must be finite; these weights are not saved"
-                )
+        refuse_not_finite(tensors, env_steps)
         folder = self.path / "checkpoints" / str(env_steps)
         folder.mkdir(exist_ok=True)
-        weights = folder / "weights.safetensors"
-        write_weights(weights, tensors)
+        (folder / "checkpoint.json").unlink(missing_ok=True)  # it spoke of other weights
+        digest = write_weights(folder / "weights.safetensors", tensors)
         write_whole(folder.with_name("latest"), f"{env_steps}\n".encode())
-        self.info = replace(self.info, weights_sha256=digest_of(weights))
+        self.info = replace(self.info, weights_sha256=digest)
+
+    def save_checkpoint(self, checkpoints: Checkpoints, content: Content) -> None:
+        """Write a checkpoint that a run can go on from, and make it the newest one.
+
+        Raises:
+            RunError, OSError: as of `save_weights`.
+        """
+        self.info = replace(self.info, weights_sha256=checkpoints.save(content))
 
     def mark(self, state: State, env_steps: int, updates: int, seconds: float) -> None:
         """Write down how far the run has come; at its end, seal it with a manifest."""
@@ -135,55 +141,36 @@ def refuse_existing(path: Path) -> None:
     except UnicodeEncodeError as error:
         name = ascii(str(path.absolute()))
         raise RunError(f"{name}: is no UTF-8; safetensors needs a path that is") from error
-    if os.path.lexists(path):
-        raise RunError(f"{path}: exists already; choose another run folder or remove it")
+    if not os.path.lexists(path):
+        return
+    raise RunError(f"{path}: exists already{_what_to_do(path)}")
 
 
-def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learner]:
-    """The configuration of a run and a learner with its newest weights.
-
-    Args:
-        run: the run folder.
-        device: where the networks are put; the device of training need not exist here.
-
-    Raises:
-        RunError: no run folder, none of ours, no checkpoint yet, or weights that are truncated,
-            altered or of other networks.
-        ConfigError: its ``config.toml`` is not valid.
-    """
-    path = Path(run)
-    files = RunFiles(path)
-    config = config_of(files)
-    train = config.train.model_copy(update={"device": device})
-    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
-        learner = build_learner(config.model_copy(update={"train": train}), env)
-    name = weights_name(files)
-    weights = path / name
-    known = files.info.weights_sha256 if files.info.state != "running" else None
-    tensors = weights_in(files.read(name, MOST_BYTES), weights, known)
-    try:
-        learner.load(tensors)
-    except ValueError as error:
-        raise RunError(f"{weights}: {error}") from error
-    return config, learner
+def _what_to_do(path: Path) -> str:
+    """What is at ``path``, where a run should begin, and what to do about it."""
+    with suppress(RunError), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnsealedRunWarning)
+        info = read_info(path)
+        if info.state != "done" and whole_checkpoints(path / "checkpoints"):
+            ended = f"interrupted after {info.env_steps:,} env-steps"
+            ended = ended if info.state == "interrupted" else "and is in training or was killed"
+            return f", {ended}; go on with: innerattn train --resume {path}"
+    return "; choose another run folder or remove it"
 
 
 def _write_info(folder: Path, info: RunInfo) -> None:
     write_whole(folder / "run.json", info_text(info))
 
 
-def _not_finite(tensor: Tensor) -> float:
-    return float(tensor[~tensor.isfinite()].flatten()[0])
-
-
-def _versions() -> dict[str, str]:
-    versions = {"python": platform.python_version()}
+def versions() -> dict[str, str]:
+    """Versions of what the numbers of a run depend on, by name."""
+    found = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:
-            versions[package] = version(package)
+            found[package] = version(package)
         except PackageNotFoundError:
-            versions[package] = "not installed"
-    return versions
+            found[package] = "not installed"
+    return found
 
 
 def _commit() -> str | None:

@@ -14,8 +14,12 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from innerattn.envs import BatchEnv
+from innerattn.learn.divergence import refuse_not_finite_reward
+from innerattn.learn.resume import State, take, take_within
 from innerattn.learn.types import Learner, Transitions
 from innerattn.train.schedule import Schedule
+
+_MOST = 2**62
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,7 @@ class Collector:
         )
         if self._schedule is not None:
             transitions = self._schedule.weigh(transitions, step)
+        refuse_not_finite_reward(transitions.reward)
         self._obs = self._tensor(step.obs)
         np.add.at(self._open_rescues, step.rescues["env"], 1)
         self._count(step.terminated | step.truncated)
@@ -85,6 +90,23 @@ class Collector:
         tally = Tally(self._episodes, self._rescues, self._total)
         self._episodes = self._rescues = 0
         return tally
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """All but the worlds; see `Resumable`."""
+        return {
+            "obs": self._obs,
+            "open_rescues": torch.from_numpy(self._open_rescues),
+            "tally": torch.tensor([self._episodes, self._rescues, self._total]),
+        }
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state, with worlds that were restored; see `Resumable`."""
+        self._obs = take(state, "obs", torch.float32, *self._obs.shape).to(self._device)
+        worlds = len(self._open_rescues)
+        rescues = take_within(state, "open_rescues", torch.int64, 0, _MOST, worlds)
+        self._open_rescues = rescues.numpy().copy()
+        tally = take_within(state, "tally", torch.int64, 0, _MOST, 3)
+        self._episodes, self._rescues, self._total = tally.tolist()
 
     def _count(self, ended: NDArray[np.bool_]) -> None:
         count = int(ended.sum())

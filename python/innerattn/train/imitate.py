@@ -6,12 +6,18 @@ sees the true state and labels these states with its actions. Any `Learner` can 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 import torch
 from torch import Tensor
 
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
+from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
+from innerattn.learn.resume import State, inside, take_generator, take_whole, under, whole
+from innerattn.learn.ring import Ring
 from innerattn.learn.types import Learner, Transitions
 from innerattn.policies import PolicyInput, WorldState, scripted_policy
 from innerattn.train.collect import Collector
@@ -42,8 +48,8 @@ class Imitation:
         """Length of the imitation, summed over worlds."""
         return self._config.env_steps
 
-    def step(self, share: float) -> tuple[Transitions, dict[str, float]]:
-        """One control step of all worlds, and the training steps that are due.
+    def collect(self, share: float) -> tuple[Transitions, dict[str, float]]:
+        """One control step of all worlds, and the training steps of the actors that are due.
 
         Args:
             share: Part of the imitation that is done, 0 to 1.
@@ -51,7 +57,7 @@ class Imitation:
         Returns:
             The transitions, and metrics by name: `agreement`, the share of the actions now drawn
             that are the script's; `imitation_loss` [nats], the mean over the actors' steps, if
-            there were any; the learner's own, where its critic learnt.
+            there were any.
         """
         wanted = torch.from_numpy(
             self._script.act(PolicyInput(self._env.observe(), WorldState.of(self._env)))
@@ -62,12 +68,42 @@ class Imitation:
         losses = self._imitate(share)
         if losses:
             metrics["imitation_loss"] = sum(losses) / len(losses)
-        if (1.0 - share) * self._config.env_steps <= self._config.critic_env_steps:
-            self._learner.actor_frozen = True
-            self._learner.observe(transitions, truncated)
-            metrics |= self._learner.learn() or {}
-            self._learner.actor_frozen = False
+        if self._critic_learns(share):
+            with self._frozen_actor():
+                self._learner.observe(transitions, truncated)
         return transitions, metrics
+
+    def learn(self, share: float) -> dict[str, float]:
+        """Let the critic learn after `collect`, in the last part; the learner's metrics."""
+        if not self._critic_learns(share):
+            return {}
+        with self._frozen_actor():
+            return self._learner.learn() or {}
+
+    def rings(self) -> dict[str, Ring]:
+        """The labelled states; see `ResumableLearner.rings`."""
+        return {"labels": self._memory.ring}
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """All but the labelled states; see `Resumable`."""
+        pending = {"pending": whole(self._pending_env_steps)}
+        return pending | under("memory", self._memory.resume_state())
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `Resumable`."""
+        self._pending_env_steps = take_whole(state, "pending")
+        self._memory.load_resume_state(inside("memory", state))
+
+    def _critic_learns(self, share: float) -> bool:
+        return (1.0 - share) * self._config.env_steps <= self._config.critic_env_steps
+
+    @contextmanager
+    def _frozen_actor(self) -> Iterator[None]:
+        self._learner.actor_frozen = True
+        try:
+            yield
+        finally:
+            self._learner.actor_frozen = False
 
     def _imitate(self, share: float) -> list[float]:
         """Do the training steps of the actors that are due, and return their losses."""
@@ -91,23 +127,33 @@ class _Memory:
         Raises:
             MemoryError: there is not that much.
         """
-        self._capacity = shape[0]
-        self._seen = 0
         self._obs = torch.from_numpy(np.empty(shape, np.float32))
         self._actions = torch.from_numpy(np.empty(shape[:2], np.uint8))
+        self.ring = Ring(obs=self._obs, actions=self._actions)
         number = np.random.SeedSequence([seed, 1]).generate_state(1, np.uint64)[0]
         self._generator = torch.Generator().manual_seed(int(number))
 
     def add(self, obs: Tensor, actions: Tensor) -> None:
         """Store states (E, R, D) and the actions that the script would take there (E, R)."""
-        rows = torch.arange(len(obs))[-self._capacity :]  # if more than fit, the last
-        place = (self._seen + rows) % self._capacity
+        rows = torch.arange(len(obs))[-self.ring.capacity :]  # if more than fit, the last
+        place = (self.ring.seen + rows) % self.ring.capacity
         self._obs[place] = obs.cpu()[rows]
         self._actions[place] = actions.to(torch.uint8)[rows]
-        self._seen += len(obs)
+        self.ring.seen += len(obs)
 
     def sample(self, count: int) -> tuple[Tensor, Tensor]:
         """States (B, R, D) float32 and actions (B, R) int64."""
-        held = min(self._seen, self._capacity)
-        rows = torch.randint(held, (count,), generator=self._generator)
+        rows = torch.randint(self.ring.held, (count,), generator=self._generator)
         return self._obs[rows], self._actions[rows].long()
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """All but the rows; see `Resumable`."""
+        return {"generator": self._generator.get_state()}
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state, once the rows are in `ring`; see `Resumable`."""
+        take_generator(state, "generator", self._generator)
+        held = self.ring.held
+        known = (self._actions[:held] < NUM_DISCRETE_ACTIONS).all()
+        if not bool(known) or not bool(self._obs[:held].isfinite().all()):
+            raise ValueError("labels: must be finite, with actions that there are")

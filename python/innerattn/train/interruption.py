@@ -1,43 +1,97 @@
-"""Remembers interruptions, since libraries may swallow KeyboardInterrupt, as the compiler does."""
+"""Interruptions of training: they wait for a moment at which everything can be saved.
+
+Libraries may swallow KeyboardInterrupt, as the compiler does; what was asked for is remembered.
+"""
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from innerattn.signals import Interrupted, exit_code, interrupt
+
+_OURS = (signal.default_int_handler, interrupt)
+
+
+class Interruptions:
+    """Signals that ask training to end; its contract is `innerattn.learn.interruptions`.
+
+    Inside `deferred` the first one waits for `check`. The second one raises at once, wherever it
+    arrives, and the third one ends the process.
+    """
+
+    def __init__(self) -> None:
+        """Nobody has asked yet."""
+        self._asked: list[int] = []
+        self._deferred = False
+
+    @property
+    def urgent(self) -> bool:
+        """Whether somebody asked twice, and does not want to wait for anything to be saved."""
+        return len(self._asked) > 1
+
+    def check(self) -> None:
+        """Raise if there was a request; to be called regularly.
+
+        Raises:
+            Interrupted: there was one.
+        """
+        if self._asked:
+            raise Interrupted(self._asked[-1])
+
+    @contextmanager
+    def deferred(self) -> Iterator[None]:
+        """Let the first request wait inside the block for `check`."""
+        with self._deferring(True):
+            yield
+
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Let a request raise at any moment inside the block."""
+        with self._deferring(False):
+            self.check()
+            yield
+
+    @contextmanager
+    def _deferring(self, deferred: bool) -> Iterator[None]:
+        before, self._deferred = self._deferred, deferred
+        try:
+            yield
+        finally:
+            self._deferred = before
+
+    def note(self, number: int, frame: FrameType | None) -> None:
+        """Handle a signal."""
+        del frame
+        self._asked.append(number)
+        if len(self._asked) > 2:
+            os._exit(exit_code(Interrupted(number)))
+        if self.urgent or not self._deferred:
+            raise Interrupted(number)
+
 
 @contextmanager
-def remembered_interruptions() -> Iterator[Callable[[], None]]:
+def remembered_interruptions() -> Iterator[Interruptions]:
     """Remember every signal that raises KeyboardInterrupt.
 
     Signals with other handlers are not changed, nor is anything outside the main thread.
 
     Yields:
-        A function that raises KeyboardInterrupt if there has been such a signal; to be called
-        regularly.
+        What tells whether there has been such a signal.
     """
-    asked = False
-
-    def note(number: int, frame: FrameType | None) -> None:
-        nonlocal asked
-        asked = True
-        signal.default_int_handler(number, frame)
-
-    def check() -> None:
-        if asked:
-            raise KeyboardInterrupt
-
-    interrupting = []
+    interruptions = Interruptions()
+    before = {}
     if threading.current_thread() is threading.main_thread():
-        own = signal.default_int_handler
-        interrupting = [one for one in signal.valid_signals() if signal.getsignal(one) is own]
-    for one in interrupting:
-        signal.signal(one, note)
+        handlers = {one: signal.getsignal(one) for one in signal.valid_signals()}
+        before = {one: handler for one, handler in handlers.items() if handler in _OURS}
+    for one in before:
+        signal.signal(one, interruptions.note)
     try:
-        yield check
+        yield interruptions
     finally:
-        for one in interrupting:
-            signal.signal(one, signal.default_int_handler)
+        for one, handler in before.items():
+            signal.signal(one, handler)

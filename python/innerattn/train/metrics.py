@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import os
 import time
@@ -14,11 +15,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
+from innerattn.config.untrusted import parse_json, read_plain
 from innerattn.errors import RunError
+from innerattn.learn.resume import State, inside, take, take_within
 from innerattn.train.collect import Tally
 
+_MOST_BYTES = 1 << 30
+_COUNTS = ("skipped_updates",)
 Metrics = Mapping[str, Any]
 """One line: env_steps, episodes, updates, seconds, env_steps_per_s, updates_per_s, losses by name,
 rescues_per_episode (none where no episode ended) and attention_entropy by robot and head [nats],
@@ -26,27 +33,94 @@ empty where the critic has no attention."""
 
 
 class MetricsFile:
-    """A file to which whole lines are appended."""
+    """A file to which whole lines are appended.
+
+    Attributes:
+        path: of the file.
+        bytes: its length.
+    """
 
     def __init__(self, path: Path) -> None:
         """Append to ``path``; the first line creates the file."""
-        self._path = path
+        self.path = path
+        self.bytes = 0
+        self._digest = hashlib.sha256()
+        self._unwritten: list[bytes] = []
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the file, in hexadecimal."""
+        return self._digest.hexdigest()
 
     def append(self, metrics: Metrics) -> None:
         """Add one line.
 
         Raises:
             RunError: training has diverged.
-            OSError: the line cannot be written; the file is as it was.
+            OSError: the line cannot be written; the file is as it was, and the line comes with the
+                next one or with `sync`.
         """
         refuse_divergence(metrics, metrics["env_steps"])
-        line = f"{json.dumps(metrics, allow_nan=False)}\n".encode()
+        self._unwritten.append(f"{json.dumps(metrics, allow_nan=False)}\n".encode())
+        self._write()
+
+    def sync(self) -> None:
+        """Let all lines outlast a loss of power.
+
+        Raises:
+            OSError: they cannot be written.
+        """
+        self._write()
+        if self.bytes:
+            with self.path.open("rb") as file:
+                os.fsync(file.fileno())
+
+    def go_on_after(self, length: int, sha256: str) -> Metrics | None:
+        """Cut the file after its first ``length`` bytes, and append there.
+
+        Returns:
+            The last line that is left, if there is one.
+
+        Raises:
+            RunError: as of `verified`; the file is as it was.
+            OSError: it cannot be written.
+        """
+        kept = self.verified(length, sha256)
+        if length:
+            os.truncate(self.path, length)
+        else:
+            self.path.unlink(missing_ok=True)
+        self.bytes, self._digest = length, hashlib.sha256(kept)
+        last: Metrics | None = parse_json(kept.splitlines()[-1]) if kept else None
+        return last
+
+    def verified(self, length: int, sha256: str) -> bytes:
+        """The first ``length`` bytes of the file.
+
+        Raises:
+            RunError: they are not there, or have another digest.
+        """
+        kept = read_plain(self.path, _MOST_BYTES)[:length] if length else b""
+        if len(kept) < length or hashlib.sha256(kept).hexdigest() != sha256:
+            raise RunError(f"{self.path}: is not that of the checkpoint; it was altered")
+        return kept
+
+    def _write(self) -> None:
         # One write of one line to a file opened for appending: a reader never sees half of it.
-        with self._path.open("ab", buffering=0) as file:
-            before = file.tell()
-            if file.write(line) < len(line):  # the disk is full, say
-                file.truncate(before)
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self._path))
+        while self._unwritten:
+            line = self._unwritten[0]
+            with self.path.open("ab", buffering=0) as file:
+                before = file.tell()
+                try:
+                    if file.write(line) < len(line):  # the disk is full, say
+                        file.truncate(before)
+                        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+                except OSError as error:
+                    error.filename = str(self.path)
+                    raise
+            self._digest.update(line)
+            self.bytes += len(line)
+            del self._unwritten[0]
 
 
 class Interval:
@@ -64,6 +138,29 @@ class Interval:
     def seconds(self) -> float:
         """Time since the start of training [s]."""
         return time.perf_counter() - self._start
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """Everything since the last line; see `Resumable`."""
+        losses = {
+            f"losses.{place:03}.{name}": torch.tensor(values, dtype=torch.float64)
+            for place, (name, values) in enumerate(self._losses.items())
+        }
+        return losses | {
+            "before": torch.tensor([self._env_steps, self._updates]),
+            "seconds": torch.tensor([self.seconds, self._seconds], dtype=torch.float64),
+        }
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `Resumable`. The time until now does not count."""
+        before = take_within(state, "before", torch.int64, 0, 2**62, 2)
+        self._env_steps, self._updates = before.tolist()
+        seconds, self._seconds = take(state, "seconds", torch.float64, 2).tolist()
+        self._start = time.perf_counter() - seconds
+        losses = inside("losses", state)
+        self._losses = {
+            name.partition(".")[2]: take(losses, name, torch.float64, None).tolist()
+            for name in sorted(losses)
+        }
 
     def add_losses(self, losses: Mapping[str, float]) -> None:
         """Add the losses of one control step; none if no update was due."""
@@ -83,13 +180,18 @@ class Interval:
             "seconds": round(seconds, 3),
             "env_steps_per_s": round((env_steps - self._env_steps) / elapsed, 1),
             "updates_per_s": round((updates - self._updates) / elapsed, 2),
-            "losses": {name: sum(all_) / len(all_) for name, all_ in self._losses.items()},
+            "losses": {name: _summary(name, all_) for name, all_ in self._losses.items()},
             "rescues_per_episode": tally.rescues / tally.episodes if tally.episodes else None,
             "attention_entropy": dict(entropy),
         }
         self._seconds, self._env_steps, self._updates = seconds, env_steps, updates
         self._losses = {}
         return line
+
+
+def _summary(name: str, values: list[float]) -> float:
+    """The mean, or the sum of what counts."""
+    return sum(values) if name in _COUNTS else sum(values) / len(values)
 
 
 def refuse_divergence(metrics: Mapping[str, Any], env_steps: int) -> None:

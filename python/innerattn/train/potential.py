@@ -18,6 +18,7 @@ from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.learn.adam import AdamStepper, Forward
 from innerattn.learn.advantage import generalised_advantage
+from innerattn.learn.resume import State, inside, take, under
 from innerattn.nn import CentralCritic, SquareSymmetry
 from innerattn.train.build import square_symmetry
 from innerattn.train.script_play import Play, play_script
@@ -126,6 +127,28 @@ class Potential:
         correlation = torch.corrcoef(torch.stack([values[seen], returns[seen]]))[0, 1]
         return float(correlation.nan_to_num())
 
+    def resume_state(self) -> dict[str, Tensor]:
+        """The fit, and the values that are known already; see `Resumable`."""
+        state = under("network", dict(self._network.named_parameters()))
+        state |= {"mean": self._mean, "deviation": self._deviation}
+        if self._last is not None:
+            state |= {"last_obs": self._last[0], "last_values": self._last[1]}
+        return {name: tensor.detach() for name, tensor in state.items()}
+
+    @torch.no_grad()
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `Resumable`."""
+        found, device = inside("network", state), self._mean.device
+        for name, parameter in self._network.named_parameters():
+            parameter.copy_(take(found, name, torch.float32, *parameter.shape))
+        self._mean = take(state, "mean", torch.float32).to(device)
+        self._deviation = take(state, "deviation", torch.float32).to(device)
+        self._last = None
+        if "last_obs" in state:
+            obs = take(state, "last_obs", torch.float32, None, None, None)
+            values = take(state, "last_values", torch.float32, len(obs))
+            self._last = (obs.to(device), values.to(device))
+
     def _loss(self, rows: Tensor, wanted: Tensor, network: Forward) -> tuple[Tensor, None]:
         """Mean squared error, in deviations of the returns."""
         standard = network(rows.unsqueeze(0), _NO_ACTIONS).q[0, 0]
@@ -186,21 +209,33 @@ def fitted_potential(
         MemoryError: the play does not fit.
     """
     train = config.train
-    numbers = np.random.SeedSequence([train.seed, 2]).generate_state(2, np.uint64)
+    play_seed, seed = _seeds(config)
     play = play_script(
         train.potential,
         env.scenario,
         train.potential_env_steps,
-        seed=int(numbers[0]),
+        seed=play_seed,
         threads=train.threads,
         check=check,
     )
     device = torch.device(train.device)
-    potential = Potential(
+    potential = unfitted_potential(config, env, seed)
+    return potential, potential.fit(Play._make(tensor.to(device) for tensor in play), check)
+
+
+def unfitted_potential(config: RunConfig, env: BatchEnv, seed: int = 0) -> Potential:
+    """Phi before its fit, with parameters drawn by ``seed``."""
+    device = torch.device(config.train.device)
+    return Potential(
         (env.num_robots, env.obs_width),
         config.potential_discount,
         square_symmetry(env.scenario, env.observation_names(), device),
-        torch.Generator().manual_seed(int(numbers[1])),
+        torch.Generator().manual_seed(seed),
         device,
     )
-    return potential, potential.fit(Play._make(tensor.to(device) for tensor in play), check)
+
+
+def _seeds(config: RunConfig) -> tuple[int, int]:
+    """Of the script's play, and of the fit."""
+    numbers = np.random.SeedSequence([config.train.seed, 2]).generate_state(2, np.uint64)
+    return int(numbers[0]), int(numbers[1])

@@ -45,6 +45,11 @@ class Schedule:
         self._weights: Tensor | None = None
         self.set_progress(0.0)
 
+    @property
+    def potential(self) -> Potential | None:
+        """What shapes rewards, if anything does yet."""
+        return self._potential
+
     def shape(self, potential: Potential) -> None:
         """Let ``potential`` shape rewards; to be called before the first step if a run has one."""
         self._potential = potential

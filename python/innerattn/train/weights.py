@@ -28,19 +28,25 @@ _MOST_HEADER_BYTES = 8 << 20
 _MOST_TENSORS = 20_000
 
 
-def write_weights(path: Path, tensors: Mapping[str, Tensor]) -> None:
+def write_weights(path: Path, tensors: Mapping[str, Tensor], form: str = FORMAT) -> str:
     """Write named tensors to ``path``; the file appears whole or not at all.
+
+    Args:
+        path: the file.
+        tensors: by name.
+        form: what the file says that it is.
+
+    Returns:
+        Their digest, see `digest_of`.
 
     Raises:
         OSError: the file cannot be written.
     """
     plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
-    metadata = {
-        "format": FORMAT,
-        "schema_version": SCHEMA_VERSION,
-        "sha256": _digest(plain),
-    }
+    digest = _digest(plain)
+    metadata = {"format": form, "schema_version": SCHEMA_VERSION, "sha256": digest}
     write_whole(path, save(plain, metadata))
+    return digest
 
 
 def read_weights(path: Path) -> dict[str, Tensor]:
@@ -76,13 +82,30 @@ def weights_in(data: bytes, path: Path, sha256: str | None = None) -> dict[str, 
     Raises:
         RunError: as of `read_weights`; or they are others, or hold a value that is not finite.
     """
-    tensors, digest = _parse(data, path)
+    tensors, digest = _parse(data, path, FORMAT)
     if sha256 not in (None, digest):
         raise RunError(f"{path}: is not of this run: run.json names other weights")
+    _refuse_not_finite(tensors, path)
+    return tensors
+
+
+def tensors_in(data: bytes, path: Path, form: str, sha256: str) -> dict[str, Tensor]:
+    """The named tensors of a checkpoint in the bytes of the file at ``path``.
+
+    Raises:
+        RunError: as of `weights_in`, or the file does not say that it is of ``form``.
+    """
+    tensors, digest = _parse(data, path, form)
+    if sha256 != digest:
+        raise RunError(f"{path}: is not of this checkpoint: checkpoint.json names another one")
+    _refuse_not_finite(tensors, path)
+    return tensors
+
+
+def _refuse_not_finite(tensors: Mapping[str, Tensor], path: Path) -> None:
     for name, tensor in tensors.items():
         if not bool(tensor.isfinite().all()):
             raise RunError(f"{path}: a value of {name} is not finite")
-    return tensors
 
 
 def _read(path: Path) -> tuple[dict[str, Tensor], str]:
@@ -91,16 +114,16 @@ def _read(path: Path) -> tuple[dict[str, Tensor], str]:
         data = read_plain(path, MOST_BYTES)
     except OSError as error:
         raise RunError(f"{path}: cannot be read ({error.strerror})") from error
-    return _parse(data, path)
+    return _parse(data, path, FORMAT)
 
 
-def _parse(data: bytes, path: Path) -> tuple[dict[str, Tensor], str]:
+def _parse(data: bytes, path: Path, form: str) -> tuple[dict[str, Tensor], str]:
     try:
         metadata = _metadata(data)
     except (ValueError, LookupError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not readable as safetensors ({error})") from error
-    if metadata.get("format") != FORMAT:
-        raise RunError(f"{path}: not a file of {FORMAT}")
+    if metadata.get("format") != form:
+        raise RunError(f"{path}: not a file of {form}")
     if metadata.get("schema_version") != SCHEMA_VERSION:
         found = metadata.get("schema_version")
         raise RunError(f"{path}: schema version {found}, only {SCHEMA_VERSION} is known")

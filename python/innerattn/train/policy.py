@@ -1,0 +1,89 @@
+"""The newest policy of a run, also while its training goes on; nothing in the folder is trusted.
+
+Links and paths that lead out of it are refused, and no file is unpickled.
+"""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from innerattn.config import RunConfig
+from innerattn.envs import BatchEnv
+from innerattn.errors import RunError
+from innerattn.learn.types import Learner
+from innerattn.records.run_files import RunFiles
+from innerattn.records.run_folder import config_of, weights_name
+from innerattn.train.build import build_learner
+from innerattn.train.weights import MOST_BYTES, weights_in
+
+_TRIES = 5
+
+
+@dataclass(frozen=True)
+class NewestPolicy:
+    """The newest policy of a run.
+
+    Attributes:
+        config: of the run.
+        learner: with its newest weights.
+        env_steps: done when these weights were saved.
+    """
+
+    config: RunConfig
+    learner: Learner
+    env_steps: int
+
+
+def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learner]:
+    """The configuration of a run and a learner with its newest weights.
+
+    Args:
+        run: the run folder.
+        device: where the networks are put; the device of training need not exist here.
+
+    Raises:
+        RunError: no run folder, none of ours, no checkpoint yet, or weights that are truncated,
+            altered or of other networks.
+        ConfigError: its ``config.toml`` is not valid.
+    """
+    newest = load_newest(run, device)
+    return newest.config, newest.learner
+
+
+def load_newest(run: str | Path, device: str = "cpu") -> NewestPolicy:
+    """As `load_policy`, with the time of the weights; also while training saves newer ones.
+
+    Raises:
+        RunError, ConfigError: as of `load_policy`.
+    """
+    path = Path(run)
+    for _ in range(_TRIES - 1):
+        files = RunFiles(path)
+        if files.info.state != "running":
+            break
+        name = weights_name(files)
+        try:
+            return _load(files, name, device)
+        except RunError:
+            # A training drops old checkpoints; this one may be gone since its name was read.
+            if weights_name(files) == name:
+                raise
+    files = RunFiles(path)
+    return _load(files, weights_name(files), device)
+
+
+def _load(files: RunFiles, name: str, device: str) -> NewestPolicy:
+    config = config_of(files)
+    train = config.train.model_copy(update={"device": device})
+    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
+        learner = build_learner(config.model_copy(update={"train": train}), env)
+    weights = files.path / name
+    known = files.info.weights_sha256 if files.info.state != "running" else None
+    tensors = weights_in(files.read(name, MOST_BYTES), weights, known)
+    try:
+        learner.load(tensors)
+    except ValueError as error:
+        raise RunError(f"{weights}: {error}") from error
+    return NewestPolicy(config, learner, int(weights.parent.name))

@@ -1,0 +1,132 @@
+"""Reads the newest checkpoint of a run, for its training to go on; nothing in it is trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from innerattn.config import RunConfig
+from innerattn.errors import RunError
+from innerattn.learn.resume import State
+from innerattn.records.run_files import RunFiles
+from innerattn.records.run_folder import RunInfo, config_of
+from innerattn.train.checkpoint_info import MOST_BYTES as MOST_INFO_BYTES
+from innerattn.train.checkpoint_info import CheckpointInfo, checkpoint_info
+from innerattn.train.metrics import MetricsFile
+from innerattn.train.parts import Parts
+from innerattn.train.row_files import read_rows
+from innerattn.train.saved import INFO, STATE_FORMAT, whole_checkpoints
+from innerattn.train.weights import FORMAT, MOST_BYTES, tensors_in
+
+
+class NothingToResumeError(RunError):
+    """A run has no checkpoint that its training could go on from."""
+
+
+class DamagedCheckpointError(RunError):
+    """The newest checkpoint of a run cannot be read; the message names the file."""
+
+
+@dataclass(frozen=True)
+class Saved:
+    """The newest checkpoint of a run.
+
+    Attributes:
+        run: the folder.
+        config: of the run.
+        run_info: what ``run.json`` says.
+        number: of the checkpoint, its env-steps.
+        info: what ``checkpoint.json`` says.
+        weights: everything learnt, by name.
+        state: everything else but the large memories, by name.
+    """
+
+    run: Path
+    config: RunConfig
+    run_info: RunInfo
+    number: int
+    info: CheckpointInfo
+    weights: State
+    state: State
+
+    def load_into(self, parts: Parts) -> None:
+        """Let a training that was built anew go on from here.
+
+        Raises:
+            DamagedCheckpointError: the checkpoint does not fit it, or a file is damaged.
+        """
+        stage = self.info.counters.stage
+        folder = self.run / "checkpoints"
+        rings = parts.rings(stage)
+        place = folder / str(self.number)
+        if rings.keys() != self.info.rows.keys():
+            raise _damaged(f"{place / INFO}: rows {sorted(self.info.rows)}: not those of this run")
+        try:
+            for name, ring in rings.items():
+                read_rows(folder / "rows", name, ring, self.info.rows[name])
+        except RunError as error:
+            raise _damaged(str(error)) from error
+        try:
+            parts.load(self.weights, self.state, stage)
+        except ValueError as error:
+            raise _damaged(f"{place / 'state.safetensors'}: {error}") from error
+
+
+def read_saved(run: Path) -> Saved:
+    """The newest checkpoint of a run.
+
+    Raises:
+        NothingToResumeError: the run is done, or has no checkpoint that it could go on from.
+        DamagedCheckpointError: a file of the checkpoint is damaged.
+        RunError: there is no run, or a file of it is damaged.
+        ConfigError: its configuration is not valid.
+    """
+    files = RunFiles(run)
+    config = config_of(files)
+    if files.info.state == "done":
+        raise NothingToResumeError(f"{run}: is done; measure it with: innerattn evaluate {run}")
+    folder = run / "checkpoints"
+    numbers = whole_checkpoints(folder)
+    if not numbers:
+        raise NothingToResumeError(f"{run}: holds no checkpoint that training could go on from")
+    number = numbers[-1]
+    name = f"checkpoints/{number}"
+    try:
+        info = _info(files.read(f"{name}/{INFO}", MOST_INFO_BYTES), run / name / INFO)
+        if info.counters.env_steps != number:
+            raise RunError(f"{run / name / INFO}: is of {info.counters.env_steps} env-steps")
+        read = {
+            file: tensors_in(files.read(file, MOST_BYTES), run / file, form, sha256)
+            for file, form, sha256 in (
+                (f"{name}/weights.safetensors", FORMAT, info.weights_sha256),
+                (f"{name}/state.safetensors", STATE_FORMAT, info.state_sha256),
+            )
+        }
+        MetricsFile(run / "metrics.jsonl").verified(info.metrics_bytes, info.metrics_sha256)
+    except RunError as error:
+        raise _damaged(str(error), folder, numbers) from error
+    if info.config_sha256 != config.digest():
+        raise RunError(
+            f"{run / 'config.toml'}: is not the configuration of checkpoint {number}; a run goes "
+            "on as it began"
+        )
+    weights, state = read.values()
+    return Saved(run, config, files.info, number, info, weights, state)
+
+
+def _info(data: bytes, path: Path) -> CheckpointInfo:
+    try:
+        return checkpoint_info(data)
+    except ValueError as error:
+        raise RunError(f"{path}: {error}") from error
+
+
+def _damaged(
+    reason: str, folder: Path | None = None, numbers: list[int] | None = None
+) -> DamagedCheckpointError:
+    if folder is None or numbers is None or len(numbers) < 2:
+        return DamagedCheckpointError(reason)
+    *_, before, newest = numbers
+    return DamagedCheckpointError(
+        f"{reason}; remove {folder / str(newest)} to go on from env-step {before:,}"
+    )

@@ -1,0 +1,97 @@
+"""Signals and lost readers: the exit code, what is left, and one line of text."""
+
+import json
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from innerattn.train.resume import read_saved
+from innerattn.train.saved import whole_checkpoints
+
+pytestmark = pytest.mark.usefixtures("interruptible")
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+PARTIAL = re.compile(r"\..+\.([0-9a-f]{16}|[0-9]+)")
+
+
+def begin(run: Path, options: list[str]) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "innerattn", "train", "--run-dir", str(run), *options]
+    streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    return subprocess.Popen(command, **streams, text=True)  # type: ignore[call-overload,no-any-return]
+
+
+def left_well(run: Path, sent: signal.Signals, code: int, err: str) -> None:
+    """What every interruption leaves."""
+    assert code == 128 + sent, err
+    assert "Traceback" not in err
+    assert "innerattn: interrupted" in err
+    assert "altered" not in err
+    assert [path for path in run.parent.rglob("*") if PARTIAL.fullmatch(path.name)] == []
+    if run.exists():
+        state = json.loads((run / "run.json").read_text())["state"]
+        assert state in ("interrupted", "done")
+        if state == "interrupted":
+            assert whole_checkpoints(run / "checkpoints")
+            read_saved(run)
+
+
+def interrupt_at(seconds: float, sent: signal.Signals, run: Path, options: list[str]) -> None:
+    with begin(run, options) as process:
+        time.sleep(seconds)
+        process.send_signal(sent)
+        _, err = process.communicate(timeout=120)
+    left_well(run, sent, process.returncode, err)
+
+
+@pytest.mark.parametrize("sent", SIGNALS)
+def test_while_modules_are_loaded(sent: signal.Signals) -> None:
+    command = [sys.executable, "-X", "importtime", "-m", "innerattn", "info"]
+    streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, **streams, text=True) as process:  # type: ignore[call-overload]
+        for line in process.stderr:
+            if "numpy" in line:  # long after the start of the command, long before its end
+                break
+        process.send_signal(sent)
+        err = [line for line in process.stderr if not line.startswith("import time:")]
+    assert process.returncode == 128 + sent
+    assert err == ["innerattn: interrupted\n"]
+
+
+@pytest.mark.parametrize("sent", SIGNALS)
+def test_in_training(sent: signal.Signals, tiny: list[str], tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    endless = [*tiny, "--train.env-steps", "100000000"]
+    with begin(run, endless) as process:
+        while not (run / "metrics.jsonl").exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        process.send_signal(sent)
+        _, err = process.communicate(timeout=120)
+    left_well(run, sent, process.returncode, err)
+    assert f"go on with: innerattn train --resume {run}" in err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(100))
+def test_at_any_time(number: int, tiny: list[str], tmp_path: Path) -> None:
+    chance = random.Random(number)
+    warm = ["--warm-start", "hungarian", "--imitation.env-steps", "400"]
+    often = ["--train.checkpoint-every-env-steps", "32", "--train.env-steps", "1600"]
+    seconds, sent = chance.uniform(0.3, 8.0), chance.choice(SIGNALS)
+    interrupt_at(seconds, sent, tmp_path / "run", [*tiny, *warm, *often])
+
+
+def test_nobody_reads_what_it_says(tiny: list[str], tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    command = [sys.executable, "-m", "innerattn", "train", "--run-dir", str(run), *tiny]
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    with subprocess.Popen(command, **streams) as process:  # type: ignore[call-overload]
+        process.stdout.close()
+        assert process.wait(timeout=240) == 0
+    assert json.loads((run / "run.json").read_text())["state"] == "done"
+    assert (run / "evaluation" / "summary.json").exists()

@@ -1,0 +1,217 @@
+"""A training that is cut and goes on in another process is the training that was not cut."""
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import hypothesis.strategies as st
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from innerattn.config import RunConfig
+from innerattn.records.run_folder import newest_weights, read_info
+from innerattn.train import NothingToResumeError, Progress, resume, train
+from innerattn.train.weights import digest_of
+
+Configure = Callable[..., RunConfig]
+
+SMALL = {
+    "train.env_steps": 480,
+    "train.checkpoint_every_env_steps": 0,
+    "train.checkpoint_every_minutes": 0.0,
+    "ppo.rollout_steps": 7,
+    "ppo.minibatch_size": 32,
+    "network.attention_heads": 2,
+    "td.replay_capacity": 300,
+    "td.update_every_env_steps": 5,
+    "td.warmup_env_steps": 100,
+}
+WARM = {
+    "train.warm_start": "hungarian",
+    "imitation.env_steps": 300,
+    "imitation.critic_env_steps": 200,
+    "imitation.batch_size": 32,
+    "imitation.update_every_env_steps": 24,
+    "imitation.memory_env_steps": 130,
+}
+SCHEDULE = {
+    "train.schedule": {
+        "dense_weight": {"first": 1.0, "last": 0.0},
+        "team_credit": {"first": 0.0, "last": 1.0},
+        "gamma": {"first": 0.9, "last": 0.98},
+        "entropy_weight": {"first": 0.02, "last": 0.01},
+    }
+}
+POTENTIAL = {"train.potential": "hungarian", "train.potential_env_steps": 1000}
+FAULTS = {
+    "scenario.faults": [
+        {"kind": kind, "robot": "food_0", "onset_step": 3, "duration_steps": 9, "value": value}
+        for kind, value in (("position_noise", 0.2), ("frozen_sensor", 0.5))
+    ]
+}
+METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo")
+CASES: dict[str, dict[str, Any]] = {
+    **{method: {"train.method": method} for method in METHODS},
+    **{
+        f"{method} {name}": {"train.method": method, **values}
+        for method in ("td-inner", "ppo-inner", "mappo")
+        for name, values in (
+            ("warm start", WARM),
+            ("schedule", SCHEDULE),
+            ("potential", POTENTIAL),
+            ("canonical", {"network.symmetry": "canonical"}),
+            ("augmented", {"network.symmetry": "augmented", "train.stagger_starts": True}),
+        )
+    },
+    "td-inner faults": {"train.method": "td-inner", **FAULTS},
+    "ppo-inner faults": {"train.method": "ppo-inner", **FAULTS},
+    "two threads": {"train.method": "td-inner", "train.threads": 2},
+}
+
+
+def left_by(run: Path) -> tuple[str, str]:
+    """Digests of the weights and of all that the metrics say but for the time."""
+    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    for line in lines:
+        for name in ("seconds", "env_steps_per_s", "updates_per_s"):
+            del line[name]
+    text = json.dumps(lines)
+    return digest_of(newest_weights(run)), hashlib.sha256(text.encode()).hexdigest()
+
+
+def stopped_after(steps: int) -> Callable[[Progress], None]:
+    """Stops a training after so many of its control steps."""
+    seen = 0
+
+    def progress(_: Progress) -> None:
+        nonlocal seen
+        seen += 1
+        if seen == steps:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def elsewhere(run: Path, stop_after: int = 0) -> None:
+    """Go on with a run in a new process."""
+    code = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[3])
+from test_resume import stopped_after
+from innerattn.train import resume
+try:
+    resume(Path(sys.argv[1]), progress=stopped_after(int(sys.argv[2])))
+except KeyboardInterrupt:
+    assert int(sys.argv[2])
+"""
+    command = [sys.executable, "-c", code, str(run), str(stop_after), str(Path(__file__).parent)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture(scope="session")
+def whole(
+    small_config: Configure, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str], tuple[str, str]]:
+    """What a case leaves that is not cut, by its name."""
+    found: dict[str, tuple[str, str]] = {}
+
+    def of(case: str) -> tuple[str, str]:
+        if case not in found:
+            path = tmp_path_factory.mktemp("whole") / "run"
+            found[case] = left_by(train(small_config(**{**SMALL, **CASES[case]}), path))
+        return found[case]
+
+    return of
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_run_that_was_cut_is_the_run_that_was_not(
+    small_config: Configure,
+    whole: Callable[[str], tuple[str, str]],
+    tmp_path: Path,
+    case: str,
+) -> None:
+    run = tmp_path / "run"
+    # The middle of the imitation, where there is one, or before the memory is full; then later.
+    with pytest.raises(KeyboardInterrupt):
+        train(small_config(**{**SMALL, **CASES[case]}), run, progress=stopped_after(17))
+    assert read_info(run).state == "interrupted"
+    with pytest.raises(KeyboardInterrupt):
+        resume(run, progress=stopped_after(16))
+    assert read_info(run).env_steps == 33 * 12
+    resume(run)
+    assert left_by(run) == whole(case)
+    info = read_info(run)
+    assert (info.state, info.resumed) == ("done", 2)
+    with pytest.raises(NothingToResumeError, match="is done"):
+        resume(run)
+
+
+@pytest.mark.parametrize("case", ["td-inner warm start", "ppo-inner schedule"])
+def test_a_new_process_goes_on_alike(
+    small_config: Configure,
+    whole: Callable[[str], tuple[str, str]],
+    tmp_path: Path,
+    case: str,
+) -> None:
+    run = tmp_path / "run"
+    with pytest.raises(KeyboardInterrupt):
+        train(small_config(**{**SMALL, **CASES[case]}), run, progress=stopped_after(9))
+    elsewhere(run, stop_after=8)
+    elsewhere(run)
+    assert left_by(run) == whole(case)
+
+
+@settings(
+    deadline=None, max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    case=st.sampled_from(sorted(CASES)),
+    cuts=st.lists(st.integers(1, 20), min_size=1, max_size=4),
+)
+def test_wherever_it_is_cut(
+    small_config: Configure,
+    whole: Callable[[str], tuple[str, str]],
+    tmp_path_factory: pytest.TempPathFactory,
+    case: str,
+    cuts: list[int],
+) -> None:
+    run = tmp_path_factory.mktemp("cut") / "run"
+    config = small_config(**{**SMALL, **CASES[case]})
+    for number, steps in enumerate(cuts):
+        try:
+            if number == 0:
+                train(config, run, progress=stopped_after(steps))
+            else:
+                resume(run, progress=stopped_after(steps))
+        except KeyboardInterrupt:
+            continue
+        break
+    if read_info(run).state != "done":
+        resume(run)
+    assert left_by(run) == whole(case)
+
+
+@pytest.mark.parametrize("case", ["td-inner", "ppo-inner", "mappo warm start"])
+def test_checkpoints_at_every_step_change_nothing(
+    small_config: Configure,
+    whole: Callable[[str], tuple[str, str]],
+    tmp_path: Path,
+    case: str,
+) -> None:
+    often = {"train.checkpoint_every_env_steps": 12, "train.keep_checkpoints": 3}
+    run = train(small_config(**{**SMALL, **CASES[case], **often}), tmp_path / "run")
+    assert left_by(run) == whole(case)
+    kept = {path.name for path in (run / "checkpoints").iterdir()}
+    best = {name for name in kept if name.startswith("best-")}
+    last = str(read_info(run).env_steps)
+    assert kept - best == {last, "latest"}
+    assert len(best) == 1
+    assert os.listdir(run / "checkpoints" / last) == ["weights.safetensors"]
