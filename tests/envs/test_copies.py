@@ -68,19 +68,13 @@ def test_a_batch_goes_on(way: str, autoreset: Any) -> None:
     assert other.reset(seed=1).tobytes() == made.reset(seed=1).tobytes()
 
 
-def views() -> dict[str, Any]:
-    """One of each view, in the middle of an episode."""
-    made = {
-        "single": RescueEnv(CROWDED, seed=1),
-        "made": gymnasium.make("innerattn/Rescue-v0", scenario=CROWDED, seed=1, form="agents"),
-        "vector": RescueVectorEnv(3, CROWDED, seed=1),
-        "parallel": parallel_env(CROWDED, seed=1, render_mode="human"),
-        "in turn": env(CROWDED, seed=1),
-    }
-    for world in made.values():
-        world.reset(seed=4)
-        act(world, 4)
-    return made
+VIEWS: dict[str, Callable[[], Any]] = {
+    "single": lambda: RescueEnv(CROWDED, seed=1),
+    "made": lambda: gymnasium.make("innerattn/Rescue-v0", scenario=CROWDED, form="agents"),
+    "vector": lambda: RescueVectorEnv(3, CROWDED, seed=1),
+    "parallel": lambda: parallel_env(CROWDED, seed=1, render_mode="rgb_array"),
+    "in turn": lambda: env(CROWDED, seed=1),
+}
 
 
 def act(world: Any, steps: int) -> Any:
@@ -97,10 +91,12 @@ def act(world: Any, steps: int) -> Any:
     return said
 
 
-@pytest.mark.parametrize("name", ["single", "made", "vector", "parallel", "in turn"])
+@pytest.mark.parametrize("name", VIEWS)
 @pytest.mark.parametrize("way", ["pickle", "deepcopy"])
 def test_a_view_goes_on(name: str, way: str) -> None:
-    made = views()[name]
+    made = VIEWS[name]()
+    made.reset(seed=4)
+    act(made, 4)
     other = COPIES[way](made)
     wanted, found = act(made, 9), act(other, 9)
     np.testing.assert_equal(found, wanted)
