@@ -25,6 +25,25 @@ def test_no_module_of_the_room_imports_torch_or_scipy(room: str) -> None:
     assert done.stdout.split() == []
 
 
+_FIRST = """
+import importlib, pkgutil, sys
+import innerattn.config as room
+modules = [one.name for one in pkgutil.walk_packages(room.__path__, "innerattn.config.")]
+for names, take in ((room.__all__, lambda one: getattr(sys.modules["innerattn.config"], one)),
+                    (modules, importlib.import_module)):
+    for name in names:
+        for module in [one for one in sys.modules if one.startswith("innerattn.config")]:
+            del sys.modules[module]
+        importlib.import_module("innerattn.config")
+        take(name)
+"""
+
+
+def test_every_name_of_the_configuration_may_be_asked_for_first() -> None:
+    done = subprocess.run([sys.executable, "-c", _FIRST], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def test_the_check_finds_what_is_imported() -> None:
     command = [sys.executable, "-c", _IMPORT, "innerattn.nn"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)

@@ -408,13 +408,13 @@ def test_a_killed_study_goes_on(
 
     def note(runs: Sequence[Run], *_: object, **__: object) -> None:
         asked.extend(run.folder for run in runs)
-        assert not left.exists()
+        assert [run.begun for run in runs] == [left.exists()] == [True]
 
     monkeypatch.setattr("innerattn.experiments.train.train_side_by_side", note)
     values = {"train.env_steps": 10_000_000}
     assert command("fig4", study, "td-inner,td-uniform", "--seeds", "1", **values) == 1
     assert asked == [left]
-    assert states(study) == ["missing", "finished"]
+    assert states(study) == ["unfinished", "finished"]
     assert times(kept) == before
 
 

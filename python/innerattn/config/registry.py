@@ -115,6 +115,11 @@ def register_attention(name: str, attention: str) -> None:
         ValueError: The name is taken.
     """
     _register_ours()
+    add_attention(name, attention)
+
+
+def add_attention(name: str, attention: str) -> None:
+    """The same for modules of this package, which are imported on the way to `_register_ours`."""
     if name in (*_attentions, "none"):
         raise ValueError(f"attention {name!r} is registered already")
     _attentions[name] = attention
