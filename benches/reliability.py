@@ -18,10 +18,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from page import machine, table
+from page import machine
 from reliability_rows import ROWS, Row
 
 from innerattn.report.marks import fill
+from innerattn.report.table import columns, markdown, plain_table
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "reliability.md"
@@ -62,11 +63,13 @@ def run_row(row: Row) -> Result:
     return Result(passed, failed, time.perf_counter() - start)
 
 
-def line_of(row: Row, result: Result) -> list[str]:
-    """A line of the table."""
+def line_of(row: Row, result: Result | None) -> list[str]:
+    """A line of the table; without a result it says that the row was not run in full."""
+    what = row.what + (f" Not tested: {row.missing}." if row.missing else "")
+    if result is None:
+        return [row.name, what, "not run in full", "", ""]
     holds = "yes" if result.passed and not result.failed and not row.missing else "**no**"
     tests = f"{result.passed}" + (f", {result.failed} failed" if result.failed else "")
-    what = row.what + (f" Not tested: {row.missing}." if row.missing else "")
     return [row.name, what, holds, tests, f"{result.seconds:,.0f} s"]
 
 
@@ -74,16 +77,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the rows, print each, and fill the page where all ran."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rows", nargs="+", choices=[row.name for row in ROWS], default=None)
-    chosen = parser.parse_args(arguments).rows
-    lines = []
+    parser.add_argument("--list", action="store_true", help="fill the page and run nothing")
+    options = parser.parse_args(arguments)
+    if options.list:
+        _publish([line_of(row, None) for row in ROWS])
+        return 0
+    chosen, lines = options.rows, []
     for row in ROWS:
         if chosen is None or row.name in chosen:
             lines.append(line_of(row, run_row(row)))
             print(" | ".join(lines[-1]), flush=True)
     if chosen is None:
-        heads = ["row", "what holds", "holds?", "tests", "time"]
-        fill(PAGE, "scoreboard", f"{machine('numpy', 'torch')}.\n\n{table(heads, lines)}")
+        _publish(lines)
     return int(any("no" in line[2] for line in lines))
+
+
+def _publish(lines: list[list[str]]) -> None:
+    heads = columns(["row", "what holds", "holds?"], ["tests", "time"])
+    about = f"{machine('numpy', 'torch')}.\n\n" if any(line[3] for line in lines) else ""
+    fill(PAGE, "scoreboard", about + markdown(plain_table(heads, lines)))
 
 
 if __name__ == "__main__":

@@ -28,7 +28,59 @@ _BATCH, _DAMAGE = "tests/envs/test_batch_", "tests/records/test_damage.py::test_
 _NEIGHBOURS = f"{_BATCH}env.py::test_threads_and_neighbours_change_no_byte"
 _FUZZ_SNAPSHOTS = "tests/envs/test_batch_snapshots.py::test_forged_snapshots_are_refused_or_go_on"
 
+_WAYS_OUT = "tests/train/test_ways_out.py::test_"
+
 ROWS: tuple[Row, ...] = (
+    Row(
+        "kill in save",
+        "Of 200 `kill -9`, half of them aimed at a save, none leaves an unreadable checkpoint.",
+        (
+            f"{_WAYS_OUT}two_hundred_kills",
+            f"{_WAYS_OUT}a_checkpoint_that_fails_half_way_leaves_nothing",
+        ),
+    ),
+    Row(
+        "exact resume",
+        "A run that was cut and goes on is the run that was not, by SHA-256, in every method.",
+        ("tests/train/test_resume.py", "tests/experiments/test_stopped_study.py"),
+        missing="compiled updates",
+    ),
+    Row(
+        "disk full",
+        "The old checkpoint loads; one line names the file.",
+        (
+            f"{_WAYS_OUT}a_full_disk_stops_no_training",
+            f"{_WAYS_OUT}a_disk_that_stays_full_ends_with_the_old_checkpoint",
+        ),
+        missing="50 offsets and a small file system; 4 offsets are tested",
+    ),
+    Row(
+        "interruption",
+        "SIGINT, SIGTERM and SIGHUP at 100 random times: codes 130, 143, 129, a checkpoint, and no "
+        "traceback.",
+        ("tests/cli/test_signals.py", "tests/train/test_interruption.py"),
+        missing="out within 2 s",
+    ),
+    Row(
+        "worker killed",
+        "A killed worker of a sweep is replaced.",
+        missing="there is no sweep yet",
+    ),
+    Row(
+        "non-finite loss",
+        "An update with a loss, gradient or weight that is not finite is not applied, and named.",
+        ("tests/learn/test_divergence.py",),
+    ),
+    Row(
+        "standard checkers",
+        "Those of PettingZoo, Gymnasium and TorchRL pass, with warnings as errors.",
+        (
+            "tests/envs/test_pettingzoo.py",
+            "tests/envs/test_gymnasium.py",
+            "tests/envs/test_vector.py",
+            "tests/envs/test_torchrl.py",
+        ),
+    ),
     Row(
         "truncated or flipped file",
         "1,000 cuts and 1,000 flipped bits of each file of a run give an error, never a run.",

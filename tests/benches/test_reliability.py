@@ -45,6 +45,7 @@ def test_a_row_with_a_failed_or_skipped_test_does_not_hold(tmp_path: Path) -> No
     assert line_of(Row("x", "."), all_)[2:4] == ["**no**", "1, 2 failed"]
     assert line_of(Row("x", ".", missing="it"), good)[1:3] == [". Not tested: it.", "**no**"]
     assert line_of(Row("x", "."), Result(0, 0, 1.0))[2] == "**no**"
+    assert line_of(Row("x", "."), None)[2:] == ["not run in full", "", ""]
 
 
 def test_chosen_rows_are_printed_and_leave_the_page(
