@@ -4,7 +4,7 @@ import re
 from importlib.util import find_spec
 from pathlib import Path
 
-from innerattn.config import Scenario, load_run_config
+from innerattn.config import Scenario, TrainConfig, load_run_config
 from innerattn.config.schedule import Ramp
 
 ROOT = Path(__file__).parents[1]
@@ -48,9 +48,11 @@ def test_the_examples_for_other_libraries_work() -> None:
 def test_what_is_said_of_a_runs_files_is_there(run_dir: Path) -> None:
     text = (ROOT / "docs" / "runs.md").read_text("utf-8")
     named = {name for line in text.splitlines() for name in re.findall(r"^\| `([^`]+)`", line)}
+    keys = {name for name in named if name.startswith("train.")}
+    assert keys <= {f"train.{key}" for key in TrainConfig.model_fields}
     found = {str(path.relative_to(run_dir)) for path in run_dir.rglob("*") if path.is_file()}
-    known = {re.sub(r"/\d+/", "/N/", name) for name in found} - {"checkpoints/latest"}
-    assert named == known
+    known = {re.sub(r"/(best-)?\d+([/.])", r"/\1N\2", name) for name in found}
+    assert named - keys == known - {"checkpoints/latest"}
 
 
 def test_the_configuration_in_the_scenario_reference_is_one(tmp_path: Path) -> None:

@@ -243,6 +243,8 @@ ADDED_SINCE = {
     "train": (
         *("episode_steps", "engine", "stagger_starts", "schedule"),
         *("potential", "potential_discount", "potential_env_steps"),
+        *("checkpoint_every_env_steps", "checkpoint_every_minutes", "keep_checkpoints"),
+        *("keep_best", "on_divergence"),
     ),
 }
 
