@@ -126,7 +126,11 @@ def test_ctrl_c_saves_every_run_and_leaves_no_process(
     path = tmp_path / "run"
     long = [*tiny, "--train.env-steps", "10000000"]
     assert main(["train", "--seeds", "0..2", "--run-dir", str(path), *long]) == 130
-    kept = [f"innerattn: what was learnt is kept in {path}-s{seed}" for seed in (0, 1)]
+    kept = [
+        f"innerattn: what was learnt is kept in {path}-s{seed}; go on with: "
+        f"innerattn train --resume {path}-s{seed}"
+        for seed in (0, 1)
+    ]
     assert capfd.readouterr().err.splitlines() == [*kept, "innerattn: interrupted"]
     assert processes() == []
     for seed in (0, 1):
