@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import trackio
 
 from innerattn.loggers.logger import Ending, Opened
+
+if TYPE_CHECKING:
+    from trackio.run import Run
 
 PROJECT = "innerattn"
 
@@ -27,7 +31,7 @@ def open_trackio(run: Opened) -> TrackioLogger:
 class TrackioLogger:
     """Sends numbers by env-steps."""
 
-    def __init__(self, run: trackio.Run) -> None:
+    def __init__(self, run: Run) -> None:
         self._run = run
 
     def log(self, env_steps: int, values: Mapping[str, float]) -> None:
