@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import trackio
 
@@ -32,7 +32,7 @@ class TrackioLogger:
     """Sends numbers by env-steps."""
 
     def __init__(self, run: Run) -> None:
-        self._run = run
+        self._run: Any = run  # its methods have no types
 
     def log(self, env_steps: int, values: Mapping[str, float]) -> None:
         """Send the numbers."""
