@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
+from innerattn import _core
 from innerattn.config import Fault, Scenario
 
-_MOST_NOISE = 10.0  # what a scenario takes, m and m/s
+_HEALTHY_AND_WORST = {
+    kind: (healthy, least if healthy == most else most)
+    for kind, _, least, most, healthy, _ in _core.FAULT_KINDS
+}
 
 
 def fault_of(
@@ -24,13 +26,9 @@ def fault_of(
         onset_step: the step at which it begins.
     """
     spec = scenario.robots[robot]
-    worst = {
-        "heading_bias": math.pi,
-        "position_noise": min(scenario.arena_half_width_m, _MOST_NOISE),
-        "velocity_noise": min(spec.max_speed_mps, _MOST_NOISE),
-    }
-    share_left = kind in ("motor_gain", "speed_limit")
-    value = 1.0 - severity if share_left else severity * worst.get(kind, 1.0)
+    healthy, worst = _HEALTHY_AND_WORST[kind]
+    here = {"position_noise": scenario.arena_half_width_m, "velocity_noise": spec.max_speed_mps}
+    value = healthy + severity * (min(worst, here.get(kind, worst)) - healthy)
     return Fault.model_validate(
         {"robot": spec.name, "kind": kind, "value": value, "onset_step": onset_step}
     )
