@@ -14,7 +14,7 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +33,10 @@ PLACES = {
     ("crossed", "short"): (DOCS / "crossed.md", ""),
 }
 """Where a report goes by its target and budget, and how the names of its figures begin."""
-TABLES: dict[tuple[str, str], tuple[Path, Mapping[str, tuple[str, ...]]]] = {
-    (target, budget): (DOCS / "learning.md", {part: (SCORES, ATTENTION)})
+Parts = Mapping[str, tuple[str, ...]]
+"""Headings of a report by the part of a page that the text below them makes."""
+TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
+    (target, budget): (DOCS / "learning.md", ({part: (SCORES, ATTENTION)},))
     for target, budget, part in (
         ("learning", "fast", "learning_fast"),
         ("learning", "quick", "learning_quick"),
@@ -45,17 +47,23 @@ TABLES: dict[tuple[str, str], tuple[Path, Mapping[str, tuple[str, ...]]]] = {
 } | {
     ("robustness", "short"): (
         DOCS / "robustness.md",
-        {
-            "deployment": (f"{robustness.RETENTION}: mixed",),
-            "recovery": (f"{robustness.RECOVERY}: mixed",),
-            "bounds": (f"{robustness.BOUNDS}: mixed",),
-            "attention": (f"{robustness.ATTENTION}: mixed",),
-            "training": (robustness.TRAINING,),
-            "redundancy": (robustness.TEAMS,),
-        },
+        (
+            {
+                "deployment": (f"{robustness.RETENTION}: mixed",),
+                "recovery": (f"{robustness.RECOVERY}: mixed",),
+                "bounds": (f"{robustness.BOUNDS}: mixed",),
+                "attention": (f"{robustness.ATTENTION}: mixed",),
+                "training": (robustness.TRAINING,),
+                "redundancy": (robustness.TEAMS,),
+            },
+            {"recovery_double": (f"{robustness.RECOVERY}: double",)},
+        ),
     )
 }
-"""By target and budget the page, and the headings of the report whose text makes each part."""
+"""By target and budget the page, and groups of its parts.
+
+A report has all parts of a group, or none where a study leaves out what the group is about.
+"""
 
 
 def main() -> None:
@@ -90,23 +98,28 @@ def report_name(target: str) -> str:
     return "report.md" if target == "all" else f"{target.replace('-', '_')}.md"
 
 
-def publish_tables(report: Path, page: Path, parts: Mapping[str, tuple[str, ...]]) -> None:
+def publish_tables(report: Path, page: Path, groups: Sequence[Parts]) -> None:
     """Put sections of a report into parts of a page, and its figure where the page shows it.
 
     Raises:
-        RunError: the page lacks a part, or the report the first section of one; nothing is
-            changed.
+        RunError: the page lacks a part, or the report the first section of one, other than all of
+            a group; nothing is changed.
     """
     found = _by_heading(report.read_text())
-    for part, headings in parts.items():
-        marked(page, part)
-        if headings[0] not in found:
-            raise RunError(f"{report}: has no section {headings[0]!r}; runs are missing")
-    for part, headings in parts.items():
-        fill(page, part, "\n\n".join(found[one] for one in headings if one in found))
-        figure = DOCS / "images" / f"{part}.png"
-        if report.with_suffix(".png").exists() and f"(images/{figure.name})" in page.read_text():
-            shutil.copyfile(report.with_suffix(".png"), figure)
+    there = [parts for parts in groups if any(first in found for first, *_ in parts.values())]
+    for parts in there or groups:
+        for part, headings in parts.items():
+            marked(page, part)
+            if headings[0] not in found:
+                raise RunError(f"{report}: has no section {headings[0]!r}; runs are missing")
+    for parts in there:
+        for part, headings in parts.items():
+            text = "\n\n".join(found[one] for one in headings if one in found)
+            fill(page, part, text)
+            figure = DOCS / "images" / f"{part}.png"
+            source = report.with_suffix(".png")
+            if source.exists() and f"(images/{figure.name})" in page.read_text():
+                shutil.copyfile(source, figure)
 
 
 def publish_report(report: Path, page: Path, figures: str) -> None:

@@ -21,8 +21,8 @@ LEARNING = ("learning", "short")
 
 
 def test_every_place_is_on_its_page() -> None:
-    for page, parts in publish.TABLES.values():
-        for part in parts:
+    for page, groups in publish.TABLES.values():
+        for part in (part for parts in groups for part in parts):
             marked(page, part)
     for page, _ in publish.PLACES.values():
         for part in ("summary", "details"):
@@ -41,9 +41,9 @@ def pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (docs / "images").mkdir(parents=True)
     shutil.copy(DOCS / "learning.md", docs)
     (docs / "images" / "learning_short.png").touch()
-    page, parts = publish.TABLES[LEARNING]
+    page, groups = publish.TABLES[LEARNING]
     monkeypatch.setattr(publish, "DOCS", docs)
-    monkeypatch.setitem(publish.TABLES, LEARNING, (docs / page.name, parts))
+    monkeypatch.setitem(publish.TABLES, LEARNING, (docs / page.name, groups))
     return docs
 
 
@@ -77,6 +77,21 @@ def test_a_report_without_its_tables_changes_nothing(pages: Path, tmp_path: Path
     with pytest.raises(RunError, match="has no section 'Scores'"):
         publish.publish_tables(report, *publish.TABLES[LEARNING])
     assert (pages / "learning.md").read_bytes() == before
+
+
+def test_a_report_may_lack_all_parts_of_a_group_and_not_some(tmp_path: Path) -> None:
+    page, report = tmp_path / "page.md", tmp_path / "report.md"
+    empty = "".join(f"<!-- {part}: begin -->\n\n<!-- {part}: end -->\n" for part in "abc")
+    groups = ({"a": ("One",), "b": ("Two",)}, {"c": ("Three",)})
+    page.write_text(empty)
+    report.write_text("# Report\n\n## Three\n\ntext of three\n")
+    publish.publish_tables(report, page, groups)
+    assert [marked(page, part)[1].strip() for part in "abc"] == ["", "", "text of three"]
+    page.write_text(empty)
+    report.write_text("# Report\n\n## Two\n\ntwo\n\n## Three\n\nthree\n")
+    with pytest.raises(RunError, match="has no section 'One'"):
+        publish.publish_tables(report, page, groups)
+    assert page.read_text() == empty
 
 
 @pytest.mark.parametrize(
