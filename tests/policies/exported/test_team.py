@@ -1,11 +1,13 @@
-"""Exported teams act as the contract says, whatever computes them, and altered folders are refused."""
+"""Exported teams act as the contract says, in both backends; altered folders are refused."""
 
 import hashlib
 import json
+import re
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.errors import ExportError, MissingLibraryError, ReadingError
 from innerattn.policies import Exported, PolicyInput
-from innerattn.policies.exported.contract import contract_text
+from innerattn.policies.exported.contract import Contract, contract_text
 
 BOTH = pytest.mark.parametrize("name", ["plain_export", "framed_export"])
 BODY = {"position": (0.1, 0.2), "velocity": (0.0, 0.0)}
@@ -185,9 +187,7 @@ def test_damaged_folders_are_refused_in_one_line(plain_export: Path, tmp_path: P
         assert "\n" not in str(caught.value)
 
 
-def test_later_versions_and_values_that_cannot_be_are_refused(
-    plain_export: Path, tmp_path: Path
-) -> None:
+def test_later_versions_and_values_that_cannot_be_are_refused(plain_export: Path) -> None:
     document = json.loads((plain_export / "contract.json").read_text())
     del document["sha256"]
     cases = [("version", 2), ("control_period_s", -1.0), ("damping", "much"), ("robots", [])]
@@ -221,3 +221,13 @@ def test_without_onnxruntime_numpy_is_taken(
     assert Exported(plain_export).backend == "numpy"
     with pytest.raises(MissingLibraryError, match=r"pip install 'innerattn\[deploy\]'"):
         Exported(plain_export, backend="onnxruntime")
+
+
+def test_the_example_on_the_page_about_deployment_works(plain_export: Path) -> None:
+    page = Path(__file__).parents[3] / "docs" / "deployment.md"
+    (example,) = re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), flags=re.DOTALL)
+    known: dict[str, Any] = {"folder": plain_export}
+    exec(compile(example, str(page), "exec"), known)
+    assert known["velocity"].shape == (2,)
+    keys = set(re.findall(r"`(\w+)`", page.read_text("utf-8")))
+    assert {field.name for field in fields(Contract)} - {"about"} <= keys
