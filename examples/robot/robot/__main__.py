@@ -34,6 +34,8 @@ def main() -> int:
             _show(drive(settings, link))
         else:
             _table(settings, skew_s, arguments.output)
+    except KeyboardInterrupt:
+        return 130
     except (InnerattnError, OSError, RuntimeError) as error:
         print(f"robot: error: {error}", file=sys.stderr)
         return 1

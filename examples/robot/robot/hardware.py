@@ -191,14 +191,17 @@ def _greeted(
 ) -> dict[str, tuple[Address, int]]:
     found: dict[str, tuple[Address, int]] = {}
     end = time.monotonic() + _START_S
-    while len(found) < len(names):
+    while not found.keys() >= set(names):
         if time.monotonic() > end or any(one.poll() is not None for one in processes):
             raise RuntimeError(f"only {len(found)} of {len(names)} robots' processes began")
         if not select.select([port], [], [], 0.2)[0]:
             continue
         data, address = port.recvfrom(4096)
-        message = json.loads(data)
-        found[message["robot"]] = (address, message["port"])
+        try:
+            message = json.loads(data)
+            found[message["robot"]] = (address, int(message["port"]))
+        except (ValueError, LookupError, TypeError):
+            continue  # somebody else's
     return {name: found[name] for name in names}
 
 

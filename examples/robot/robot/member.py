@@ -6,19 +6,22 @@ It gets an exported team, and knows nothing of the world but what its messages s
 from __future__ import annotations
 
 import json
+import os
 import random
 import select
+import signal
 import sys
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from innerattn.policies import Exported
+from innerattn.errors import ReadingError
+from innerattn.policies.exported import Exported
 from robot.link import LOOPBACK, Clock, LinkSettings, LossyLink, open_socket, pack, received
 
 LISTEN_SHARE = 0.3
 """Part of a control period that a robot listens to its teammates before it decides."""
-_MOST_SILENCE_S = 120.0
-"""After so long without hardware the process ends [s]."""
+_MOST_PATIENCE_S = 1.0
+"""So often a process that waits looks whether the hardware's process is still there [s]."""
 
 
 @dataclass(frozen=True)
@@ -60,14 +63,15 @@ class Member:
         self._decide_at = 0.0
 
     def run(self) -> int:
-        """Serve until the hardware says that it is over; the exit code."""
+        """Serve until the hardware says that it is over, or is gone; the exit code."""
+        parent = os.getppid()
         self._tell_hardware({"kind": "hello", "port": self._link.port})
         while True:
             ready, _, _ = select.select(
                 [self._hardware, self._link.socket], [], [], self._patience()
             )
-            if not ready and self._sensed is None and self._link.next_due is None:
-                print(f"{self._name}: no word from the hardware", file=sys.stderr)
+            if not ready and os.getppid() != parent:
+                print(f"{self._name}: the hardware is gone", file=sys.stderr)
                 return 1
             for message in received(self._hardware):
                 if message["kind"] == "end":
@@ -87,8 +91,8 @@ class Member:
         if self._sensed is not None:
             times.append(self._decide_at)
         if not times:
-            return _MOST_SILENCE_S
-        return self._clock.real(min(times) - self._clock.now())
+            return _MOST_PATIENCE_S
+        return min(_MOST_PATIENCE_S, self._clock.real(min(times) - self._clock.now()))
 
     def _take(self, message: dict[str, Any]) -> None:
         """What the hardware says: how to begin, or what the robot senses."""
@@ -111,16 +115,14 @@ class Member:
         self._link.send(told, self._peers, now)
 
     def _listen(self, message: dict[str, Any]) -> None:
-        """Keep the newest message of each teammate."""
-        name = message.get("robot")
+        """Keep the newest message of each teammate; drop what is none."""
+        name, episode, time = (message.get(key) for key in ("robot", "episode", "time"))
         if name not in self._team.robot_names or name == self._name:
             return
+        if not (isinstance(episode, int) and isinstance(time, float) and "body" in message):
+            return
         before = self._heard.get(name)
-        newer = before is None or (message["episode"], message["time"]) > (
-            before["episode"],
-            before["time"],
-        )
-        if newer:
+        if before is None or (episode, time) > (before["episode"], before["time"]):
             self._heard[name] = message
 
     def _decide(self, sensed: dict[str, Any]) -> None:
@@ -128,7 +130,7 @@ class Member:
         teammates = {
             name: {**one["body"], "time": one["time"]}
             for name, one in self._heard.items()
-            if one["episode"] == sensed["episode"]
+            if one["episode"] == sensed["episode"] and isinstance(one["body"], dict)
         }
         readings = {
             "now": now,
@@ -138,7 +140,11 @@ class Member:
             "teammates": teammates,
         }
         fresh = [one for one in teammates.values() if abs(now - one["time"]) <= self._max_age_s]
-        decision = self._team.decide(self._name, readings)
+        try:
+            decision = self._team.decide(self._name, readings)
+        except ReadingError as error:  # no command: the hardware gives no force then
+            print(f"{self._name}: {error}", file=sys.stderr)
+            return
         self._tell_hardware(
             {
                 "kind": "command",
@@ -153,4 +159,5 @@ class Member:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the hardware, which ends us
     sys.exit(Member(MemberSettings(**json.loads(sys.argv[1]))).run())

@@ -93,6 +93,8 @@ def test_a_velocity_command_is_what_the_world_does(plain_export: Path, seed: int
     env = BatchEnv(scenario, 16, seed=seed, num_threads=1)
     env.reset()
     rng = np.random.default_rng(seed)
+    apart = np.broadcast_to([(10.0 * robot, 0.0) for robot in range(4)], (16, 4, 2))
+    env.set_motion(apart, rng.uniform(-1.0, 1.0, (16, 4, 2)))
     for _ in range(3):
         before = env.velocities()
         actions = rng.integers(0, 5, (16, 4))

@@ -108,7 +108,7 @@ class Network:
 
     encoder: Literal["flat", "entities"]
     hidden_width: Annotated[int, Field(ge=1, le=4096)]
-    leaky_relu_slope: _Number
+    leaky_relu_slope: Annotated[float, Field(ge=0, lt=1)]
     entities: Entities | None
     frame: FrameColumns | None
 

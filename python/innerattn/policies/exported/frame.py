@@ -60,12 +60,16 @@ class Frame:
 
     def elements(self, rows: NDArray[np.float32]) -> NDArray[np.int64]:
         """The elements (B,) that bring observations (B, D) into their frames."""
+        if len(rows) == 1:  # a robot asks for one, and most often the first anchor decides
+            first_x, first_y = float(rows[0, self.x[0]]), float(rows[0, self.y[0]])
+            if first_x != 0.0 and first_y != 0.0 and abs(first_x) != abs(first_y):
+                swap = abs(first_x) < abs(first_y)
+                return np.array([(first_x < 0.0) + 2 * (first_y < 0.0) + 4 * swap])
         x, y = rows[:, self.x], rows[:, self.y]
         mirror_x, mirror_y = self._negative(x), self._negative(y)
         x = np.where(mirror_x[:, None], -x, x)
         y = np.where(mirror_y[:, None], -y, y)
-        found: NDArray[np.int64] = mirror_x + 2 * mirror_y + 4 * self._negative(x - y)
-        return found
+        return mirror_x + 2 * mirror_y + 4 * self._negative(x - y)
 
     def turn(self, rows: NDArray[np.float32], elements: NDArray[np.int64]) -> NDArray[np.float32]:
         """Observations (B, D) of worlds turned by elements (B,)."""
@@ -78,12 +82,11 @@ class Frame:
         self, logits: NDArray[np.float32], elements: NDArray[np.int64]
     ) -> NDArray[np.float32]:
         """Logits (B, A) of the world's actions from those in the frame."""
-        found: NDArray[np.float32] = np.take_along_axis(logits, self.forward[elements], axis=1)
-        return found
+        return np.asarray(logits[np.arange(len(logits))[:, None], self.forward[elements]])
 
     def _negative(self, values: NDArray[np.float32]) -> NDArray[np.int64]:
         """Whether the first of (B, K) values that is not zero is negative: 1 or 0."""
-        return (np.sign(values) @ self.importance < 0).astype(np.int64)
+        return np.asarray(np.sign(values) @ self.importance < 0, np.int64)
 
 
 def _turned(element: int, x: int, y: int) -> tuple[int, int]:

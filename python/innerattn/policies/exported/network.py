@@ -108,7 +108,8 @@ class NumpyActor:
         return outputs
 
     def _relu(self, values: Array) -> Array:
-        return np.where(values > 0, values, values * self._slope)
+        found: Array = np.maximum(values, values * self._slope)  # as the slope is below 1
+        return found
 
 
 def layer_shapes(network: Network, width: int, num_actions: int) -> dict[str, tuple[int, int]]:

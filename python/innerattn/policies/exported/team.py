@@ -175,9 +175,8 @@ class Exported:
     def _chosen(self, logits: NDArray[np.float32]) -> NDArray[np.int64]:
         """The likeliest, or drawn actions (...) of logits (..., A)."""
         if self.greedy:
-            return logits.argmax(axis=-1)
-        drawn: NDArray[np.int64] = (logits + self._draws.gumbel(size=logits.shape)).argmax(axis=-1)
-        return drawn
+            return np.asarray(logits.argmax(axis=-1))
+        return np.asarray((logits + self._draws.gumbel(size=logits.shape)).argmax(axis=-1))
 
     def _number(self, robot: str) -> int:
         try:
