@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, Literal, Protocol, get_args
 
@@ -96,7 +95,9 @@ def chosen_backend(backend: str | None) -> Backend:
 
 def _onnxruntime() -> Any:
     try:
-        return import_module("onnxruntime")
+        import onnxruntime
+
+        return onnxruntime
     except ModuleNotFoundError as error:
         missing: MissingLibraryError | None = missing_library("backend = 'onnxruntime'", error)
         if missing is None:

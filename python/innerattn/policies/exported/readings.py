@@ -51,7 +51,7 @@ class RowBuilder:
         self._most_position_m = 2.0 * contract.arena_half_width_m
         own = set(team[robot].abilities)
         self._needs = {
-            task.name: [1.0, *(float(task.needs.count(one)) for one in abilities)]
+            task.name: np.array([1, *(task.needs.count(one) for one in abilities)], np.float32)
             for task in contract.tasks
         }
         self._cannot_help = {task.name: own.isdisjoint(task.needs) for task in contract.tasks}
@@ -193,7 +193,8 @@ class RowBuilder:
     def _write_victims(
         self, victims: Any, own: NDArray[np.float32], row: NDArray[np.float32]
     ) -> None:
-        if not isinstance(victims, Sequence) or isinstance(victims, str | bytes):
+        listed = type(victims) is list or isinstance(victims, Sequence)
+        if not listed or isinstance(victims, str | bytes):
             raise ReadingError("victims", f"is {type(victims).__name__}: must be a list")
         if len(victims) > self._slots:
             raise ReadingError(
@@ -241,13 +242,13 @@ def _given(readings: Mapping[str, Any], key: str, place: str = "") -> Any:
 
 
 def _mapping(value: Any, place: str) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
+    if type(value) is not dict and not isinstance(value, Mapping):
         raise ReadingError(place, f"is {type(value).__name__}: must be a mapping of names")
     return value
 
 
 def _refuse_unknown(found: Mapping[str, Any], known: frozenset[str], place: str) -> None:
-    if not isinstance(found, Mapping):
+    if type(found) is not dict and not isinstance(found, Mapping):
         raise ReadingError(place or "readings", f"is {type(found).__name__}: must be a mapping")
     if not found.keys() <= known:
         name = next(key for key in found if key not in known)
@@ -263,6 +264,8 @@ def _pair(body: Mapping[str, Any], key: str, place: str, most: float) -> tuple[f
         x, y = value
     except (TypeError, ValueError):
         _refuse_pair(value, f"{place}.{key}")
+    if type(x) is float and type(y) is float and abs(x) <= most and abs(y) <= most:
+        return x, y
     return _number(x, f"{place}.{key}.x", most), _number(y, f"{place}.{key}.y", most)
 
 
