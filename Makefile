@@ -13,10 +13,15 @@ export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train test test-pool test-slow reliability soak lint format bench lock docs dist smoke setup clean
+.PHONY: train robot test test-pool test-slow reliability soak lint format bench lock docs dist smoke setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
+
+robot: setup ## export a trained team, and let four processes drive it, one for each robot
+	@test -e runs/robot || innerattn train $(TRAIN) --run-dir runs/robot
+	@test -e runs/robot/export || innerattn export runs/robot
+	@PYTHONPATH=examples/robot python -m robot run runs/robot/export
 
 test: setup lint ## every check but the long one
 	cargo test --quiet --locked

@@ -33,10 +33,30 @@ class RunError(InnerattnError):
     """A run folder is missing, foreign, damaged, or already there."""
 
 
+class ExportError(InnerattnError):
+    """The folder of an exported team is missing, damaged, already there, or cannot be made."""
+
+
+class ReadingError(InnerattnError, ValueError):
+    """A robot's readings are not what its policy can act on."""
+
+    def __init__(self, field: str, reason: str) -> None:
+        super().__init__(f"{field}: {reason}")
+        self.field = field
+        """What is wrong, such as ``teammates.food_1.position``."""
+
+
+class StaleReadingError(ReadingError):
+    """A reading is older, or further in the future, than is allowed."""
+
+
 EXTRA_OF = {
     "gymnasium": "gym",
     "imageio_ffmpeg": "report",
     "matplotlib": "report",
+    "onnx": "deploy",
+    "onnxruntime": "deploy",
+    "onnxscript": "deploy",
     "pettingzoo": "gym",
     "plotly": "report",
     "rich": "train",

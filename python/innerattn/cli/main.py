@@ -17,6 +17,7 @@ from typing import Annotated, Any
 import tyro
 
 from innerattn.cli.evaluate import Evaluate
+from innerattn.cli.export import Export
 from innerattn.cli.info import Info
 from innerattn.cli.options import UsageError
 from innerattn.cli.play import Play
@@ -107,6 +108,7 @@ def _parse(argv: list[str]) -> Any:
         | Annotated[Play, tyro.conf.subcommand("play")]
         | Annotated[Robustness, tyro.conf.subcommand("robustness")]
         | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+        | Annotated[Export, tyro.conf.subcommand("export")]
         | Annotated[Info, tyro.conf.subcommand("info")]
     )
     return tyro.cli(commands, args=argv, prog="innerattn", description=_DESCRIPTION)

@@ -1,0 +1,54 @@
+"""`innerattn export`: a trained team as ONNX files and a contract, for robots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from innerattn.cli.options import Command
+
+
+@dataclass(kw_only=True)
+class Export(Command):
+    """Export a trained team for robots: ONNX files, weights for numpy, and a contract."""
+
+    run_folder: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN")]
+    """A run's folder."""
+    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    """Folder to make; None: export in the run's folder."""
+
+    def run(self) -> int:
+        """Export, check, print.
+
+        Returns:
+            The exit code, 0.
+
+        Raises:
+            InnerattnError: no such run, no weights, a folder that is already there, a library that
+                is missing, or an exported policy that differs from the trained one.
+            OSError: a file cannot be written.
+        """
+        from innerattn.train.export import export_run
+
+        folder, contract = export_run(self.run_folder, self.output)
+        checked = contract.checked
+        assert checked is not None  # as export_run always checks
+        robots, actors = len(contract.robots), len(contract.actors)
+        size = sum(entry.bytes for entry in contract.files.values()) / 1e6
+        frame = "as the world is" if contract.network.frame is None else "canonical, in the files"
+        print(f"{folder}: {robots} robots, {actors} ONNX files, {size:.1f} MB")
+        print(f"observation: {len(contract.observation)} columns; frame: {frame}")
+        print(f"control period: {contract.control_period_s:g} s")
+        ties = f", {checked.near_ties:,} near ties" if checked.near_ties else ""
+        print(
+            f"checked on {checked.observations:,} played observations: same greedy action in "
+            f"{checked.same_greedy_action:,}{ties}"
+        )
+        print(
+            f"largest difference: {checked.largest_difference_onnx:.1e} in onnxruntime, "
+            f"{checked.largest_difference_numpy:.1e} in numpy"
+        )
+        return 0

@@ -1,0 +1,109 @@
+"""What computes a policy: numpy, or onnxruntime on one thread."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import Any, Literal, Protocol, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.errors import ExportError, MissingLibraryError, missing_library
+
+Backend = Literal["onnxruntime", "numpy"]
+INPUT, LOGITS, PROBABILITIES = "observation", "logits", "probabilities"
+"""Names of the input and the outputs of an ONNX file."""
+
+
+class Actor(Protocol):
+    """A robot's policy."""
+
+    def logits(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Map observations (B, D) float32 to logits (B, A) float32 of the world's actions."""
+
+
+class OnnxActor:
+    """An ONNX file in onnxruntime."""
+
+    def __init__(self, data: bytes, name: str, width: int, num_actions: int, mark: str) -> None:
+        """Load a file.
+
+        Args:
+            data: the file.
+            name: what to call it in messages.
+            width: D.
+            num_actions: A.
+            mark: what the file must say of itself, as of `onnx_mark`.
+
+        Raises:
+            ExportError: the file cannot be loaded, or belongs to another team.
+            MissingLibraryError: onnxruntime is not installed.
+        """
+        runtime = _onnxruntime()
+        options = runtime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 4
+        try:
+            session = runtime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+        except Exception as error:  # onnxruntime has no common base of its errors
+            raise ExportError(
+                f"{name}: onnxruntime cannot load it ({_first_line(error)})"
+            ) from error
+        said = session.get_modelmeta().custom_metadata_map.get(MARK)
+        if said != mark:
+            raise ExportError(f"{name}: is not of this team and robot: it says {said!r}")
+        shapes = [
+            [one.name, *one.shape[1:]] for one in (*session.get_inputs(), *session.get_outputs())
+        ]
+        expected = [[INPUT, width], [LOGITS, num_actions], [PROBABILITIES, num_actions]]
+        if shapes != expected:
+            raise ExportError(f"{name}: has {shapes}, must have {expected}")
+        self._session: Any = session
+
+    def logits(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+        """See `Actor.logits`."""
+        (found,) = self._session.run([LOGITS], {INPUT: rows})
+        return np.asarray(found)
+
+
+MARK = "innerattn.actor"
+"""Key of the mark in an ONNX file's metadata."""
+
+
+def onnx_mark(weights_sha256: str, scenario_sha256: str, actor: str) -> str:
+    """What an ONNX file says of itself: of which weights, worlds and actor it is."""
+    return f"{weights_sha256} {scenario_sha256} {actor}"
+
+
+def chosen_backend(backend: str | None) -> Backend:
+    """The backend asked for; onnxruntime where it is installed if none is.
+
+    Raises:
+        ValueError: there is no such backend.
+        MissingLibraryError: onnxruntime is asked for and not installed.
+    """
+    if backend is None:
+        return "onnxruntime" if find_spec("onnxruntime") is not None else "numpy"
+    if backend not in get_args(Backend):
+        known = " or ".join(repr(one) for one in get_args(Backend))
+        raise ValueError(f"backend = {backend!r}: must be {known}, or None for what is installed")
+    if backend == "onnxruntime":
+        _onnxruntime()
+        return "onnxruntime"
+    return "numpy"
+
+
+def _onnxruntime() -> Any:
+    try:
+        import onnxruntime
+
+        return onnxruntime
+    except ModuleNotFoundError as error:
+        missing: MissingLibraryError | None = missing_library("backend = 'onnxruntime'", error)
+        if missing is None:
+            raise
+        raise missing from error
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().split("\n")[0]

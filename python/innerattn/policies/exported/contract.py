@@ -1,0 +1,252 @@
+"""What the file ``contract.json`` of an exported team says, as checked plain data."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, StringConstraints, TypeAdapter, ValidationError
+
+from innerattn.config.untrusted import parse_json
+
+FORMAT = "innerattn.export"
+VERSION = 1
+NAME = "contract.json"
+WEIGHTS = "weights.safetensors"
+
+_Sha256 = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
+_Name = Annotated[str, StringConstraints(pattern="^[A-Za-z0-9_-]{1,200}$")]
+_File = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,200}\.(onnx|safetensors)$")]
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Share = Annotated[float, Field(ge=0, le=1)]
+_Number = Annotated[float, Field(allow_inf_nan=False)]
+_Index = Annotated[int, Field(ge=0, lt=2**20)]
+_STRICT = ConfigDict(extra="forbid", strict=True)
+
+
+@dataclass(frozen=True)
+class Column:
+    """One number of an observation: its name, unit, frame, and what a robot takes it from."""
+
+    __pydantic_config__ = _STRICT
+
+    name: str
+    unit: str
+    frame: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Action:
+    """One action: its number, and the force [share of full force, x and y of the world]."""
+
+    __pydantic_config__ = _STRICT
+
+    number: _Index
+    name: str
+    force: tuple[_Number, _Number]
+
+
+@dataclass(frozen=True)
+class Member:
+    """One robot of the team, and which actor is its policy."""
+
+    __pydantic_config__ = _STRICT
+
+    name: _Name
+    kind: _Name
+    abilities: tuple[str, ...]
+    max_speed_mps: _Positive
+    mass_kg: _Positive
+    radius_m: _Positive
+    drive_force_n: Annotated[float, Field(ge=0, allow_inf_nan=False)]
+    actor: _Name
+
+
+@dataclass(frozen=True)
+class NeededAbilities:
+    """One kind of victim: the abilities that it needs, each from a robot of its own."""
+
+    __pydantic_config__ = _STRICT
+
+    name: str
+    needs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Entities:
+    """Whose columns are whose: those of the robot, of each teammate, of each victim."""
+
+    __pydantic_config__ = _STRICT
+
+    own: _Index
+    teammates: _Index
+    teammate: _Index
+    victims: _Index
+    victim: _Index
+    present: _Index
+
+
+@dataclass(frozen=True)
+class FrameColumns:
+    """Columns that turn: pairs (x, y), those that change sign in a mirror, those that choose."""
+
+    __pydantic_config__ = _STRICT
+
+    vectors: tuple[tuple[_Index, _Index], ...]
+    handed: tuple[_Index, ...]
+    anchors: Annotated[tuple[tuple[_Index, _Index], ...], Field(min_length=1)]
+
+
+@dataclass(frozen=True)
+class Network:
+    """How the numbers of `weights.safetensors` make a policy."""
+
+    __pydantic_config__ = _STRICT
+
+    encoder: Literal["flat", "entities"]
+    hidden_width: Annotated[int, Field(ge=1, le=4096)]
+    leaky_relu_slope: Annotated[float, Field(ge=0, lt=1)]
+    entities: Entities | None
+    frame: FrameColumns | None
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What the check at the export found."""
+
+    __pydantic_config__ = _STRICT
+
+    observations: _Index
+    same_greedy_action: Annotated[int, Field(ge=0)]
+    near_ties: Annotated[int, Field(ge=0)]
+    largest_difference_onnx: _Number
+    largest_difference_numpy: _Number
+
+
+@dataclass(frozen=True)
+class FileEntry:
+    """A file of the folder: its SHA-256 and size."""
+
+    __pydantic_config__ = _STRICT
+
+    sha256: _Sha256
+    bytes: Annotated[int, Field(ge=0, lt=2**40)]
+
+
+@dataclass(frozen=True)
+class Contract:
+    """The contents of ``contract.json``, but for its own digest.
+
+    Attributes:
+        format: `FORMAT`.
+        version: `VERSION`.
+        about: rules in sentences, by subject.
+        made_with: versions of libraries.
+        run: where the team comes from: method, seed, env_steps, digests.
+        scenario: all keys of the worlds that it was trained for.
+        scenario_sha256: that of the scenario as JSON with sorted keys, without spaces.
+        control_period_s: from one action to the next [s].
+        damping: share of the velocity that is lost in a control period.
+        arena_half_width_m: half the side of the arena [m].
+        victim_order: as in the scenario.
+        victim_slots: most victims that an observation holds.
+        observe_faults: whether the columns of faults are there.
+        max_age_s: how old a reading may be, if nothing else is asked for [s].
+        greedy_actions: whether the likeliest action is to be taken, instead of a drawn one.
+        abilities: all of them, in the order of columns.
+        tasks: kinds of victims.
+        robots: the team, in the order of the worlds.
+        observation: the columns.
+        actions: the actions.
+        network: what numpy needs.
+        actors: the ONNX file of each actor.
+        weights_sha256: that of the tensors of `weights.safetensors`: names, types, shapes, bytes.
+        files: all other files of the folder.
+        checked: what the check found.
+    """
+
+    __pydantic_config__ = _STRICT
+
+    format: Literal["innerattn.export"]
+    version: Literal[1]
+    about: dict[str, str]
+    made_with: dict[str, str]
+    run: dict[str, str | int | None]
+    scenario: dict[str, Any]
+    scenario_sha256: _Sha256
+    control_period_s: _Positive
+    damping: _Share
+    arena_half_width_m: _Positive
+    victim_order: Literal["relevant", "slot"]
+    victim_slots: _Index
+    observe_faults: bool
+    max_age_s: _Positive
+    greedy_actions: bool
+    abilities: tuple[str, ...]
+    tasks: tuple[NeededAbilities, ...]
+    robots: Annotated[tuple[Member, ...], Field(min_length=1, max_length=64)]
+    observation: Annotated[tuple[Column, ...], Field(min_length=1)]
+    actions: Annotated[tuple[Action, ...], Field(min_length=1)]
+    network: Network
+    actors: dict[_Name, _File]
+    weights_sha256: _Sha256
+    files: dict[_File, FileEntry]
+    checked: Checked | None
+
+
+_CHECK = TypeAdapter(Contract)
+
+
+def digest_of(document: Any) -> str:
+    """SHA-256, in hexadecimal, of a document as JSON with sorted keys and without spaces."""
+    text = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def contract_text(document: dict[str, Any]) -> bytes:
+    """The bytes of a contract.
+
+    Args:
+        document: the values of `Contract` as JSON.
+
+    Raises:
+        ValueError: the document is no contract.
+    """
+    _checked(document)
+    sealed = {**document, "sha256": digest_of(document)}
+    return (json.dumps(sealed, indent=1, allow_nan=False) + "\n").encode()
+
+
+def contract_in(data: bytes) -> Contract:
+    """What the bytes of a contract say.
+
+    Raises:
+        ValueError: they are damaged, altered, of another version, or say what cannot be.
+    """
+    document = parse_json(data)
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise ValueError("not the contract of an exported team")
+    if document.get("version") != VERSION:
+        raise ValueError(f"version {document.get('version')!r}, only {VERSION} is known")
+    if document.pop("sha256", None) != digest_of(document):
+        raise ValueError("does not fit its own digest; it was altered")
+    return _checked(document)
+
+
+def _checked(document: dict[str, Any]) -> Contract:
+    try:
+        contract = _CHECK.validate_json(json.dumps(document))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise ValueError(f"{place}: {first['msg']}") from error
+    if digest_of(contract.scenario) != contract.scenario_sha256:
+        raise ValueError("scenario_sha256: is not that of the scenario beside it")
+    if missing := {WEIGHTS, *contract.actors.values()} - contract.files.keys():
+        raise ValueError(f"files: {min(missing)} is missing")
+    if unknown := {robot.actor for robot in contract.robots} - contract.actors.keys():
+        raise ValueError(f"actors: {min(unknown)} is missing")
+    return contract

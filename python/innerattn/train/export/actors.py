@@ -1,0 +1,138 @@
+"""The actors of a learner, one by one, as networks that ONNX and numpy can hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from innerattn.config import RunConfig
+from innerattn.errors import ExportError
+from innerattn.learn.framed import FramedLearner
+from innerattn.learn.types import Learner
+from innerattn.nn import Actor, EntityColumns, PerRobotLinear
+from innerattn.policies.exported.frame import Frame
+
+
+@dataclass(frozen=True)
+class TeamActors:
+    """The policies of a team.
+
+    Attributes:
+        of_robot: name of the actor of each robot.
+        actors: for each name, the policy of one robot, R = 1, float32 on the CPU.
+    """
+
+    of_robot: tuple[str, ...]
+    actors: dict[str, Actor]
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Weights (out, in) and biases (out,) by ``ACTOR.LAYER.weight`` and ``.bias``."""
+        found = {}
+        for name, actor in self.actors.items():
+            for layer, linear in _layers(actor).items():
+                found[f"{name}.{layer}.weight"] = linear.weight.detach()[0].clone()
+                found[f"{name}.{layer}.bias"] = linear.bias.detach()[0].clone()
+        return found
+
+
+def inner_actor(learner: Learner, run: Path) -> Actor:
+    """The policies of all robots inside a learner.
+
+    Raises:
+        ExportError: the learner has others than those of this package.
+    """
+    inside = learner.learner if isinstance(learner, FramedLearner) else learner
+    actor = getattr(inside, "actor", None)
+    if type(actor) is not Actor:
+        raise ExportError(
+            f"{run}: its policy is a {type(actor).__name__}: must be an innerattn.nn.Actor, as of "
+            "the methods td-*, ppo-* and mappo"
+        )
+    return actor
+
+
+def team_actors(config: RunConfig, actor: Actor, entities: EntityColumns | None) -> TeamActors:
+    """Take the policies of all robots apart: one for each robot, or for each kind that shares one.
+
+    Args:
+        config: the run.
+        actor: the policies of all robots.
+        entities: the columns that the actor encodes separately; None: it takes the whole row.
+    """
+    robots = config.scenario.robots
+    shared = config.network.parameter_sharing == "kind"
+    of_robot = tuple(robot.kind if shared else robot.name for robot in robots)
+    actors = {}
+    for name in dict.fromkeys(of_robot):
+        actors[name] = _of_robot(actor, of_robot.index(name), entities)
+    return TeamActors(of_robot, actors)
+
+
+def _of_robot(actor: Actor, robot: int, entities: EntityColumns | None) -> Actor:
+    num_actions, hidden_width = actor.output.weight.shape[1:]
+    first = actor.first
+    obs_width = first.weight.shape[2] if isinstance(first, PerRobotLinear) else 1
+    one = Actor(1, obs_width, num_actions, hidden_width, torch.Generator(), entities)
+    theirs = _layers(actor)
+    with torch.no_grad():
+        for name, layer in _layers(one).items():
+            layer.weight.copy_(theirs[name].weight[robot : robot + 1])
+            layer.bias.copy_(theirs[name].bias[robot : robot + 1])
+    return one
+
+
+def _layers(actor: Actor) -> dict[str, PerRobotLinear]:
+    """The linear layers by name; shared ones are those of all robots, too."""
+    found = actor.named_modules()
+    return {name: layer for name, layer in found if isinstance(layer, PerRobotLinear)}
+
+
+class OnnxForm(nn.Module):
+    """One robot's policy from the row in the frame of the world to the actions of the world."""
+
+    def __init__(self, actor: Actor, frame: Frame | None) -> None:
+        """Put the frame around the actor, if there is one."""
+        super().__init__()
+        self.actor = actor
+        self.framed = frame is not None
+        if frame is not None:
+            self.signs = _table(frame.signs)
+            self.swapped = _table(frame.swapped)
+            self.actions = _table(frame.forward)
+            self.x, self.y = _table(frame.x), _table(frame.y)
+            self.importance = _table(frame.importance)
+
+    def forward(self, observation: Tensor) -> tuple[Tensor, Tensor]:
+        """Map observations (B, D) to logits (B, A) and probabilities (B, A)."""
+        if not self.framed:
+            logits = self._logits(observation)
+        else:
+            element = self._element(observation)
+            turned = observation * self.signs[element]
+            swapped = turned.index_select(1, self.swapped)
+            turned = torch.where((element >= 4).unsqueeze(1), swapped, turned)
+            logits = self._logits(turned).gather(1, self.actions[element])
+        return logits, logits.softmax(dim=1)
+
+    def _logits(self, rows: Tensor) -> Tensor:
+        logits: Tensor = self.actor(rows.unsqueeze(0))
+        return logits[0].t()
+
+    def _element(self, rows: Tensor) -> Tensor:
+        x, y = rows.index_select(1, self.x), rows.index_select(1, self.y)
+        mirror_x, mirror_y = self._negative(x), self._negative(y)
+        x = torch.where(mirror_x.unsqueeze(1), -x, x)
+        y = torch.where(mirror_y.unsqueeze(1), -y, y)
+        return mirror_x.long() + 2 * mirror_y.long() + 4 * self._negative(x - y).long()
+
+    def _negative(self, values: Tensor) -> Tensor:
+        return values.sign().double() @ self.importance < 0
+
+
+def _table(values: NDArray[Any]) -> nn.Buffer:
+    return nn.Buffer(torch.from_numpy(values.copy()))

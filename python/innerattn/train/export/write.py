@@ -1,0 +1,131 @@
+"""Writes the folder of an exported team, whole or not at all, once it is checked."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from contextlib import closing
+from dataclasses import asdict
+from importlib.util import find_spec
+from pathlib import Path
+
+from innerattn.config import RunConfig
+from innerattn.config.files import sync_folder, write_whole
+from innerattn.envs import BatchEnv
+from innerattn.errors import ExportError, MissingLibraryError, missing_library
+from innerattn.learn.types import Learner
+from innerattn.policies.exported.backend import onnx_mark
+from innerattn.policies.exported.contract import (
+    NAME,
+    WEIGHTS,
+    Contract,
+    contract_in,
+    contract_text,
+    digest_of,
+)
+from innerattn.policies.exported.frame import Frame
+from innerattn.policies.exported.team import Exported
+from innerattn.records.run_files import RunFiles, amend
+from innerattn.train.columns import entity_columns
+from innerattn.train.export.actors import OnnxForm, inner_actor, team_actors
+from innerattn.train.export.check import check_export
+from innerattn.train.export.document import PUSHES, contract_document, network_of
+from innerattn.train.export.onnx_file import onnx_bytes
+from innerattn.train.policy import load_newest
+from innerattn.train.weights import write_weights
+
+FORMAT = "innerattn.actors"
+_LIBRARIES = ("onnx", "onnxscript", "onnxruntime")
+
+
+def needed_libraries() -> None:
+    """Refuse in time to export where a library is missing.
+
+    Raises:
+        MissingLibraryError: one is; the message says how to install it.
+    """
+    for name in _LIBRARIES:
+        if find_spec(name) is None:
+            error = ModuleNotFoundError(name=name)
+            missing: MissingLibraryError | None = missing_library("innerattn export", error)
+            assert missing is not None
+            raise missing
+
+
+def export_run(run: str | Path, out: str | Path | None = None) -> tuple[Path, Contract]:
+    """Export the newest policy of a run, and check it on observations that it plays.
+
+    Args:
+        run: the run folder.
+        out: the folder to make; None: ``export`` in the run folder.
+
+    Returns:
+        The folder, and its contract.
+
+    Raises:
+        MissingLibraryError: a library of the extra ``deploy`` is not installed.
+        ExportError: the folder is already there or cannot be made, the run's policy is not one of
+            this package, or the exported one differs from it.
+        RunError, ConfigError: there is no readable run, or it holds no weights.
+        OSError: a file cannot be written.
+    """
+    needed_libraries()
+    source = Path(run)
+    target = source / "export" if out is None else Path(out)
+    if os.path.lexists(target):
+        raise ExportError(f"{target}: is already there; -o names another folder")
+    newest = load_newest(source)
+    if not target.parent.is_dir():
+        raise ExportError(f"{target.parent}: no such folder")
+    partial = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(8)}")
+    partial.mkdir()
+    try:
+        contract = _write(source, newest.config, newest.learner, newest.env_steps, partial)
+        os.rename(partial, target)
+    except BaseException:
+        shutil.rmtree(partial, ignore_errors=True)
+        raise
+    sync_folder(target.parent)
+    if target.resolve().is_relative_to(source.resolve()):
+        amend(source, target.resolve().relative_to(source.resolve()).as_posix())
+    return target, contract
+
+
+def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: Path) -> Contract:
+    """Fill a folder, and check what is in it."""
+    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
+        names = env.observation_names()
+    entities = entity_columns(names) if config.network.encoder == "entities" else None
+    actor = inner_actor(learner, run)
+    team = team_actors(config, actor, entities)
+    weights_sha256 = write_weights(out / WEIGHTS, team.tensors(), FORMAT)
+    files = {name: f"{name}.onnx" for name in team.actors}
+    network = network_of(config, names, entities)
+    frame = None if network.frame is None else Frame(network.frame, len(names), PUSHES)
+    scenario_sha256 = digest_of(config.scenario.model_dump(mode="json"))
+    for name, one in team.actors.items():
+        mark = onnx_mark(weights_sha256, scenario_sha256, name)
+        write_whole(out / files[name], onnx_bytes(OnnxForm(one, frame), len(names), mark))
+    document = contract_document(
+        config,
+        names,
+        network,
+        of_robot=team.of_robot,
+        actors=files,
+        weights_sha256=weights_sha256,
+        run={
+            "method": config.train.method,
+            "seed": config.train.seed,
+            "env_steps": env_steps,
+            "config_sha256": config.digest(),
+            "weights_sha256": RunFiles(run).info.weights_sha256,
+        },
+        files={name: (out / name).read_bytes() for name in (WEIGHTS, *files.values())},
+    )
+    write_whole(out / NAME, contract_text(document))
+    onnx, plain = Exported(out, backend="onnxruntime"), Exported(out, backend="numpy")
+    checked = check_export(config, learner, actor, onnx, plain)
+    data = contract_text({**document, "checked": asdict(checked)})
+    write_whole(out / NAME, data)
+    return contract_in(data)

@@ -1,0 +1,144 @@
+"""What `innerattn export` writes, how it checks that, and what it refuses."""
+
+import json
+from contextlib import closing
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+import torch
+from fresh_run import make_run, run_config
+from made_export import FRAMED, made_export
+
+from innerattn.envs import BatchEnv
+from innerattn.errors import ExportError, RunError
+from innerattn.policies import Exported, PolicyInput
+from innerattn.records.run_files import RunFiles
+from innerattn.train import load_policy
+from innerattn.train.export import export_run
+from innerattn.train.export.actors import inner_actor
+from innerattn.train.export.check import check_export
+
+Made = tuple[Path, Path]
+
+
+@pytest.fixture(scope="module")
+def framed(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """PPO in canonical frames, parameters shared by kind, entities encoded one by one."""
+    return made_export(tmp_path_factory.mktemp("framed"), "ppo-inner", **FRAMED)
+
+
+@pytest.fixture(scope="module")
+def central(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """Flat MAPPO in canonical frames, one actor for each robot."""
+    values = {"network.symmetry": "canonical"}
+    return made_export(tmp_path_factory.mktemp("central"), "mappo", **values)
+
+
+@pytest.mark.parametrize("made", ["framed", "central"])
+def test_an_exported_team_plays_as_the_trained_one(
+    request: pytest.FixtureRequest, made: str
+) -> None:
+    run, folder = request.getfixturevalue(made)
+    config, learner = load_policy(run)
+    teams = [Exported(folder, backend=one, greedy=True) for one in ("numpy", "onnxruntime")]
+    with closing(BatchEnv(config.scenario, 64, seed=9, num_threads=1)) as env:
+        obs = env.reset()
+        taken = []
+        for _ in range(30):
+            actions = learner.act(torch.tensor(obs), greedy=True).numpy()
+            for team in teams:
+                np.testing.assert_array_equal(team.act(PolicyInput(obs)), actions)
+            taken.append(actions)
+            obs = env.step(actions).obs
+    assert len(np.unique(taken)) > 2
+
+
+def test_the_contract_says_what_was_trained(framed: Made) -> None:
+    run, folder = framed
+    contract = Exported(folder, backend="numpy").contract
+    config, _ = load_policy(run)
+    with closing(BatchEnv(config.scenario, 1)) as env:
+        assert [column.name for column in contract.observation] == env.observation_names()
+    assert set(contract.actors) == {"food", "navigation", "medical"}
+    assert [robot.actor for robot in contract.robots] == ["food", "food", "navigation", "medical"]
+    assert contract.network.frame is not None
+    assert contract.run["weights_sha256"] == RunFiles(run).info.weights_sha256
+    assert contract.run["method"] == "ppo-inner"
+    assert contract.checked is not None
+    assert contract.checked.observations >= 10_000
+    assert contract.checked.same_greedy_action == contract.checked.observations
+    assert contract.checked.largest_difference_onnx < 1e-5
+    units = {column.name: (column.unit, column.frame) for column in contract.observation}
+    assert units["own.velocity.x"] == ("m/s", "world")
+    assert units["victim_0.relative_position.y"] == ("m", "world axes, relative to the robot")
+    assert units["teammate_2.ability.food"] == ("1", "none")
+
+
+def test_files_are_those_of_the_contract_and_tell_nothing_of_the_machine(framed: Made) -> None:
+    _, folder = framed
+    document = json.loads((folder / "contract.json").read_text())
+    found = {path.name for path in folder.iterdir()}
+    assert found == {*document["files"], "contract.json"}
+    for name, entry in document["files"].items():
+        data = (folder / name).read_bytes()
+        assert sha256(data).hexdigest() == entry["sha256"]
+        assert str(Path.home()).encode() not in data
+        assert b".py" not in data
+    for name in document["actors"].values():
+        onnx.checker.check_model(onnx.load(folder / name), full_check=True)
+
+
+def test_what_differs_is_refused(framed: Made) -> None:
+    """The check compares with the learner, not with the export itself."""
+    run, folder = framed
+    config, learner = load_policy(run)
+    actor = inner_actor(learner, run)
+    teams = [Exported(folder, backend=one) for one in ("onnxruntime", "numpy")]
+    with torch.no_grad():
+        dict(actor.named_parameters())["output.parametrizations.bias.original"][1, 2] += 0.001
+    with pytest.raises(ExportError, match=r"navigation_0: the exported policy \(onnxruntime\) dif"):
+        check_export(config, learner, actor, *teams)
+
+
+def test_a_folder_that_is_there_is_left_alone(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", run_config("td-inner"))
+    for name in ("folder", "file"):
+        target = tmp_path / name
+        target.mkdir() if name == "folder" else target.write_text("mine")
+        with pytest.raises(ExportError, match=f"{name}: is already there"):
+            export_run(run, target)
+    with pytest.raises(ExportError, match="no such folder"):
+        export_run(run, tmp_path / "none" / "export")
+    assert (tmp_path / "file").read_text() == "mine"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder", "run"]
+
+
+def test_what_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = make_run(tmp_path / "run", run_config("td-inner"))
+
+    def fail(*_: object) -> None:
+        raise ExportError("differs")
+
+    monkeypatch.setattr("innerattn.train.export.write.onnx_bytes", fail)
+    with pytest.raises(ExportError, match="differs"):
+        export_run(run, tmp_path / "export")
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_policies_of_other_kinds_are_refused(tmp_path: Path) -> None:
+    _, learner = load_policy(make_run(tmp_path / "run", run_config("td-inner")))
+    learner.actor = torch.nn.Linear(1, 1)  # type: ignore[attr-defined]
+    with pytest.raises(ExportError, match="its policy is a Linear: must be an innerattn"):
+        inner_actor(learner, tmp_path / "run")
+
+
+def test_a_run_without_weights_is_refused(tmp_path: Path) -> None:
+    from innerattn.train import RunFolder
+
+    RunFolder.create(tmp_path / "run", run_config("td-inner"), threads=1)
+    with pytest.raises(RunError, match="holds no checkpoint yet"):
+        export_run(tmp_path / "run", tmp_path / "export")
+    assert not (tmp_path / "export").exists()
