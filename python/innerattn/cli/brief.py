@@ -106,7 +106,7 @@ BRIEF: Mapping[str, Brief] = {
             ("--report FILE", "write a page about the runs with these results: .html"),
             _QUIET,
         ),
-        ("latest", "runs/a runs/b --faults motor_gain,blackout --json found.json"),
+        ("latest", "runs/a runs/b --faults blackout --json found.json"),
     ),
     "reproduce": Brief(
         "[OPTIONS] TARGET",

@@ -107,6 +107,9 @@ class Training(Work):
             if progress.stage == "imitating"
             else f"{progress.updates / seconds:,.1f} updates/s",
         ]
+        losses = progress.metrics.get("losses", {}) if progress.metrics else {}
+        if "critic_loss" in losses:
+            parts.append(f"loss {losses['critic_loss']:.3g}")
         self.show(progress.env_steps, progress.total_env_steps, " | ".join(parts))
 
 

@@ -41,6 +41,7 @@ def named_run(name: str) -> Path:
     if os.sep in name or path.is_absolute():
         return path
     fitting = [run for run in _runs() if run.name.startswith(name)]
+    fitting = [run for run in fitting if run.name == name] or fitting
     if len(fitting) > 1:
         shown = ", ".join(run.name for run in fitting[:_MOST_NAMED])
         more = f" and {len(fitting) - _MOST_NAMED} more" if len(fitting) > _MOST_NAMED else ""

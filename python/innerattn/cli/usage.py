@@ -104,6 +104,7 @@ def _meant(option: str, names: Sequence[str], prog: str) -> str:
     if not same and near is not None:
         same = [name for name in names if name == near or name.rpartition(".")[2] == near]
     if same:
+        same.sort(key=lambda name: not name.startswith("--train."))  # keys of the run come first
         return f", did you mean {' or '.join(same[:_MOST_MEANT])}?"
     return f"; {prog} --help-all lists all"
 
@@ -141,7 +142,8 @@ def _line(event: Any, argv: Sequence[str], prog: str) -> str | None:
             known = [one for one in _words(metavar) or event.choices if one != "None"]
             near = nearest(event.value, known)
             end = f", did you mean {near}?" if near else ""
-            return f"{option or metavar} {event.value}: must be {_listed(known)}{end}"
+            place = f"{option} {event.value}" if option else event.value
+            return f"{place}: must be {_listed(known)}{end}"
         case "InstantiationFailure" if event.argument is not None:
             flags, metavar = _flags_and_metavar(event.argument)
             option, value = _as_written(flags, argv)

@@ -11,11 +11,13 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     ValidationError,
     ValidationInfo,
     field_validator,
 )
 from pydantic.fields import FieldInfo
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from innerattn.config.near import did_you_mean
@@ -47,6 +49,13 @@ class OneOf:
     ) -> CoreSchema:
         """Check the word after its type."""
         return core_schema.no_info_after_validator_function(self._check, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Offer today's words; another installation may know more."""
+        plain = handler(schema)
+        return {"anyOf": [{"enum": list(self.words())}, plain]}
 
     def _check(self, value: str) -> str:
         *others, last = (repr(word) for word in self.words())

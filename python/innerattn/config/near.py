@@ -7,12 +7,20 @@ from collections.abc import Callable, Iterable
 _ALIKE = 0.6
 """Least ratio of `difflib` at which two words are taken for the same; its own default."""
 
+_LEAST_BEGINNING = 3
+
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that is most like ``word``, or none where all are too far from it."""
+    """The first known word that begins as ``word``, else the one most like it, else none.
+
+    Dashes, underscores and case make no difference.
+    """
     import difflib  # slow to load, and needed only where something is wrong
 
     by_form = {_form(one): one for one in known}
+    begun = [one for form, one in by_form.items() if form.startswith(_form(word))]
+    if begun and len(word) >= _LEAST_BEGINNING:
+        return begun[0]
     found = difflib.get_close_matches(_form(word), by_form, n=1, cutoff=_ALIKE)
     return by_form[found[0]] if found else None
 
