@@ -133,7 +133,7 @@ def test_a_scenario_of_ones_own(
     [
         (["--train.method", "td-uniform"], "train.method", "td-uniform"),
         (["--train.seed", "7"], "train.seed", 7),
-        (["--train.device", "cuda:1"], "train.device", "cuda:1"),
+        (["--train.device", "cpu:0"], "train.device", "cpu:0"),
         (["--train.threads", "2"], "train.threads", 2),
         (["--scenario.end-when-rescued", "2"], "scenario.end_when_rescued", 2),
         (["--scenario.rescue-credit", "team"], "scenario.rescue_credit", "team"),

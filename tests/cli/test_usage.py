@@ -61,7 +61,7 @@ def printed(capsys: Captured, *arguments: str) -> str:
         ("evaluate random --episodes x", "--episodes x: must be a whole number"),
         ("reproduce tabel2", "tabel2: must be table2, fig4, "),
         ("--completion bsh", "--completion bsh: must be one of bash, zsh, fish, did you mean ba"),
-        ("--completion", "--completion : must be one of bash, zsh, fish"),
+        ("--completion", "--completion: must be one of bash, zsh, fish"),
     ],
 )
 def test_wrong_words_are_one_line(line: str, told: str, capsys: Captured) -> None:

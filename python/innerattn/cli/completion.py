@@ -29,7 +29,11 @@ def completion_script(commands: Any, words: Sequence[str]) -> str:
     if len(words) != 1 or words[0] not in SHELLS:
         given = " ".join(words)
         near = did_you_mean(given, SHELLS)
-        refuse(UsageError(f"--completion {given}: must be one of {', '.join(SHELLS)}{near}"))
+        refuse(
+            UsageError(
+                f"{' '.join(['--completion', *words])}: must be one of {', '.join(SHELLS)}{near}"
+            )
+        )
     script = io.StringIO()
     with redirect_stdout(script), suppress(SystemExit):
         tyro.cli(commands, args=["--tyro-print-completion", words[0]], prog="innerattn")

@@ -34,7 +34,8 @@ class Work:
         self._clock = clock
         self._start = self._last_line = clock()
         self._bar: Progress | None = None
-        if self._console.is_terminal and not self._console.is_dumb_terminal:
+        drawn = self._console.is_terminal and not self._console.is_dumb_terminal
+        if drawn and not self._console.quiet:
             self._bar = Progress(
                 BarColumn(bar_width=16),
                 TextColumn("{task.description}"),  # two lines, so that 80 columns hold them

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import create_model
+from pydantic import BaseModel, create_model
 
 from innerattn.config.files import write_whole
 from innerattn.config.registry import algorithms
@@ -45,7 +45,8 @@ def run_schema() -> dict[str, Any]:
         for name, algorithm in algorithms().items()
         if name not in RunConfig.model_fields
     }
-    schema = create_model("Run", __base__=RunConfig, **others).model_json_schema()
+    run: type[BaseModel] = create_model("Run", __base__=RunConfig, **others)
+    schema = run.model_json_schema()
     for key in ("required", "description"):
         schema.pop(key, None)
     schema["additionalProperties"] = False
