@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from innerattn.report.table import Row, Table, columns, plain_table, print_table, section
-from innerattn.report.tables.text import mean_alone, number, percent, plus_minus
+from innerattn.report.tables.text import NONE, mean_alone, number, percent, plus_minus
 
 if TYPE_CHECKING:
     from innerattn.evaluate.bounds.results import Bounds, Level
@@ -53,9 +53,9 @@ def print_robustness(
     from innerattn.evaluate.faults.overview import overview
 
     policies = {name: overview(grid, one) for name, one in found.items()}
-    letters = _letters(found)
+    letters = run_letters(found)
     console.print()
-    for line in _verdict(policies, letters):
+    for line in verdict(policies, letters):
         console.print(line, style="bold", soft_wrap=True)
     console.print()
     for name, letter in letters.items():
@@ -67,7 +67,7 @@ def print_robustness(
     oracle = policies.get("oracle")
     print_table(console, _after_onset(grid, letters.get(first, first), own, oracle))
     for name, of_run in bounds.items():
-        letter = letters[name]
+        letter = letters.get(name, name)
         if any(level.checks for level in of_run.levels):
             print_table(console, _bounds(letter, of_run))
         else:
@@ -81,10 +81,10 @@ def robustness_line(grid: Grid, found: Mapping[str, Retention]) -> str:
     from innerattn.evaluate.faults.overview import overview
 
     policies = {name: overview(grid, one) for name, one in found.items()}
-    return _verdict(policies, {name: name for name in _letters(found)})[0]
+    return verdict(policies, {name: name for name in run_letters(found)})[0]
 
 
-def _letters(found: Mapping[str, object]) -> dict[str, str]:
+def run_letters(found: Mapping[str, object]) -> dict[str, str]:
     """A short name for each run, in their order: A to Z, then A2 and so on."""
     from innerattn.policies import SCRIPTED
 
@@ -95,12 +95,14 @@ def _letters(found: Mapping[str, object]) -> dict[str, str]:
     }
 
 
-def _verdict(policies: Mapping[str, Overview], letters: Mapping[str, str]) -> tuple[str, str]:
+def verdict(policies: Mapping[str, Overview], letters: Mapping[str, str]) -> tuple[str, str]:
     """What each run keeps when a robot fails, beside a script, and what costs it most."""
     kept = [f"{letter} {plus_minus(policies[name].retention)}" for name, letter in letters.items()]
     if len(kept) > _MOST_NAMED:
         means = [policies[name].retention.mean for name in letters]
-        kept = [f"{kept[0]}, {len(means)} runs from {min(means):.2f} to {max(means):.2f}"]
+        known = [mean for mean in means if not math.isnan(mean)]
+        between = f"{min(known):.2f} to {max(known):.2f}" if known else NONE
+        kept = [f"{len(means)} runs {between}"]
     if "hungarian" in policies:
         kept.append(f"hungarian {plus_minus(policies['hungarian'].retention)}")
     worst = []
@@ -111,7 +113,7 @@ def _verdict(policies: Mapping[str, Overview], letters: Mapping[str, str]) -> tu
             worst.append(f"{letter} {_words(kind.kind)} {plus_minus(kind.retention)}")
     return (
         f"Share of rescues kept when a robot fails: {', '.join(kept)}",
-        f"Fault that costs most: {', '.join(worst) or 'none, since nobody is rescued'}",
+        f"Fault that costs most: {', '.join(worst) or 'unknown, since the runs rescue nobody'}",
     )
 
 
