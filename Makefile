@@ -13,7 +13,7 @@ export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train robot test test-pool test-slow reliability soak lint format bench lock docs dist smoke setup clean
+.PHONY: train robot test test-pool test-slow reliability soak lint format bench lock docs schemas dist smoke setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -90,6 +90,9 @@ lock: $(VENV)/.installed ## renew constraints.txt: the newest versions that pypr
 
 docs: setup ## draw the pictures of the documentation
 	python docs/pictures.py
+
+schemas: setup ## write the JSON Schemas of the scenario's file and of the run's file
+	python -m innerattn.config.schema
 
 dist: $(VENV)/.installed ## wheel for manylinux2014 and source archive, into dist/
 	rm -rf dist

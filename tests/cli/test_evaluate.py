@@ -106,20 +106,21 @@ def test_wrong_values(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     (tmp_path / "empty").mkdir()
     shutil.copytree(run_dir, tmp_path / "without", ignore=shutil.ignore_patterns("checkpoints"))
     cases = [
-        (["nobody"], "nobody: neither a run's folder nor one of random, greedy, hungarian"),
-        ([str(tmp_path / "empty")], f"{tmp_path / 'empty' / 'run.json'}: missing"),
-        ([str(tmp_path / "without")], f"{tmp_path / 'without'}: holds no checkpoint yet"),
-        (["random", "--json", str(tmp_path)], f"{tmp_path}: is a folder; must be a file"),
-        (["random", "--episodes", "0"], "evaluate.episodes = 0: must be greater"),
-        (["random", "--episode-steps", "0"], "scenario.episode_steps = 0: must be"),
-        ([str(run_dir), "--situation", "single"], f"{run_dir}: was trained for other"),
+        (1, ["nobody"], "nobody: neither a run's folder nor one of random, greedy, hungarian"),
+        (1, [str(tmp_path / "empty")], f"{tmp_path / 'empty' / 'run.json'}: missing"),
+        (1, [str(tmp_path / "without")], f"{tmp_path / 'without'}: holds no checkpoint yet"),
+        (1, ["random", "--json", str(tmp_path)], f"{tmp_path}: is a folder; must be a file"),
+        (2, ["random", "--episodes", "0"], "evaluate.episodes = 0: must be greater"),
+        (2, ["random", "--episode-steps", "0"], "scenario.episode_steps = 0: must be"),
+        (1, [str(run_dir), "--situation", "single"], f"{run_dir}: was trained for other"),
         (
+            1,
             ["random", *FEW, "--json", str(tmp_path / "no" / "x.json")],
             f"{tmp_path / 'no'}: no such folder",
         ),
     ]
-    for options, message in cases:
-        assert main(["evaluate", *options]) == 1
+    for code, options, message in cases:
+        assert main(["evaluate", *options]) == code
         err = capsys.readouterr().err
         assert err.startswith(f"innerattn: error: {message}")
         assert err.count("\n") == 1

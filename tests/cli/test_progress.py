@@ -67,6 +67,15 @@ def test_terminal_shows_a_bar() -> None:
     assert "0.6 updates/s" in text  # the whole line fits
 
 
+def test_the_loss_is_shown_once_it_is_known() -> None:
+    known = replace(
+        progress(10.0, 400), metrics={"rescues_per_episode": 1.5, "losses": {"critic_loss": 0.0123}}
+    )
+    (line,) = shown(terminal=False, steps=[known]).splitlines()
+    assert line.endswith("1.50 rescues/episode | 40 env-steps/s | 4.0 updates/s | loss 0.0123")
+    assert "loss 0.0123" in shown(terminal=True, steps=[known])  # the whole line fits
+
+
 def test_imitation_is_a_stage_of_its_own() -> None:
     imitating = replace(
         progress(15.0, 250),

@@ -87,7 +87,7 @@ def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
         (2, ["greedy", "--episode", "3"], "--episode, --robot: are for .gif and .mp4"),
         (1, ["greedy", "-o", str(tmp_path / "no" / "x.html")], f"{tmp_path / 'no'}: no such f"),
         (1, ["greedy", "-o", str(tmp_path / "x.gif"), "--episode", "30"], "must be 0 to 19"),
-        (1, ["greedy", "--seed", "-1"], "evaluate.seed = -1: must be"),
+        (2, ["greedy", "--seed", "-1"], "--seed -1: must be 0 to 2**63 - 1"),
     ]
     for code, options, message in cases:
         out = [] if "-o" in options else ["-o", str(tmp_path / "out.html")]

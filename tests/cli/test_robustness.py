@@ -1,6 +1,7 @@
 """`innerattn robustness`: the document, the tables, the picture, and what is refused."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -44,12 +45,20 @@ def test_tables_a_file_and_a_picture(
     ):
         assert words in shown
     assert [line for line in shown.splitlines() if len(line.rstrip()) > 80] == []
+    verdict, worst, _, first, second, _ = shown.strip().splitlines()[:6]
+    assert re.fullmatch(
+        r"Share of rescues kept when a robot fails: A .+, B .+, hungarian .+", verdict
+    )
+    assert worst.startswith("Fault that costs most: ")
     document = json.loads(files["--json"].read_text())
     assert document["seed"] == 1
     ends = [f"{path.parts[-3]}/{path.parts[-2]}/{path.name}" for path in (run_dir, other)]
     names = [policy["policy"] for policy in document["policies"]]
     assert names == [*ends, "greedy", "hungarian", "oracle"]
     assert list(document["bounds"]) == list(document["attention"]) == ends
+    assert [first, second] == [f"A: {ends[0]}", f"B: {ends[1]}"]
+    assert "A: a fault from the start" in shown
+    assert "B: bounds on attention" in shown
     assert files["--plot"].read_bytes().startswith(b"\x89PNG")
     assert {path: path.stat().st_mtime_ns for path in run_dir.rglob("*")} == before
 
@@ -79,11 +88,11 @@ def test_a_page_about_the_run(
         (["--faults", "rust"], 2, "--faults = 'rust': known are all, motor_gain"),
         (["--episodes", "1"], 2, "--episodes = 1: must be 2 to 1,000,000"),
         (["--episode-steps", "1"], 2, "--episode-steps = 1: must be 2 to 1,000,000"),
-        (["--plot", "map.jpeg"], 1, "must end in .pdf, .png, .svg"),
+        (["--plot", "map.jpeg"], 2, "--plot map.jpeg: must end in one of .pdf, .png, .svg"),
         (["--json", "nowhere/a.json"], 1, "nowhere: no such folder"),
         (["--json", "/tmp"], 1, "/tmp: is a folder; must be a file"),
         (["--json", "/dev/null"], 1, "/dev/null: is no plain file, and would be replaced"),
-        (["--seed", str(2**64)], 1, f"seed = {2**64}: must be"),
+        (["--seed", str(2**63)], 2, f"--seed {2**63}: must be 0 to 2**63 - 1"),
     ],
 )
 def test_refusals_are_one_line(

@@ -52,6 +52,6 @@ def test_seed_and_seeds_contradict(seed: str, capsys: pytest.CaptureFixture[str]
 
 
 def test_a_seed_out_of_range_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["train", "--seeds", "9223372036854775808"]) == 1
+    assert main(["train", "--seeds", "9223372036854775808"]) == 2
     err = capsys.readouterr().err
     assert err.startswith("innerattn: error: train.seed = 9223372036854775808: must be less than")

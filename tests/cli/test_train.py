@@ -133,7 +133,7 @@ def test_a_scenario_of_ones_own(
     [
         (["--train.method", "td-uniform"], "train.method", "td-uniform"),
         (["--train.seed", "7"], "train.seed", 7),
-        (["--train.device", "cuda:1"], "train.device", "cuda:1"),
+        (["--train.device", "cpu:0"], "train.device", "cpu:0"),
         (["--train.threads", "2"], "train.threads", 2),
         (["--scenario.end-when-rescued", "2"], "scenario.end_when_rescued", 2),
         (["--scenario.rescue-credit", "team"], "scenario.rescue_credit", "team"),
@@ -152,7 +152,7 @@ def test_single_options(
 
 def test_every_key_is_an_option(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        main(["train", "--help"])
+        main(["train", "--help-all"])
     text = capsys.readouterr().out.replace("_", "-")
     in_a_file = {f"scenario.{name}" for name in ("robots", "tasks", "obstacles", "faults")}
     in_a_file.add("train.schedule")
@@ -165,32 +165,38 @@ def test_every_key_is_an_option(capsys: pytest.CaptureFixture[str]) -> None:
 def test_help_shows_the_chosen_defaults(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["train", "--budget", "paper", "--help"])
+    assert "(625,000)" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["train", "--budget", "paper", "--help-all"])
     assert "(default: 625000)" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("options", "code", "message"),
     [
-        (["--td.gamma", "2"], "td.gamma = 2.0: must be less than or equal to 1"),
-        (["--network.attention", "uniform"], "network.attention = 'uniform': train.method"),
-        (["--scenario.episode-steps", "0"], "scenario.episode_steps = 0: must be"),
-        (["--config", "none.toml"], "cannot read none.toml"),
-        (["--scenario", "none.toml"], "cannot read none.toml"),
-        (["--device", "abacus"], "train.device = 'abacus': not usable here, must be 'cpu'"),
-        (["--td.batch-size", "9", "--td.replay-capacity", "8"], "td.replay_capacity = 8: must be"),
-        (["--scenario.actions", "continuous"], "scenario.actions = 'continuous'"),
+        (["--td.gamma", "2"], 2, "td.gamma = 2.0: must be less than or equal to 1"),
+        (["--network.attention", "uniform"], 2, "network.attention = 'uniform': train.method"),
+        (["--scenario.episode-steps", "0"], 2, "scenario.episode_steps = 0: must be"),
+        (["--config", "none.toml"], 1, "cannot read none.toml"),
+        (["--scenario", "none.toml"], 1, "cannot read none.toml"),
+        (["--device", "gpu"], 1, "train.device = 'gpu': not usable here, must be 'cpu'"),
+        (["--run-dir", "."], 1, ".: exists already"),
+        (["--td.batch-size", "9", "--td.replay-capacity", "8"], 2, "td.replay_capacity = 8: must"),
+        (["--scenario.actions", "continuous"], 1, "scenario.actions = 'continuous'"),
     ],
 )
 def test_what_cannot_be_run_is_one_line(
     options: list[str],
+    code: int,
     message: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["train", *options]) == 1
-    err = capsys.readouterr().err
+    assert main(["train", *options]) == code
+    out, err = capsys.readouterr()
+    assert out == ""  # nothing is announced that does not begin
     assert err.startswith(f"innerattn: error: {message}")
     assert err.count("\n") == 1
     assert list(tmp_path.glob("runs/*")) == []
@@ -259,7 +265,7 @@ def test_counts_beyond_any_machine_are_refused(
     option: str, most: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "run"
-    assert main(["train", "--run-dir", str(path), f"--{option}", str(most + 1)]) == 1
+    assert main(["train", "--run-dir", str(path), f"--{option}", str(most + 1)]) == 2
     err = capsys.readouterr().err
     assert f"{option.replace('-', '_')} = {most + 1}: must be less than or equal to {most}" in err
     assert not path.exists()

@@ -130,11 +130,11 @@ def test_what_is_wrong_in_a_file_names_the_file(tmp_path: Path) -> None:
     for overrides in (None, {"td.batch_size": 64}):
         with pytest.raises(ConfigError) as error:
             load_run_config(config_file=path, overrides=overrides)
-        assert str(error.value) == f"{path}: td.gama: unknown key"
+        assert str(error.value) == f"{path}: td.gama: unknown key, did you mean gamma?"
     path.write_text("[td]\ngamma = 0.9\n")
     with pytest.raises(ConfigError) as error:
         load_run_config(config_file=path, overrides={"td.gama": 0.9})
-    assert str(error.value) == "td.gama: unknown key"
+    assert str(error.value) == "td.gama: unknown key, did you mean gamma?"
 
 
 def test_a_scenarios_file_is_not_a_runs_and_is_told(tmp_path: Path) -> None:
@@ -194,8 +194,8 @@ def test_tables_in_a_file_replace_lists(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        ({"td.gama": 0.9}, r"^td\.gama: unknown key$"),
-        ({"tdd.gamma": 0.9}, r"^tdd: unknown key$"),
+        ({"td.gama": 0.9}, r"^td\.gama: unknown key, did you mean gamma\?$"),
+        ({"tdd.gamma": 0.9}, r"^tdd: unknown key, did you mean td\?$"),
         ({"gamma": 0.9}, r"^gamma: unknown key"),
         ({"td.gamma": 2}, r"^td\.gamma = 2: must be less than or equal to 1$"),
         ({"scenario.colour": 1}, r"^scenario\.colour: unknown key$"),

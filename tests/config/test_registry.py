@@ -73,7 +73,7 @@ def test_the_built_in_methods_are_these() -> None:
     with pytest.raises(ConfigError) as error:
         load_run_config(method="ppo")
     allowed = "'td-inner', 'td-uniform', 'ppo-inner', 'ppo-uniform' or 'mappo'"
-    assert str(error.value) == f"train.method = 'ppo': must be {allowed}"
+    assert str(error.value) == f"train.method = 'ppo': must be {allowed}, did you mean 'ppo-inner'?"
 
 
 @pytest.mark.usefixtures("walk")

@@ -8,25 +8,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
-from rich.console import Console
 
-from innerattn.cli.options import Command, check_target
+from innerattn.cli.options import LongCommand, UsageError, check_target, option_values
 from innerattn.cli.progress import Evaluating
+from innerattn.cli.runs import named_policy
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
-from innerattn.errors import RunError
-from innerattn.report.tables.evaluation import print_summary
+from innerattn.errors import ConfigError
+from innerattn.report.tables.evaluation import print_summary, result_line
 
 if TYPE_CHECKING:
     from innerattn.evaluate import Evaluation
 
 
 @dataclass(kw_only=True)
-class Evaluate(Command):
+class Evaluate(LongCommand):
     """Measure a trained or scripted policy."""
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
-    """A run's folder, or one of random, greedy, hungarian."""
+    """A run, or one of random, greedy, hungarian. A run is a folder, latest, or the beginning of
+    the name of one in runs."""
     scenario: Path | None = None
     """TOML file with the scenario to measure in; None: that of the run, or mixed."""
     situation: Literal["single", "double", "mixed"] | None = None
@@ -65,44 +66,46 @@ class Evaluate(Command):
             print(document)
             return 0
         print_summary(
-            Console(markup=False, highlight=False),
+            self.console(),
             evaluation.summary,
             evaluation.records[0].scenario,
         )
         if self.json is not None:
             write_whole(self.json, f"{document}\n".encode())
+        self.say_result(f"{self.policy}: {result_line(evaluation.summary)}")
         return 0
 
     def _measure(self) -> Evaluation:
         from innerattn.evaluate import SCRIPTED, evaluate_policy, evaluate_run, scripted_policy
         from innerattn.records.run_folder import read_config
 
-        if self.policy in SCRIPTED:
+        policy = named_policy(self.policy, SCRIPTED)
+        if policy in SCRIPTED:
             scenario = self._worlds(Scenario.preset("mixed"))
             settings = self._settings(EvaluateConfig())
-            chosen = scripted_policy(self.policy, scenario, settings.seed)
-            with Evaluating() as progress:
+            chosen = scripted_policy(policy, scenario, settings.seed)
+            with Evaluating(self.progress_console()) as progress:
                 return evaluate_policy(chosen, scenario, settings, progress=progress)
-        if not Path(self.policy).exists():
-            raise RunError(
-                f"{self.policy}: neither a run's folder nor one of {', '.join(SCRIPTED)}"
-            )
-        config = read_config(self.policy)
+        config = read_config(policy)
         scenario, settings = self._worlds(config.scenario), self._settings(config.evaluate)
-        with Evaluating() as progress:
-            return evaluate_run(
-                self.policy, scenario=scenario, settings=settings, progress=progress
-            )
+        with Evaluating(self.progress_console()) as progress:
+            return evaluate_run(policy, scenario=scenario, settings=settings, progress=progress)
 
     def _worlds(self, scenario: Scenario) -> Scenario:
         given = self._given("situation", "episode_steps")
-        if self.scenario is not None:
+        if self.scenario is None:
+            with option_values():
+                return scenario.replace(**given)
+        try:
             return Scenario.from_toml(self.scenario, **given)
-        return scenario.replace(**given)
+        except ConfigError as error:
+            Scenario.from_toml(self.scenario)  # a file that is wrong by itself is no wrong usage
+            raise UsageError(str(error)) from error
 
     def _settings(self, settings: EvaluateConfig) -> EvaluateConfig:
         names = ("episodes", "score_episodes", "long_episodes", "long_episode_steps", "seed")
-        return settings.replace(**self._given(*names))
+        with option_values():
+            return settings.replace(**self._given(*names))
 
     def _given(self, *names: str) -> dict[str, object]:
         """The options among ``names`` that were given."""

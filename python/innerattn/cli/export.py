@@ -9,6 +9,7 @@ from typing import Annotated
 import tyro
 
 from innerattn.cli.options import Command
+from innerattn.cli.runs import named_run
 
 
 @dataclass(kw_only=True)
@@ -16,7 +17,7 @@ class Export(Command):
     """Export a trained team for robots: ONNX files, weights for numpy, and a contract."""
 
     run_folder: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN")]
-    """A run's folder."""
+    """A run's folder or name."""
     output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """Folder to make; None: export in the run's folder."""
 
@@ -33,7 +34,7 @@ class Export(Command):
         """
         from innerattn.train.export import export_run
 
-        folder, contract = export_run(self.run_folder, self.output)
+        folder, contract = export_run(named_run(self.run_folder), self.output)
         checked = contract.checked
         assert checked is not None  # as export_run always checks
         robots, actors = len(contract.robots), len(contract.actors)

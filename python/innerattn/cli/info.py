@@ -7,6 +7,7 @@ import platform
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Literal
 
 import tomli_w
 
@@ -23,6 +24,8 @@ class Info(Command):
 
     scenario: Path | None = None
     """TOML file with a scenario: check it and print it with all defaults."""
+    schema: Literal["scenario", "run"] | None = None
+    """Print the JSON Schema of a scenario's file or a run's file, for editors."""
 
     def run(self) -> int:
         """Print the answer.
@@ -33,6 +36,11 @@ class Info(Command):
         Raises:
             ConfigError: the scenario file is not valid.
         """
+        if self.schema is not None:
+            from innerattn.config.schema import schema_text
+
+            print(schema_text(self.schema), end="")
+            return 0
         if self.scenario is not None:
             scenario = Scenario.from_toml(self.scenario)
             print(tomli_w.dumps(scenario.model_dump(exclude_none=True)), end="")

@@ -10,12 +10,16 @@ import io
 import os
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import reduce
+from operator import or_
 from typing import Annotated, Any
 
 import tyro
 
+from innerattn.cli.brief import print_brief
+from innerattn.cli.completion import completion_script
 from innerattn.cli.evaluate import Evaluate
 from innerattn.cli.export import Export
 from innerattn.cli.info import Info
@@ -26,15 +30,33 @@ from innerattn.cli.report import Report
 from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
 from innerattn.cli.train import command_type
+from innerattn.cli.usage import parse, refuse, words_of
 from innerattn.cli.watch import Watch
+from innerattn.config.near import did_you_mean
 from innerattn.cores import let_waiting_threads_sleep
 from innerattn.errors import UnsealedRunWarning, missing_library, needs_no_traceback, one_line
 from innerattn.signals import exit_code, interrupt, requests_handled_by
 
+_PROG = "innerattn"
 _DESCRIPTION = (
     "Train teams of unlike robots to rescue together, and measure how they do it. "
-    "`innerattn --version` prints the version."
+    "`innerattn --version` prints the version, `innerattn --completion bash` a script that "
+    "completes commands and options in a shell."
 )
+
+COMMANDS: Mapping[str, Any] = {
+    "train": None,  # its options follow from what is chosen, see `_type_of`
+    "evaluate": Evaluate,
+    "replay": Replay,
+    "report": Report,
+    "watch": Watch,
+    "play": Play,
+    "robustness": Robustness,
+    "reproduce": Reproduce,
+    "export": Export,
+    "info": Info,
+}
+"""What a user can do, by name, in the order in which help lists it."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -98,17 +120,36 @@ def _named_by_its_extra(error: Exception) -> Exception:
 
 
 def _parse(argv: list[str]) -> Any:
-    train = command_type(argv[1:] if argv[:1] == ["train"] else [])
-    commands: Any = (
-        Annotated[train, tyro.conf.subcommand("train")]
-        | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
-        | Annotated[Replay, tyro.conf.subcommand("replay")]
-        | Annotated[Report, tyro.conf.subcommand("report")]
-        | Annotated[Watch, tyro.conf.subcommand("watch")]
-        | Annotated[Play, tyro.conf.subcommand("play")]
-        | Annotated[Robustness, tyro.conf.subcommand("robustness")]
-        | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
-        | Annotated[Export, tyro.conf.subcommand("export")]
-        | Annotated[Info, tyro.conf.subcommand("info")]
-    )
-    return tyro.cli(commands, args=argv, prog="innerattn", description=_DESCRIPTION)
+    name, rest = (argv[0], argv[1:]) if argv else ("", [])
+    if name in COMMANDS:
+        command = _type_of(name, rest)
+        if "--help-all" in rest:
+            rest = ["--help"]
+        elif {"-h", "--help"} & set(words_of(rest)) and print_brief(name, command):
+            raise SystemExit(0)
+        return parse(command, rest, f"innerattn {name}")
+    if name == "--completion":
+        print(completion_script(_every_command(), rest))
+        raise SystemExit(0)
+    if name in ("-h", "--help", "--help-all"):
+        return tyro.cli(_every_command(), args=["--help"], prog=_PROG, description=_DESCRIPTION)
+    known = ", ".join(COMMANDS)
+    if not name:
+        refuse(
+            UsageError(f"a command must be given: {known}; innerattn --help says what each does")
+        )
+    if name.startswith("-"):
+        refuse(UsageError(f"{name}: a command must come first: {known}"))
+    near = did_you_mean(name, COMMANDS)
+    refuse(UsageError(f"{name}: unknown command{near or f'; commands are {known}'}"))
+
+
+def _type_of(name: str, argv: Sequence[str]) -> Any:
+    """The dataclass of a command's options; some have defaults that ``argv`` chooses."""
+    return command_type(argv) if name == "train" else COMMANDS[name]
+
+
+def _every_command() -> Any:
+    """All commands as one type, for what shows all of them."""
+    kinds = [Annotated[_type_of(name, []), tyro.conf.subcommand(name)] for name in COMMANDS]
+    return reduce(or_, kinds)

@@ -6,6 +6,8 @@ It checks no value: the models do, when the options are put back into a configur
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,10 +15,11 @@ from typing import Annotated, Any, Literal
 import tyro
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
+from rich.console import Console
 
 from innerattn.config import RunConfig
 from innerattn.config.model import OneOf
-from innerattn.errors import InnerattnError, RunError
+from innerattn.errors import ConfigError, InnerattnError, RunError
 
 _SHORT = ("method", "warm_start", "seed", "device", "compile")
 """Keys of the section `train` that are options by their last word too."""
@@ -46,6 +49,52 @@ class Command:
 
     debug: tyro.conf.FlagCreatePairsOff[bool] = False
     """Show where in the program an error arose."""
+    help_all: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Show every option, where --help shows the most used."""
+
+
+@dataclass(kw_only=True)
+class LongCommand(Command):
+    """What every command that takes minutes has, too."""
+
+    quiet: Annotated[tyro.conf.FlagCreatePairsOff[bool], tyro.conf.arg(aliases=["-q"])] = False
+    """Print warnings, errors and one line with the result, and nothing else."""
+
+    def console(self) -> Console:
+        """Where tables and announcements go; with --quiet they go nowhere."""
+        return Console(markup=False, highlight=False, quiet=self.quiet)
+
+    def progress_console(self) -> Console:
+        """Where progress is shown: standard error, or nowhere."""
+        return Console(stderr=True, quiet=self.quiet)
+
+    def say_result(self, line: str) -> None:
+        """Print the one line of --quiet."""
+        if self.quiet:
+            print(line, flush=True)
+
+
+@contextmanager
+def option_values() -> Iterator[None]:
+    """Inside the block, what is not valid was said by options: it is wrong usage.
+
+    Raises:
+        UsageError: in place of a `ConfigError`.
+    """
+    try:
+        yield
+    except ConfigError as error:
+        raise UsageError(str(error)) from error
+
+
+def check_seed(seed: int | None, bits: int = 63) -> None:
+    """Refuse a seed that is negative or has more than ``bits`` bits.
+
+    Raises:
+        UsageError: it is or has.
+    """
+    if seed is not None and not 0 <= seed < 2**bits:
+        raise UsageError(f"--seed {seed}: must be 0 to 2**{bits} - 1")
 
 
 def check_target(path: Path) -> None:
@@ -69,8 +118,13 @@ def check_target(path: Path) -> None:
 def short_option(name: str, default: object) -> OptionField:
     """An option for key ``name`` of the section `train`."""
     info = type(RunConfig().train).model_fields[name]
-    note = tyro.conf.arg(aliases=[f"--train.{name}"], help=info.description)
+    note = tyro.conf.arg(aliases=[_in_train(name)], help=info.description)
     return name, Annotated[_type_of(info), note], field(default=default)
+
+
+def _in_train(name: str) -> str:
+    """The long name of a key of the section `train`, with dashes, as of every other option."""
+    return f"--train.{name.replace('_', '-')}"
 
 
 def run_options(defaults: RunConfig) -> list[OptionField]:

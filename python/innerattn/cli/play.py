@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from innerattn.cli.options import Command, UsageError
+from innerattn.cli.options import Command, UsageError, check_seed
+from innerattn.cli.runs import named_policy
 from innerattn.config import EvaluateConfig, Scenario
-from innerattn.errors import RunError
 
 if TYPE_CHECKING:
     from innerattn.config import RunConfig
@@ -25,7 +25,7 @@ class Play(Command):
     """Play with a team in a browser on this machine: move, push, break robots; Ctrl-C ends it."""
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
-    """A run's folder, or one of random, greedy, hungarian, oracle; it acts first."""
+    """A run, or one of random, greedy, hungarian, oracle; it acts first."""
     scenario: Path | None = None
     """TOML file with the scenario to play in; None: that of the run, or mixed."""
     seed: int | None = None
@@ -60,11 +60,8 @@ class Play(Command):
     def _check(self) -> None:
         if not 0 <= self.port < 65536:
             raise UsageError(f"--port {self.port}: must be 0 to 65,535")
-        if self.seed is not None and not 0 <= self.seed < 2**64:
-            raise UsageError(f"--seed {self.seed}: must be 0 to 2**64 - 1")
-        if self.policy not in SCRIPTS and not Path(self.policy).exists():
-            known = ", ".join(SCRIPTS)
-            raise RunError(f"{self.policy}: neither a run's folder nor one of {known}")
+        check_seed(self.seed, bits=64)
+        self.policy = named_policy(self.policy, SCRIPTS)
 
     @property
     def _name(self) -> str:

@@ -34,7 +34,8 @@ class Work:
         self._clock = clock
         self._start = self._last_line = clock()
         self._bar: Progress | None = None
-        if self._console.is_terminal and not self._console.is_dumb_terminal:
+        drawn = self._console.is_terminal and not self._console.is_dumb_terminal
+        if drawn and not self._console.quiet:
             self._bar = Progress(
                 BarColumn(bar_width=16),
                 TextColumn("{task.description}"),  # two lines, so that 80 columns hold them
@@ -107,6 +108,9 @@ class Training(Work):
             if progress.stage == "imitating"
             else f"{progress.updates / seconds:,.1f} updates/s",
         ]
+        losses = progress.metrics.get("losses", {}) if progress.metrics else {}
+        if "critic_loss" in losses:
+            parts.append(f"loss {losses['critic_loss']:.3g}")
         self.show(progress.env_steps, progress.total_env_steps, " | ".join(parts))
 
 

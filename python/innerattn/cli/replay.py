@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from innerattn.cli.options import Command, UsageError, check_target
+from innerattn.cli.options import Command, UsageError, check_seed, check_target
+from innerattn.cli.runs import named_policy
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
@@ -33,7 +34,7 @@ class Replay(Command):
     policies: Annotated[
         tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN|POLICY|FILE ...")
     ]
-    """Runs' folders, evaluation/episodes.parquet files, or random, greedy, hungarian, oracle; up to
+    """Runs, evaluation/episodes.parquet files, or random, greedy, hungarian, oracle; up to
     four, shown side by side."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("replay.html")
     """File to write: .html is a page, .gif or .mp4 a moving picture of one episode."""
@@ -59,6 +60,7 @@ class Replay(Command):
             OSError: the file cannot be written.
         """
         self._check()
+        self.policies = [named_policy(one, SCRIPTS) for one in self.policies]
         names = _names(self.policies)
         records = self._played() if self._plays_anew() else self._recorded()
         if self.output.suffix == ".html":
@@ -83,6 +85,7 @@ class Replay(Command):
             raise UsageError(f"-o {self.output}: must end in one of {', '.join(SUFFIXES)}")
         if self.output.suffix == ".html" and (self.episode, self.robot) != (None, None):
             raise UsageError("--episode, --robot: are for .gif and .mp4; a page has all of them")
+        check_seed(self.seed)
         check_target(self.output)
 
     def _plays_anew(self) -> bool:
@@ -103,7 +106,6 @@ class Replay(Command):
 
         runs = [one for one in self.policies if one not in SCRIPTS]
         for one in runs:
-            _refuse_nobody(one)
             if Path(one).is_file():
                 raise UsageError(f"{one}: holds records, which cannot play; name the run's folder")
         config = read_config(runs[0]) if runs else None
@@ -145,7 +147,6 @@ def recorded(name: str) -> Record:
     """
     from innerattn.records import read_records
 
-    _refuse_nobody(name)
     path = Path(name)
     if path.is_file():
         if path.name != "episodes.parquet":
@@ -164,11 +165,6 @@ def recorded(name: str) -> Record:
         if "positions" in record.steps:
             return record
     raise RunError(f"{folder}: no episode was recorded step by step; --episodes N plays some")
-
-
-def _refuse_nobody(name: str) -> None:
-    if not Path(name).exists():
-        raise RunError(f"{name}: neither a run's folder nor one of {', '.join(SCRIPTS)}")
 
 
 def _play(name: str, scenario: Scenario, episodes: int, worlds: Record | int) -> Record:

@@ -9,6 +9,7 @@ from typing import Annotated
 import tyro
 
 from innerattn.cli.options import Command, UsageError, check_target
+from innerattn.cli.runs import named_run
 from innerattn.config.files import write_whole
 
 
@@ -38,10 +39,11 @@ class Report(Command):
         if self.output.suffix != ".html":
             raise UsageError(f"-o {self.output}: must end in .html")
         check_target(self.output)
+        folders = [named_run(run) for run in self.runs]
         from innerattn.report.runs.page import read_robustness, read_runs, runs_page
 
         document = None if self.robustness is None else read_robustness(self.robustness)
-        page = runs_page(read_runs([Path(run) for run in self.runs]), document)
+        page = runs_page(read_runs(folders), document)
         write_whole(self.output, page.encode())
         count = "1 run" if len(self.runs) == 1 else f"{len(self.runs)} runs"
         print(f"{self.output}: {count}, {self.output.stat().st_size / 1e6:.1f} MB")

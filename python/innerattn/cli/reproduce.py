@@ -11,18 +11,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
-from rich.console import Console
 
-from innerattn.cli.options import Command, UsageError, check_target
+from innerattn.cli.options import LongCommand, UsageError, check_target
 from innerattn.cli.progress import SeveralMeasurements, SeveralRuns
 from innerattn.config import BUDGETS
 from innerattn.config.files import write_whole
+from innerattn.config.near import did_you_mean
 from innerattn.experiments.plan import SITUATIONS, PlannedRun
 from innerattn.experiments.smoke import smoke_note
 from innerattn.report.tables.experiments import print_scores
 from innerattn.report.targets import TARGETS, Target
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from innerattn.experiments.lock import StudyLock
     from innerattn.experiments.processes import Job
     from innerattn.experiments.run import FinishedRun
@@ -38,7 +40,7 @@ _WHAT = "\n".join(("What to make.", *(f"- {one.name}: {one.shows}." for one in T
 
 
 @dataclass(kw_only=True)
-class Reproduce(Command):
+class Reproduce(LongCommand):
     """Train the runs that a result needs, then write it with a report.
 
     Runs that are there already are kept; the same command goes on with what is missing.
@@ -93,7 +95,7 @@ class Reproduce(Command):
         self._check_page(planned)  # before hours of training, not after
         if target.draws:
             check_format(out / "figure.png")
-        console = Console(markup=False, highlight=False)
+        console = self.console()
         with StudyLock.take(out) as lock:
             found = scan()
             self._print_plan(console, found, out)
@@ -124,6 +126,9 @@ class Reproduce(Command):
             console.print(f"Written: {path}", soft_wrap=True)
         if note:
             console.print(note[:1].upper() + note[1:], style="bold")
+        finished = sum(one.state == "finished" for one in found)
+        runs = f"{finished} of {_count(len(found), 'run')} finished"
+        self.say_result(f"{self.target}: {runs}; written: {(*outputs, account)[0]}")
         return int(bool(reasons))
 
     def _check_page(self, planned: Sequence[PlannedRun]) -> None:
@@ -189,7 +194,7 @@ class Reproduce(Command):
     def _train(self, found: Sequence[RunStatus], out: Path, lock: StudyLock) -> None:
         from innerattn.experiments.train import train_missing
 
-        with SeveralRuns() as progress:
+        with SeveralRuns(self.progress_console()) as progress:
             train_missing(found, out, lock, changed=progress, failed=_say_why, debug=self.debug)
 
     def _measure(
@@ -204,7 +209,7 @@ class Reproduce(Command):
 
         jobs = target.jobs(found, out) if target.jobs else ()
         if jobs and not self.report_only:
-            with SeveralMeasurements() as progress:
+            with SeveralMeasurements(self.progress_console()) as progress:
                 run_side_by_side(
                     jobs,
                     places(len(jobs)),
@@ -223,7 +228,8 @@ def _chosen(option: str, text: str, known: Sequence[str]) -> tuple[str, ...]:
         return tuple(known)
     unknown = sorted(names - set(known))
     if unknown:
-        raise UsageError(f"--{option} = {unknown[0]!r}: must be all or of {', '.join(known)}")
+        near = did_you_mean(unknown[0], known)
+        raise UsageError(f"--{option} = {unknown[0]!r}: must be all or of {', '.join(known)}{near}")
     return tuple(name for name in known if name in names)
 
 

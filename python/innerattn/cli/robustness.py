@@ -9,22 +9,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
-from rich.console import Console
 
-from innerattn.cli.options import Command, UsageError, check_target
+from innerattn.cli.options import LongCommand, UsageError, check_seed, check_target
 from innerattn.cli.progress import MeasuringRobustness
+from innerattn.cli.runs import named_run
 from innerattn.config.files import write_whole
+from innerattn.config.near import did_you_mean
 from innerattn.envs.batch import FAULT_KINDS
-from innerattn.report.tables.robustness import print_robustness
+from innerattn.report.tables.robustness import print_robustness, robustness_line
 
 if TYPE_CHECKING:
     from innerattn.evaluate.robustness import Robustness as MeasuredRobustness
 
+_PICTURES = (".pdf", ".png", ".svg")
 _MOST = 1_000_000  # episodes, and steps of one
 
 
 @dataclass(kw_only=True)
-class Robustness(Command):
+class Robustness(LongCommand):
     """Measure how many rescues remain when a robot fails, beside scripted policies."""
 
     runs: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="RUN [RUN ...]")]
@@ -61,6 +63,8 @@ class Robustness(Command):
             from innerattn.report.plots.drawing import check_format
 
             check_format(self.plot)
+        self.runs = tuple(str(named_run(run)) for run in self.runs)
+        self._check_once()
         runs = []
         if self.report is not None:
             from innerattn.report.runs.page import read_runs, runs_page
@@ -73,8 +77,9 @@ class Robustness(Command):
             why = f"left out: {left_out}, which has no choice in a team of {robots}"
             print(f"innerattn: {why}", file=sys.stderr)
         if self.json != Path("-"):
-            console = Console(markup=False, highlight=False)
-            print_robustness(console, found.grid, found.retention, found.bounds, found.attention)
+            print_robustness(
+                self.console(), found.grid, found.retention, found.bounds, found.attention
+            )
         if self.json is not None:
             document = json.dumps(found.to_json(), indent=1, allow_nan=False)
             if self.json == Path("-"):
@@ -88,39 +93,47 @@ class Robustness(Command):
             write_heatmap(self.plot, first, found.retention[first], found.grid)
         if self.report is not None:
             write_whole(self.report, runs_page(runs, found.to_json()).encode())
+        if self.json != Path("-"):
+            self.say_result(robustness_line(found.grid, found.retention))
         return 0
 
     def _check(self) -> tuple[str, ...]:
         """The kinds asked for, once every option has been looked at."""
         if not self.runs:
             raise UsageError("RUN: at least one run is needed")
-        folders = [Path(run).resolve() for run in self.runs]
-        for index, folder in enumerate(folders):
-            if folder in folders[:index]:
-                raise UsageError(f"RUN = {self.runs[index]}: is given twice")
         for name, least in (("episodes", 2), ("episode_steps", 2)):
             value = getattr(self, name)
             if value is not None and not least <= value <= _MOST:
                 flag = name.replace("_", "-")
                 raise UsageError(f"--{flag} = {value}: must be {least} to {_MOST:,}")
+        check_seed(self.seed)
         for path in (self.json, self.plot, self.report):
             if path is not None:
                 check_target(path)
         if self.report is not None and self.report.suffix != ".html":
             raise UsageError(f"--report {self.report}: must end in .html")
+        if self.plot is not None and self.plot.suffix not in _PICTURES:
+            raise UsageError(f"--plot {self.plot}: must end in one of {', '.join(_PICTURES)}")
         if self.faults == "all":
             return FAULT_KINDS
         kinds = tuple(dict.fromkeys(kind.strip() for kind in self.faults.split(",")))
         unknown = [kind for kind in kinds if kind not in FAULT_KINDS]
         if unknown:
             known = ", ".join(FAULT_KINDS)
-            raise UsageError(f"--faults = {unknown[0]!r}: known are all, {known}")
+            near = did_you_mean(unknown[0], FAULT_KINDS)
+            raise UsageError(f"--faults = {unknown[0]!r}: known are all, {known}{near}")
         return kinds
+
+    def _check_once(self) -> None:
+        folders = [Path(run).resolve() for run in self.runs]
+        for index, folder in enumerate(folders):
+            if folder in folders[:index]:
+                raise UsageError(f"RUN = {self.runs[index]}: is given twice")
 
     def _measure(self, kinds: tuple[str, ...]) -> MeasuredRobustness:
         from innerattn.evaluate.robustness import measure_robustness
 
-        with MeasuringRobustness() as progress:
+        with MeasuringRobustness(self.progress_console()) as progress:
             return measure_robustness(
                 self.runs,
                 kinds=kinds,

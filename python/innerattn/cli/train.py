@@ -12,15 +12,18 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 import tyro
 from rich.console import Console
 
-from innerattn.cli.options import Command, UsageError, changed, run_options
+from innerattn.cli.options import LongCommand, UsageError, changed, run_options
 from innerattn.cli.progress import Evaluating, SeveralRuns, Training
 from innerattn.cli.replay import write_replay
+from innerattn.cli.runs import named_run
 from innerattn.cli.seeds import parse_seeds
 from innerattn.cli.streams import droppable_output
+from innerattn.cli.usage import parse, words_of
 from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
 from innerattn.config.registry import methods
 from innerattn.config.sections import WarmStart
 from innerattn.cores import usable_cores
+from innerattn.errors import ConfigError
 from innerattn.experiments.side_by_side import (
     Run,
     refuse_what_cannot_run,
@@ -28,7 +31,12 @@ from innerattn.experiments.side_by_side import (
     train_side_by_side,
 )
 from innerattn.loggers import LOGGERS, Opened, RunLoggers
-from innerattn.report.tables.evaluation import print_seeds, print_summary
+from innerattn.report.tables.evaluation import (
+    print_seeds,
+    print_summary,
+    result_line,
+    seeds_line,
+)
 from innerattn.signals import leave, requests_handled_by
 
 if TYPE_CHECKING:
@@ -43,7 +51,7 @@ else:
 
 
 @dataclass(kw_only=True)
-class _Sources(Command):
+class _Sources(LongCommand):
     """Where the values of a run come from; later ones win, single options win over all."""
 
     preset: Preset = "mixed"
@@ -57,7 +65,19 @@ class _Sources(Command):
     tasks, obstacles and faults are set only there."""
 
     def load(self, overrides: dict[str, object]) -> RunConfig:
-        """The configuration, with single values on top."""
+        """The configuration, with single values on top.
+
+        Raises:
+            ConfigError: a file cannot be read, or is wrong.
+            UsageError: a single value is wrong.
+        """
+        try:
+            return self._load(overrides)
+        except ConfigError as error:
+            self._load({})  # where a file is wrong by itself, it is no wrong usage
+            raise UsageError(str(error)) from error
+
+    def _load(self, overrides: dict[str, object]) -> RunConfig:
         return load_run_config(
             self.preset,
             budget=self.budget,
@@ -83,7 +103,7 @@ class _Choice(_Sources):
         return self.load({key: value for key, value in chosen.items() if value is not None})
 
 
-_WITH_RESUME = ("--resume", "--log", "--debug")
+_WITH_RESUME = ("--resume", "--log", "--debug", "--quiet")
 
 
 @dataclass(kw_only=True)
@@ -94,7 +114,7 @@ class _Train(_Sources):
 
     given: ClassVar[Sequence[str]] = ()
 
-    resume: Path | None = None
+    resume: Annotated[str | None, tyro.conf.arg(metavar="RUN")] = None
     """Go on with a run that was stopped, from its newest checkpoint, as if it had not been; all
     other options are those of the run."""
     run_dir: Path | None = None
@@ -124,23 +144,21 @@ class _Train(_Sources):
 
     def _run(self) -> int:
         if self.resume is not None:
-            others = [word for word in self.given if word.startswith("--")]
-            others = [
-                w for w in others if w.partition("=")[0] not in ("--resume", "--log", "--debug")
-            ]
+            given = [w.partition("=")[0] for w in words_of(self.given) if w.startswith("--")]
+            others = [option for option in given if option not in _WITH_RESUME]
             if others:
                 raise UsageError(
                     f"--resume {self.resume}: the run has its own configuration; leave out "
                     f"{others[0]}"
                 )
-            return self._resume(Console(markup=False, highlight=False), self.resume)
+            return self._resume(self.console(), named_run(self.resume))
         train = self.defaults.train
         chosen: dict[str, object] = {
             "train.method": train.method,
             "train.warm_start": train.warm_start,
         }
         overrides = chosen | changed(self, self.defaults)
-        console = Console(markup=False, highlight=False)
+        console = self.console()
         if self.seeds is None:
             return self._train_one(console, self.load(overrides))
         seeds = parse_seeds(self.seeds)
@@ -155,6 +173,7 @@ class _Train(_Sources):
             from innerattn.train import train
 
         run_dir = self.run_dir or self._new_run_dir(config, _stamp())
+        refuse_what_cannot_run([Run(config, run_dir)])
         console.print(f"{_what(config)}, seed {config.train.seed}")
         console.print(f"Run folder: {run_dir}", soft_wrap=True)
         return self._finish(
@@ -187,12 +206,12 @@ class _Train(_Sources):
 
         with RunLoggers(self.log, Opened(run_dir, config), failed=say_not_logged) as loggers:
             try:
-                with Training() as progress:
+                with Training(self.progress_console()) as progress:
                     learn(_both(progress, loggers))
             except KeyboardInterrupt:
                 _say_what_is_kept([run_dir])
                 raise
-            with Evaluating() as evaluating:
+            with Evaluating(self.progress_console()) as evaluating:
                 evaluation = evaluate_run(run_dir, progress=evaluating)
             evaluation.write(run_dir / "evaluation")
             loggers.log_scores(evaluation.summary)
@@ -200,6 +219,7 @@ class _Train(_Sources):
         print_summary(console, evaluation.summary, config.scenario)
         console.print(f"Measure it again with: innerattn evaluate {run_dir}", soft_wrap=True)
         console.print(f"Watch it in a browser: {write_replay(run_dir)}", soft_wrap=True)
+        self.say_result(f"{run_dir}: {result_line(evaluation.summary)}")
         return 0
 
     def _train_several(self, console: Console, configs: Sequence[RunConfig]) -> int:
@@ -213,7 +233,7 @@ class _Train(_Sources):
         console.print(f"{_what(configs[0])}, {len(runs)} seeds, {at_once} at a time")
         console.print(f"Run folders: {runs[0].folder} to {runs[-1].folder}", soft_wrap=True)
         try:
-            with SeveralRuns() as progress:
+            with SeveralRuns(self.progress_console()) as progress:
                 train_side_by_side(
                     runs, at_once, changed=progress, failed=_say_why, debug=self.debug
                 )
@@ -221,10 +241,14 @@ class _Train(_Sources):
             _say_what_is_kept([run.folder for run in runs])
             raise
         _say_if_nothing_was_learnt([run.folder for run in runs if run.state == "done"])
-        print_seeds(console, seed_scores({run.config.train.seed: run.summary for run in runs}))
+        scores = seed_scores({run.config.train.seed: run.summary for run in runs})
+        print_seeds(console, scores)
         console.print("Run folders", style="bold")
         for run in runs:
             console.print(f"  {run.folder} ({run.state})", soft_wrap=True)
+        if scores is not None:
+            folders = f"{runs[0].folder} to {runs[-1].folder}"
+            self.say_result(f"{folders}: {seeds_line(scores)}")
         return int(any(run.failure for run in runs))
 
     def _folder_of_seed(self, config: RunConfig, stamp: str) -> Path:
@@ -300,8 +324,8 @@ def command_type(argv: Sequence[str]) -> Any:
         ConfigError: the chosen sources make no valid configuration.
         UsageError: both --seed and --seeds are given.
     """
-    known = [argument for argument in argv if argument not in ("-h", "--help")]
-    choice, _ = tyro.cli(_Choice, args=known, prog="innerattn train", return_unknown_args=True)
+    known = [argument for argument in argv if argument not in ("-h", "--help", "--help-all")]
+    choice: _Choice = parse(_Choice, known, "innerattn train", all_known=False)
     defaults = choice.defaults()
     options: list[Any] = run_options(defaults)
     train: Any = make_dataclass("Train", options, bases=(_Train,), kw_only=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from innerattn.cli.options import Command, UsageError
+from innerattn.cli.runs import named_run
 
 if TYPE_CHECKING:
     from innerattn.records import Record
@@ -42,7 +43,7 @@ class Watch(Command):
         from innerattn.report.local_server import LocalServer
         from innerattn.report.watch.pages import watch_pages
 
-        folders = [Path(run) for run in self.runs]
+        folders = [named_run(run) for run in self.runs]
         for folder in folders:
             read_live(folder)
         pages = watch_pages(folders, _scripts_beside(folders[0]), self._play)

@@ -14,6 +14,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+from innerattn.config.near import did_you_mean
 from innerattn.config.untrusted import MOST_TOML_BYTES, parse_toml, read_plain
 from innerattn.errors import ConfigError, RunError
 
@@ -36,7 +37,10 @@ def preset_table(folder: str, name: str) -> dict[str, Any]:
     known = preset_names(folder)
     if name not in known:
         what = folder.removesuffix("s")
-        raise ConfigError(f"unknown {what} preset {name!r}: known are {', '.join(known)}")
+        raise ConfigError(
+            f"unknown {what} preset {name!r}: known are {', '.join(known)}"
+            f"{did_you_mean(name, known, repr)}"
+        )
     return tomllib.loads((PRESETS / folder / f"{name}.toml").read_text("utf-8"))
 
 

@@ -121,7 +121,7 @@ def _validated(table: dict[str, Any], source: str = "") -> RunConfig:
     try:
         return RunConfig.model_validate(table)
     except ValidationError as error:
-        raise config_error(error, source=source) from error
+        raise config_error(error, source=source, model=RunConfig) from error
 
 
 def _merge(table: dict[str, Any], other: Mapping[str, Any]) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self, get_args
 
@@ -10,13 +11,16 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     ValidationError,
     ValidationInfo,
     field_validator,
 )
 from pydantic.fields import FieldInfo
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from innerattn.config.near import did_you_mean
 from innerattn.errors import ConfigError
 
 MOST_ROWS = 1_000_000_000
@@ -45,6 +49,13 @@ class OneOf:
     ) -> CoreSchema:
         """Check the word after its type."""
         return core_schema.no_info_after_validator_function(self._check, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Offer today's words; another installation may know more."""
+        plain = handler(schema)
+        return {"anyOf": [{"enum": list(self.words())}, plain]}
 
     def _check(self, value: str) -> str:
         *others, last = (repr(word) for word in self.words())
@@ -85,7 +96,7 @@ class Model(BaseModel):
         try:
             return self.model_validate(self.model_dump() | fields)
         except ValidationError as error:
-            raise config_error(error, self.place) from error
+            raise config_error(error, self.place, model=type(self)) from error
 
 
 def values_for_digest(model: BaseModel) -> dict[str, Any]:
@@ -116,27 +127,73 @@ def _types(annotation: Any) -> Iterator[Any]:
         yield from _types(part)
 
 
-def config_error(error: ValidationError, root: str = "", source: str = "") -> ConfigError:
+def config_error(
+    error: ValidationError,
+    root: str = "",
+    source: str = "",
+    model: type[BaseModel] | None = None,
+) -> ConfigError:
     """A pydantic error in one line: place = value: what is allowed.
 
     Args:
         error: what pydantic raised.
         root: what places are inside of, e.g. "scenario".
         source: the file the values came from, if any.
+        model: what was checked; the message names the key of it that an unknown one is like.
     """
     lines = []
     for item in error.errors(include_url=False):
-        place = _place([root, *item["loc"]])
+        location = item["loc"]
+        place = _place([root, *location])
         if item["type"] == "value_error":  # our own rules name their place themselves
             lines.append(str(item["ctx"]["error"]))
         elif item["type"] == "extra_forbidden":
-            lines.append(f"{place}: unknown key")
+            near = "" if model is None else _meant_key(model, location)
+            lines.append(f"{place}: unknown key{near}")
         elif item["type"] == "missing":
             lines.append(f"{place}: must be given")
         else:
             rule = item["msg"].replace("Input should be", "must be")
-            lines.append(f"{place} = {item['input']!r}: {rule}")
+            near = _meant_word(item["input"], rule) if item["type"] in _OF_WORDS else ""
+            lines.append(f"{place} = {item['input']!r}: {rule}{near}")
     return ConfigError((f"{source}: " if source else "") + "; ".join(lines))
+
+
+_OF_WORDS = ("literal_error", "word")
+"""Types of errors whose message lists the words that are allowed, quoted."""
+
+
+def _meant_word(value: object, rule: str) -> str:
+    if not isinstance(value, str):
+        return ""
+    return did_you_mean(value, re.findall(r"'([^']+)'", rule), repr)
+
+
+def _meant_key(model: type[BaseModel], location: Sequence[int | str]) -> str:
+    """The key that was meant: one of the same name in another section, or one like it here."""
+    *parents, last = location
+    name = str(last)
+    if len(parents) == 1:
+        others = [
+            f"{section}.{name}"
+            for section in model.model_fields
+            if any(name in one.model_fields for one in _models_of(model, section))
+            and section != parents[0]
+        ]
+        if others:
+            return f", did you mean {' or '.join(others)}?"
+    here = [model]
+    for part in parents:
+        if isinstance(part, str):
+            here = [inner for outer in here for inner in _models_of(outer, part)]
+    return did_you_mean(name, [key for one in here for key in one.model_fields])
+
+
+def _models_of(model: type[BaseModel], key: str) -> list[type[BaseModel]]:
+    """The models that the value of a key may be made of."""
+    info = model.model_fields.get(key)
+    found = [] if info is None else list(_types(info.annotation))
+    return [one for one in found if isinstance(one, type) and issubclass(one, BaseModel)]
 
 
 def _place(location: Iterable[int | str]) -> str:

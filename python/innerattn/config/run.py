@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from innerattn.config.files import preset_names
 from innerattn.config.model import Model, config_error, values_for_digest
+from innerattn.config.near import did_you_mean
 from innerattn.config.ppo import PPO, PPOConfig
 from innerattn.config.registry import (
     AlgorithmConfig,
@@ -119,7 +120,7 @@ class RunConfig(Model):
                 if isinstance(data.get(section, {}), Mapping | BaseModel):  # else its check says so
                     data = {**data, section: {**values, **_given(data.get(section))}}
         return {
-            key: value if key in cls.model_fields else _registered_section(key, value)
+            key: value if key in cls.model_fields else _registered_section(key, value, cls)
             for key, value in data.items()
         }
 
@@ -182,7 +183,7 @@ def _given(section: object) -> Mapping[str, Any]:
     return section if isinstance(section, Mapping) else {}
 
 
-def _registered_section(name: str, given: object) -> AlgorithmConfig:
+def _registered_section(name: str, given: object, run: type[RunConfig]) -> AlgorithmConfig:
     """The section of an algorithm that is no field of `RunConfig`.
 
     Raises:
@@ -190,8 +191,9 @@ def _registered_section(name: str, given: object) -> AlgorithmConfig:
     """
     algorithm = algorithms().get(name)
     if algorithm is None:
-        raise ValueError(f"{name}: unknown key")
+        known = (*run.model_fields, *algorithms())
+        raise ValueError(f"{name}: unknown key{did_you_mean(name, known)}")
     try:
         return algorithm.config.model_validate(given)
     except ValidationError as error:
-        raise ValueError(str(config_error(error, name))) from error
+        raise ValueError(str(config_error(error, name, model=algorithm.config))) from error

@@ -16,6 +16,7 @@ from pydantic import Field, PrivateAttr, ValidationError
 from innerattn import _core
 from innerattn.config.files import preset_names, preset_table, toml_table
 from innerattn.config.model import Model, config_error
+from innerattn.config.near import did_you_mean
 from innerattn.errors import ConfigError
 from innerattn.shown import Shown
 
@@ -125,6 +126,20 @@ def _default_tasks() -> tuple[Task, ...]:
     )
 
 
+def _need_of_nobody(robots: tuple[Robot, ...], tasks: tuple[Task, ...]) -> str:
+    """What to say of the first need that no robot can serve; empty where there is none."""
+    abilities = list(dict.fromkeys(one for robot in robots for one in robot.abilities))
+    for index, task in enumerate(tasks):
+        for need in task.needs:
+            if need not in abilities:
+                return (
+                    f"scenario.tasks[{index}].needs: task {task.name!r} needs {need!r}, which no "
+                    f"robot of the team can do; abilities of the team are {', '.join(abilities)}"
+                    f"{did_you_mean(need, abilities, repr)}"
+                )
+    return ""
+
+
 class Scenario(Model, Shown):
     """Everything that defines a rescue world.
 
@@ -189,7 +204,13 @@ class Scenario(Model, Shown):
 
     def model_post_init(self, _context: object, /) -> None:
         """Check the scenario and keep what the check returned."""
-        self._rules = _core.Rules(self.model_dump_json())
+        try:
+            self._rules = _core.Rules(self.model_dump_json())
+        except ValueError as error:
+            missing = _need_of_nobody(self.robots, self.tasks)
+            if missing and ".needs = " in str(error):
+                raise ValueError(missing) from error
+            raise
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy; one with changed fields is checked, as `replace` does.
@@ -229,7 +250,7 @@ class Scenario(Model, Shown):
         try:
             return cls.model_validate(scenario_table(path) | fields)
         except ValidationError as error:
-            raise config_error(error, "scenario", str(path)) from error
+            raise config_error(error, "scenario", str(path), cls) from error
 
     @property
     def num_robots(self) -> int:

@@ -72,6 +72,25 @@ def print_seeds(console: Console, scores: SeedScores | None) -> None:
     print_table(console, Table(columns(["seed"], _heads(lengths)), tuple(parts), title, _SEEDS))
 
 
+def result_line(summary: Summary) -> str:
+    """What an evaluation found, in one line."""
+    found = summary.standard
+    return (
+        f"{plus_minus(found.rescues_per_episode)} rescues per episode of {found.episode_steps} "
+        f"steps, score {plus_minus(found.score)}"
+    )
+
+
+def seeds_line(scores: SeedScores) -> str:
+    """The mean over seeds, in one line."""
+    found = scores.mean[0]
+    used = sum(two is not None for two in scores.by_seed.values())
+    return (
+        f"{plus_minus(found.rescues_per_episode)} rescues per episode of {found.episode_steps} "
+        f"steps, score {plus_minus(found.score)}, mean of {used} of {len(scores.by_seed)} seeds"
+    )
+
+
 def _scores_shown(two: TwoLengths) -> list[str]:
     return [number(x) for one in two for x in (one.rescues_per_episode, one.score)]
 

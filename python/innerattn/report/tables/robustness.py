@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import string
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from innerattn.report.table import Row, Table, columns, plain_table, print_table, section
-from innerattn.report.tables.text import mean_alone, number, percent, plus_minus
+from innerattn.report.tables.text import NONE, mean_alone, number, percent, plus_minus
 
 if TYPE_CHECKING:
     from innerattn.evaluate.bounds.results import Bounds, Level
@@ -27,6 +29,8 @@ _BOUNDS = (
     "radius: size of the change, in norms of an observation; Q: of its teammates; flips: another "
     "action is best by Q, or is taken by the actor of the disturbed robot, which no bound covers",
 )
+_ALPHABET = string.ascii_uppercase
+_MOST_NAMED = 2  # runs that one line of 80 columns holds
 _MOST_WITH_INTERVALS = 4  # policies that 80 columns hold with their intervals
 
 
@@ -49,26 +53,73 @@ def print_robustness(
     from innerattn.evaluate.faults.overview import overview
 
     policies = {name: overview(grid, one) for name, one in found.items()}
+    letters = run_letters(found)
     console.print()
-    print_table(console, _by_kind(grid, policies))
+    for line in verdict(policies, letters):
+        console.print(line, style="bold", soft_wrap=True)
+    console.print()
+    for name, letter in letters.items():
+        console.print(f"{letter}: {name}", soft_wrap=True)
+    console.print()
+    print_table(console, _by_kind(grid, policies, letters))
     first, own = next(iter(policies.items()))
-    print_table(console, _by_severity(grid, first, own))
-    print_table(console, _after_onset(grid, first, own, policies.get("oracle")))
+    print_table(console, _by_severity(grid, letters.get(first, first), own))
+    oracle = policies.get("oracle")
+    print_table(console, _after_onset(grid, letters.get(first, first), own, oracle))
     for name, of_run in bounds.items():
+        letter = letters.get(name, name)
         if any(level.checks for level in of_run.levels):
-            print_table(console, _bounds(name, of_run))
+            print_table(console, _bounds(letter, of_run))
         else:
-            console.print(f"{name}: no learnt attention, so no bound on it can be checked\n")
+            console.print(f"{letter}: no learnt attention, so no bound on it can be checked\n")
         if name in attention:
-            print_table(console, _attention(name, attention[name]))
+            print_table(console, _attention(letter, attention[name]))
 
 
-def _by_kind(grid: Grid, policies: Mapping[str, Overview]) -> Table:
+def robustness_line(grid: Grid, found: Mapping[str, Retention]) -> str:
+    """What was measured, in one line; it names the runs as they are."""
+    from innerattn.evaluate.faults.overview import overview
+
+    policies = {name: overview(grid, one) for name, one in found.items()}
+    return verdict(policies, {name: name for name in run_letters(found)})[0]
+
+
+def run_letters(found: Mapping[str, object]) -> dict[str, str]:
+    """A short name for each run, in their order: A to Z, then A2 and so on."""
     from innerattn.policies import SCRIPTED
 
+    runs = [name for name in found if name not in (*SCRIPTED, "oracle")]
+    return {
+        name: _ALPHABET[i % 26] + (str(i // 26 + 1) if i >= 26 else "")
+        for i, name in enumerate(runs)
+    }
+
+
+def verdict(policies: Mapping[str, Overview], letters: Mapping[str, str]) -> tuple[str, str]:
+    """What each run keeps when a robot fails, beside a script, and what costs it most."""
+    kept = [f"{letter} {plus_minus(policies[name].retention)}" for name, letter in letters.items()]
+    if len(kept) > _MOST_NAMED:
+        means = [policies[name].retention.mean for name in letters]
+        known = [mean for mean in means if not math.isnan(mean)]
+        between = f"{min(known):.2f} to {max(known):.2f}" if known else NONE
+        kept = [f"{len(means)} runs {between}"]
+    if "hungarian" in policies:
+        kept.append(f"hungarian {plus_minus(policies['hungarian'].retention)}")
+    worst = []
+    for name, letter in list(letters.items())[:_MOST_NAMED]:
+        kinds = [kind for kind in policies[name].kinds if not math.isnan(kind.retention.mean)]
+        if kinds:
+            kind = min(kinds, key=lambda kind: kind.retention.mean)
+            worst.append(f"{letter} {_words(kind.kind)} {plus_minus(kind.retention)}")
+    return (
+        f"Share of rescues kept when a robot fails: {', '.join(kept)}",
+        f"Fault that costs most: {', '.join(worst) or 'unknown, since the runs rescue nobody'}",
+    )
+
+
+def _by_kind(grid: Grid, policies: Mapping[str, Overview], letters: Mapping[str, str]) -> Table:
     # Names of runs are too long to stand over columns.
-    runs = [name for name in policies if name not in (*SCRIPTED, "oracle")]
-    heads = [f"run {i + 1}" if name in runs else name for i, name in enumerate(policies)]
+    heads = [letters.get(name, name) for name in policies]
     shown = plus_minus if len(policies) <= _MOST_WITH_INTERVALS else mean_alone
     each = list(policies.values())
     kinds = section(
@@ -78,13 +129,12 @@ def _by_kind(grid: Grid, policies: Mapping[str, Overview]) -> Table:
     overall = Row(("all kinds", *(shown(one.retention) for one in each)), strong=True)
     rescues = ["rescues, no fault", *(shown(one.rescues) for one in each)]
     with_fault = ["rescues, fault", *(shown(one.rescues_with_fault) for one in each)]
-    named = [f"{head}: {name}" for head, name in zip(heads, runs, strict=False)]
     return Table(
         columns(["retention"], heads),
         (kinds, section([overall]), section([rescues, with_fault])),
         f"Retention when a robot fails: {grid.scenario.situation}, {grid.episodes:,} worlds of "
         f"{grid.scenario.episode_steps} steps",
-        (*named, *_RETENTION),
+        _RETENTION,
     )
 
 

@@ -1,0 +1,179 @@
+"""The help that fits one screen: the options that most people need, and examples.
+
+`--help-all` shows all options, written by the library that parses them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+_COLUMNS = 80
+_MEANING = 23
+"""Column at which meanings begin."""
+
+
+class Brief(NamedTuple):
+    """What the short help of a command shows.
+
+    Attributes:
+        usage: what stands after the command's name.
+        rows: options or arguments as they are written, and what they mean; a name in braces in a
+            meaning stands for the default of that field.
+        examples: words after the command's name.
+    """
+
+    usage: str
+    rows: Sequence[tuple[str, str]]
+    examples: Sequence[str]
+
+
+_QUIET = ("-q, --quiet", "print warnings, errors and one line with the result only")
+_JSON = ("--json FILE", "write the results to FILE too; - for standard output")
+
+BRIEF: Mapping[str, Brief] = {
+    "train": Brief(
+        "[OPTIONS]",
+        (
+            ("--preset NAME", "built-in scenario ({preset}); innerattn info lists all"),
+            ("--scenario FILE", "TOML file with a scenario of your own, instead"),
+            ("--method NAME", "td-inner, td-uniform, ppo-inner, ppo-uniform, mappo ({method})"),
+            ("--budget NAME", "fast, quick, short, strong or paper ({budget})"),
+            ("--warm-start NAME", "script to imitate first: hungarian or greedy ({warm_start})"),
+            ("--seed N", "seed of everything random ({seed})"),
+            ("--seeds LIST", "one run for each seed: 0..4, or 0,3,7"),
+            ("--device NAME", "where networks run: cpu, cuda, cuda:0 ({device})"),
+            ("--train.env-steps N", "length of learning, summed over worlds ({train.env_steps:,})"),
+            ("--config FILE", "TOML file with any of all keys"),
+            ("--run-dir FOLDER", "folder to make for the run (under runs)"),
+            ("--resume RUN", "go on with a run that was stopped"),
+            _QUIET,
+        ),
+        (
+            "--method ppo-inner --budget fast",
+            "--scenario flood.toml --seeds 0..4 --td.learning-rate 0.001",
+            "--resume latest",
+        ),
+    ),
+    "evaluate": Brief(
+        "[OPTIONS] RUN|POLICY",
+        (
+            (
+                "RUN|POLICY",
+                "a run (folder, latest, or how its name begins), or a script: "
+                "random, greedy, hungarian",
+            ),
+            ("--scenario FILE", "TOML file with the scenario to measure in"),
+            ("--situation NAME", "single, double or mixed (that of the run)"),
+            ("--score-episodes N", "episodes that rescues are averaged over (1000)"),
+            ("--episodes N", "episodes that cooperation is counted in (80)"),
+            ("--episode-steps N", "length of an episode (that of the run)"),
+            ("--seed N", "seed of the worlds (12345)"),
+            _JSON,
+            _QUIET,
+        ),
+        ("latest", "hungarian --situation double", "runs/mine --json - > mine.json"),
+    ),
+    "replay": Brief(
+        "[OPTIONS] RUN|POLICY|FILE ...",
+        (
+            (
+                "RUN|POLICY|FILE",
+                "up to four: runs, scripts (random, greedy, hungarian, oracle) or "
+                "episodes.parquet files",
+            ),
+            ("-o, --output FILE", "what to write: .html, .gif or .mp4 ({output})"),
+            ("--episodes N", "play N new episodes instead of showing recorded ones"),
+            ("--scenario FILE", "TOML file with the scenario to play in"),
+            ("--seed N", "seed of the worlds to play in"),
+            ("--episode N", "which episode a moving picture shows"),
+            ("--robot NAME", "robot whose attention a moving picture shows"),
+        ),
+        ("latest", "latest hungarian -o both.html", "latest --episode 3 -o third.gif"),
+    ),
+    "robustness": Brief(
+        "[OPTIONS] RUN ...",
+        (
+            ("RUN", "runs: folders, latest, or how a name begins"),
+            ("--faults KINDS", "kinds of faults, separated by commas ({faults})"),
+            ("--episodes N", "worlds in which each fault is tried ({episodes})"),
+            ("--episode-steps N", "length of an episode (twice that of the run)"),
+            ("--seed N", "seed of the worlds"),
+            _JSON,
+            ("--plot FILE", "draw a heat map of the first run: .pdf, .png or .svg"),
+            ("--report FILE", "write a page about the runs with these results: .html"),
+            _QUIET,
+        ),
+        ("latest", "runs/a runs/b --faults blackout --json found.json"),
+    ),
+    "reproduce": Brief(
+        "[OPTIONS] TARGET",
+        (
+            ("TARGET", "what to make: {TARGETS}"),
+            (
+                "--budget NAME",
+                "fast, quick, short, strong or paper ({budget}, which gives no result)",
+            ),
+            ("--seeds N", "how many seeds ({seeds})"),
+            ("--methods LIST", "methods, separated by commas ({methods})"),
+            ("--situations LIST", "situations, separated by commas ({situations})"),
+            ("--out FOLDER", "folder of the study (studies/BUDGET)"),
+            ("--report-only", "train nothing; report on the runs that are finished"),
+            ("--page FILE", "write a page about the finished runs too: .html"),
+            _QUIET,
+        ),
+        ("table2 --budget short", "all --report-only", "fig4 --methods td-inner,td-uniform"),
+    ),
+}
+
+
+def print_brief(name: str, command: Any) -> bool:
+    """Print the short help of a command.
+
+    Args:
+        name: of the command.
+        command: dataclass of its options, with the defaults to show.
+
+    Returns:
+        Whether there is one.
+    """
+    if name not in BRIEF:
+        return False
+    brief = BRIEF[name]
+    defaults = _Defaults(command)
+    print(f"usage: innerattn {name} {brief.usage}\n")
+    print(f"{(command.__doc__ or '').split(chr(10))[0]}\n")
+    for option, meaning in brief.rows:
+        print(_row(option, meaning.format_map(defaults)))
+    print("\nExamples:")
+    for example in brief.examples:
+        print(f"  innerattn {name} {example}")
+    print(f"`innerattn {name} --help-all` shows every option with its unit and default.")
+    return True
+
+
+def _row(option: str, meaning: str) -> str:
+    lines = textwrap.wrap(meaning, _COLUMNS - _MEANING, break_on_hyphens=False)
+    head = f"  {option}".ljust(_MEANING)
+    return "\n".join([head + lines[0], *(" " * _MEANING + line for line in lines[1:])])
+
+
+class _Defaults(dict[str, object]):
+    """Defaults of a command's fields by name, when they are asked for; sections as objects."""
+
+    def __init__(self, command: Any) -> None:
+        super().__init__()
+        self._fields = {field.name: field for field in dataclasses.fields(command)}
+
+    def __missing__(self, name: str) -> object:
+        if name == "TARGETS":
+            from innerattn.report.targets import TARGETS
+
+            return ", ".join(TARGETS)
+        field = self._fields[name]
+        if field.default is not dataclasses.MISSING:
+            return field.default
+        assert callable(field.default_factory)
+        return field.default_factory()

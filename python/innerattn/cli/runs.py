@@ -1,0 +1,82 @@
+"""Runs by name: a path, `latest`, or the beginning of the name of a folder under `runs`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection
+from pathlib import Path
+
+from innerattn.config.near import did_you_mean
+from innerattn.errors import RunError
+
+RUNS = Path("runs")
+"""Where `innerattn train` makes run folders, unless it is told another place."""
+
+LATEST = "latest"
+_MOST_NAMED = 8
+
+
+def named_run(name: str) -> Path:
+    """The run folder that ``name`` means; a path where something is always wins.
+
+    Args:
+        name: a path; `latest`, the run in `runs` that was begun last; or the beginning of the name
+            of just one run folder in `runs`.
+
+    Returns:
+        The folder. Where nothing fits, ``name`` itself as a path, so that what reads it says what
+        is missing.
+
+    Raises:
+        RunError: the names of several runs begin so, or there is no run that could be the latest.
+    """
+    path = Path(name)
+    if not name or os.path.lexists(path):
+        return path
+    if name == LATEST:
+        runs = _runs()
+        if not runs:
+            raise RunError(f"{name}: no run is in {RUNS} yet")
+        return max(runs, key=lambda run: (_begun(run), run.name))
+    if os.sep in name or path.is_absolute():
+        return path
+    fitting = [run for run in _runs() if run.name.startswith(name)]
+    fitting = [run for run in fitting if run.name == name] or fitting
+    if len(fitting) > 1:
+        shown = ", ".join(run.name for run in fitting[:_MOST_NAMED])
+        more = f" and {len(fitting) - _MOST_NAMED} more" if len(fitting) > _MOST_NAMED else ""
+        raise RunError(f"{name}: {len(fitting)} runs in {RUNS} begin so: {shown}{more}")
+    return fitting[0] if fitting else path
+
+
+def named_policy(name: str, scripts: Collection[str]) -> str:
+    """The script or the path of the run that ``name`` means; see `named_run`.
+
+    Raises:
+        RunError: there is neither; the message names the scripts.
+    """
+    if name in scripts:
+        return name
+    found = named_run(name)
+    if not found.exists():
+        raise RunError(
+            f"{name}: neither a run's folder nor one of {', '.join(scripts)}"
+            f"{did_you_mean(name, scripts)}"
+        )
+    return str(found)
+
+
+def _runs() -> list[Path]:
+    """The run folders in `runs`, by name."""
+    try:
+        return sorted(path for path in RUNS.iterdir() if (path / "run.json").is_file())
+    except OSError:
+        return []
+
+
+def _begun(run: Path) -> float:
+    """When a run was begun [s]: its configuration is written once, first of all."""
+    try:
+        return (run / "config.toml").stat().st_mtime
+    except OSError:
+        return 0.0
