@@ -68,9 +68,9 @@ ROWS: tuple[Row, ...] = (
     ),
     Row(
         "non-finite loss",
-        "An update with a loss, gradient or weight that is not finite is not applied, and named.",
-        ("tests/learn/test_divergence.py",),
-        missing="an update that fails in the actor after the critic has stepped",
+        "An update with a loss or gradient that is not finite is named, and changes no weight, also "
+        "where the actor fails after the critic has stepped.",
+        ("tests/learn/test_divergence.py", "tests/train/test_divergence.py"),
     ),
     Row(
         "standard checkers",
