@@ -33,8 +33,10 @@ _WAYS_OUT = "tests/train/test_ways_out.py::test_"
 ROWS: tuple[Row, ...] = (
     Row(
         "kill in save",
-        "Of 200 `kill -9`, half of them aimed at a save, none leaves an unreadable checkpoint.",
+        "Of 200 `kill -9`, half of them aimed at a save, none leaves an unreadable checkpoint. What "
+        "a start leaves that was killed goes at the next one.",
         (
+            "tests/train/test_orphans.py",
             f"{_WAYS_OUT}two_hundred_kills",
             f"{_WAYS_OUT}a_checkpoint_that_fails_half_way_leaves_nothing",
         ),
@@ -68,8 +70,8 @@ ROWS: tuple[Row, ...] = (
     ),
     Row(
         "non-finite loss",
-        "An update with a loss or gradient that is not finite is named, and changes no weight, also "
-        "where the actor fails after the critic has stepped.",
+        "An update with a loss or gradient that is not finite is named, and changes no weight, "
+        "also where the actor fails after the critic has stepped.",
         ("tests/learn/test_divergence.py", "tests/train/test_divergence.py"),
     ),
     Row(
