@@ -24,6 +24,7 @@ from innerattn.cli.replay import Replay
 from innerattn.cli.report import Report
 from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
+from innerattn.cli.seal import Seal
 from innerattn.cli.train import command_type
 from innerattn.cli.watch import Watch
 from innerattn.cores import let_waiting_threads_sleep
@@ -107,6 +108,7 @@ def _parse(argv: list[str]) -> Any:
         | Annotated[Play, tyro.conf.subcommand("play")]
         | Annotated[Robustness, tyro.conf.subcommand("robustness")]
         | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+        | Annotated[Seal, tyro.conf.subcommand("seal")]
         | Annotated[Info, tyro.conf.subcommand("info")]
     )
     return tyro.cli(commands, args=argv, prog="innerattn", description=_DESCRIPTION)
