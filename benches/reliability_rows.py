@@ -171,8 +171,9 @@ ROWS: tuple[Row, ...] = (
     ),
     Row(
         "tunnelling, escape",
-        "Ten million env-steps with each engine: no robot leaves the arena or passes another.",
-        (),
+        "Ten million env-steps with each engine: no robot leaves the arena or passes another. With "
+        "`rapier` and masses of 100 : 1 overlaps reach 65 % of a radius.",
+        ("tests/envs/test_unequal_masses.py",),
         ("containment::", "speed::"),
     ),
     Row(
