@@ -49,6 +49,7 @@ def run_row(row: Row) -> Result:
         with tempfile.TemporaryDirectory() as folder:
             report = Path(folder) / "report.xml"
             command = [sys.executable, "-m", "pytest", "-q", "-m", "slow or not slow"]
+            command += ["-o", "junit_family=xunit1"]  # the later form knows no properties of tests
             subprocess.run([*command, f"--junit-xml={report}", *row.python], cwd=ROOT, env=env)
             suite = ET.parse(report).getroot().find("testsuite")
         assert suite is not None, "pytest wrote no report"
