@@ -13,7 +13,7 @@ export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train robot test test-pool test-slow reliability soak lint format bench lock docs schemas dist smoke setup clean
+.PHONY: train robot test test-pool test-asan test-slow reliability soak lint format bench lock docs schemas dist smoke setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -29,6 +29,12 @@ test: setup lint ## every check but the long one
 
 test-pool: ## the pool of threads under every order of events that the memory model allows
 	RUSTFLAGS='--cfg loom' cargo test --quiet --locked --target-dir target/loom -p innerattn-pool
+
+test-asan: ## the pool and the parsing of snapshots under the address sanitizer; needs x86-64 Linux, builds all worlds anew
+	RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Zsanitizer=address cargo test --quiet --locked --target-dir target/asan \
+	--target x86_64-unknown-linux-gnu -p innerattn-pool
+	RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Zsanitizer=address cargo test --quiet --locked --target-dir target/asan \
+	--target x86_64-unknown-linux-gnu -p innerattn-env --test worlds -- snapshot fuzz
 
 test-slow: setup test-pool ## the long checks: ten million env-steps of contacts, compilers at their slowest
 	INNERATTN_SLOW=1 cargo test --quiet --test worlds containment
@@ -64,6 +70,7 @@ bench: setup ## speed of worlds and learner on this machine, beside their peers;
 	python benches/fault_cost.py
 	python benches/copy_cost.py
 	python benches/view_cost.py
+	python benches/checkpoint_cost.py
 	python benches/time_to_score.py
 	python benches/compare_learner.py $(if $(MAAC),--maac "$(MAAC)")
 

@@ -14,9 +14,10 @@ import sys
 import tempfile
 import time
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import median
 
 from page import machine
 from reliability_rows import ROWS, Row
@@ -31,24 +32,29 @@ FUZZ_SECONDS = "60"
 
 @dataclass(frozen=True)
 class Result:
-    """What a row's tests found: how many ran and failed, and how many cases they say they tried."""
+    """What a row's tests found: how many passed and failed, and what they measured, by name."""
 
     passed: int
     failed: int
     seconds: float
+    measured: Mapping[str, list[float]] = field(default_factory=dict)
 
 
 def run_row(row: Row) -> Result:
     """Run all tests of a row, the slow ones too."""
     start, passed, failed = time.perf_counter(), 0, 0
+    measured: dict[str, list[float]] = {}
     env = {**os.environ, "INNERATTN_SLOW": "1", "INNERATTN_FUZZ_SECONDS": FUZZ_SECONDS}
     if row.python:
         with tempfile.TemporaryDirectory() as folder:
             report = Path(folder) / "report.xml"
             command = [sys.executable, "-m", "pytest", "-q", "-m", "slow or not slow"]
+            command += ["-o", "junit_family=xunit1"]  # the later form knows no properties of tests
             subprocess.run([*command, f"--junit-xml={report}", *row.python], cwd=ROOT, env=env)
             suite = ET.parse(report).getroot().find("testsuite")
         assert suite is not None, "pytest wrote no report"
+        for one in suite.iter("property"):
+            measured.setdefault(one.attrib["name"], []).append(float(one.attrib["value"]))
         count = {
             key: int(suite.get(key, "0")) for key in ("tests", "failures", "errors", "skipped")
         }
@@ -60,7 +66,7 @@ def run_row(row: Row) -> Result:
         found = re.search(r"(\d+) passed; (\d+) failed", done.stdout)
         ran = (int(found[1]), int(found[2])) if found else (0, 1)
         passed, failed = passed + ran[0], failed + ran[1]
-    return Result(passed, failed, time.perf_counter() - start)
+    return Result(passed, failed, time.perf_counter() - start, measured)
 
 
 def line_of(row: Row, result: Result | None) -> list[str]:
@@ -68,6 +74,8 @@ def line_of(row: Row, result: Result | None) -> list[str]:
     what = row.what + (f" Not tested: {row.missing}." if row.missing else "")
     if result is None:
         return [row.name, what, "not run in full", "", ""]
+    for name, values in sorted(result.measured.items()):
+        what += f" Median of {len(values)} {name}: {median(values):.2f}, longest {max(values):.2f}."
     holds = "yes" if result.passed and not result.failed and not row.missing else "**no**"
     tests = f"{result.passed}" + (f", {result.failed} failed" if result.failed else "")
     return [row.name, what, holds, tests, f"{result.seconds:,.0f} s"]

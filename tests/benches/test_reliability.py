@@ -48,6 +48,18 @@ def test_a_row_with_a_failed_or_skipped_test_does_not_hold(tmp_path: Path) -> No
     assert line_of(Row("x", "."), None)[2:] == ["not run in full", "", ""]
 
 
+def test_what_a_test_measures_is_shown(tmp_path: Path) -> None:
+    (tmp_path / "test_some.py").write_text(
+        "import pytest\n"
+        "@pytest.mark.parametrize('took', [0.5, 0.25, 4.0])\n"
+        "def test_good(took, record_property): record_property('seconds to the end', took)\n"
+    )
+    found = run_row(Row("x", "", (str(tmp_path / "test_some.py"),)))
+    assert (found.passed, found.failed) == (3, 0)
+    shown = line_of(Row("x", "It ends."), found)[1]
+    assert shown == "It ends. Median of 3 seconds to the end: 0.50, longest 4.00."
+
+
 def test_chosen_rows_are_printed_and_leave_the_page(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -40,12 +41,16 @@ def left_well(run: Path, sent: signal.Signals, code: int, err: str) -> None:
             read_saved(run)
 
 
-def interrupt_at(seconds: float, sent: signal.Signals, run: Path, options: list[str]) -> None:
+def interrupt_at(seconds: float, sent: signal.Signals, run: Path, options: list[str]) -> float:
+    """Send a signal to a training some seconds after its start; how long it goes on then [s]."""
     with begin(run, options) as process:
         time.sleep(seconds)
+        start = time.perf_counter()
         process.send_signal(sent)
         _, err = process.communicate(timeout=120)
+        took = time.perf_counter() - start
     left_well(run, sent, process.returncode, err)
+    return took
 
 
 @pytest.mark.parametrize("sent", SIGNALS)
@@ -78,12 +83,17 @@ def test_in_training(sent: signal.Signals, tiny: list[str], tmp_path: Path) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(100))
-def test_at_any_time(number: int, tiny: list[str], tmp_path: Path) -> None:
+def test_at_any_time(
+    number: int, tiny: list[str], tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
     chance = random.Random(number)
     warm = ["--warm-start", "hungarian", "--imitation.env-steps", "400"]
     often = ["--train.checkpoint-every-env-steps", "32", "--train.env-steps", "1600"]
     seconds, sent = chance.uniform(0.3, 8.0), chance.choice(SIGNALS)
-    interrupt_at(seconds, sent, tmp_path / "run", [*tiny, *warm, *often])
+    took = interrupt_at(seconds, sent, tmp_path / "run", [*tiny, *warm, *often])
+    # For the table; no time is asserted, since a busy machine takes longer.
+    record_property(f"seconds from {sent.name} to the end", took)
+    print(f"{sent.name} after {seconds:.1f} s: out after {took:.2f} s")
 
 
 def test_nobody_reads_what_it_says(tiny: list[str], tmp_path: Path) -> None:

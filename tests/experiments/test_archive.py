@@ -74,6 +74,7 @@ def test_archived_runs_give_the_same_report(
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
 
 
+@pytest.mark.filterwarnings("ignore::innerattn.errors.UnsealedRunWarning")  # forged: no digest
 def test_what_is_no_archive_is_refused(runs: list[FinishedRun], tmp_path: Path) -> None:
     path = tmp_path / FILE
     with pytest.raises(RunError, match="missing, or not a plain file"):

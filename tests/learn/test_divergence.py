@@ -1,6 +1,8 @@
 """Numbers that are not finite are named, and nothing is learnt from them."""
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 import torch
@@ -19,6 +21,14 @@ CPU = torch.device("cpu")
 def td(compiled: bool) -> TD:
     network = NetworkConfig(hidden_width=8, attention_heads=2)
     learner = TD(TEAM, network, TDConfig(batch_size=8, replay_capacity=64), seed=0, device=CPU)
+    if compiled:
+        learner.compile(backend="aot_eager")
+    return learner
+
+
+def ppo(compiled: bool) -> PPO:
+    network = NetworkConfig(hidden_width=8, attention_heads=2)
+    learner = PPO(TEAM, network, PPOConfig(), seed=0, device=CPU)
     if compiled:
         learner.compile(backend="aot_eager")
     return learner
@@ -43,6 +53,9 @@ def rollout() -> Rollout:
     return Rollout(torch.randn(3, 16, 4, generator=source), actions, log_prob, *rows)
 
 
+BATCHES: dict[str, Callable[[], Any]] = {"td": transitions, "ppo": rollout}
+
+
 def alike(left: dict[str, Tensor], right: dict[str, Tensor]) -> bool:
     return all(torch.equal(left[name], right[name]) for name in left)
 
@@ -62,9 +75,8 @@ def test_td_learns_nothing_from_a_broken_reward(compiled: bool, bad: float) -> N
     assert text.startswith("losses.critic_loss = ")
     assert ": must be finite; first in the gradient of critic." in text
     assert text.endswith(" of robot navigation_0")
-    weights = {name for name in before if not name.startswith("target_")}
     after = learner.state()
-    assert alike({name: before[name] for name in weights}, after)
+    assert alike(before, after)
     assert after["updates"] == 2
     learner.update(transitions())  # it goes on
     assert learner.updates == 3
@@ -72,11 +84,7 @@ def test_td_learns_nothing_from_a_broken_reward(compiled: bool, bad: float) -> N
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_ppo_learns_nothing_from_a_broken_advantage(compiled: bool) -> None:
-    network = NetworkConfig(hidden_width=8, attention_heads=2)
-    learner = PPO(TEAM, network, PPOConfig(), seed=0, device=CPU)
-    if compiled:
-        learner.compile(backend="aot_eager")
-    rows = rollout()
+    learner, rows = ppo(compiled), rollout()
     learner.update(rows)
     rows.advantage[2, 5] = math.nan
     before = learner.state()
@@ -85,8 +93,39 @@ def test_ppo_learns_nothing_from_a_broken_advantage(compiled: bool) -> None:
     assert caught.value.text(ROBOTS).endswith(
         "first in the gradient of actor.first.weight of robot medical_0"
     )
-    actor = {name: value for name, value in before.items() if name.startswith("actor")}
-    assert alike(actor, learner.state())
+    assert alike(before, learner.state())
+
+
+def overflow(learner: TD | PPO) -> None:
+    """Let the policies overflow; all their weights are finite, and the critic works."""
+    *_, last = (value for name, value in learner.actor.named_parameters() if "weight" in name)
+    with torch.no_grad():
+        last.fill_(3e38)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("method", ["td", "ppo"])
+def test_an_actor_that_fails_undoes_the_step_of_the_critic(
+    method: str, compiled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    learner, batch = (td if method == "td" else ppo)(compiled), BATCHES[method]()
+    learner.update(batch)
+    overflow(learner)
+    before = learner.state()
+    with monkeypatch.context() as patched:
+        patched.setattr("innerattn.learn.undo.Undo.restore", lambda _: None)
+        with pytest.raises(DivergenceError):
+            learner.update(batch)
+    stepped = {
+        name for name, value in learner.state().items() if not torch.equal(value, before[name])
+    }
+    assert any(name.startswith("critic.") for name in stepped)  # else nothing is shown below
+    assert not any(name.startswith("actor") for name in stepped)
+    learner.load(before)
+    with pytest.raises(DivergenceError) as caught:
+        learner.update(batch)
+    assert "first in the gradient of actor." in caught.value.text(ROBOTS)
+    assert alike(before, learner.state())
 
 
 def test_what_diverged_is_skipped_and_counted_where_asked_for() -> None:

@@ -4,7 +4,6 @@ import json
 import os
 import random
 import re
-import resource
 import signal
 import subprocess
 import sys
@@ -112,70 +111,6 @@ def test_two_hundred_kills(small_config: Configure, tmp_path: Path) -> None:
 
 def interrupted(_: object) -> None:
     raise KeyboardInterrupt
-
-
-@contextmanager
-def longest_file(size: int) -> Iterator[None]:
-    """Let no file grow beyond a size, as a disk that is full would."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
-@pytest.mark.parametrize("offset", [1, 100, 3_000, 60_000])
-def test_a_full_disk_stops_no_training(
-    small_config: Configure, tmp_path: Path, caplog: pytest.LogCaptureFixture, offset: int
-) -> None:
-    config, run = small_config(**OFTEN), tmp_path / "run"
-    full: list[int] = []
-
-    def progress(now: object) -> None:
-        done = now.env_steps  # type: ignore[attr-defined]
-        if done == 240:
-            full.append(newest(run))
-            limit = resource.getrlimit(resource.RLIMIT_FSIZE)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (offset, limit[1]))
-        if done == 480:
-            full.append(newest(run))
-            read_saved(run)
-            load_newest(run)
-            limit = resource.getrlimit(resource.RLIMIT_FSIZE)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (limit[1], limit[1]))
-
-    with longest_file(resource.RLIM_INFINITY):
-        train(config, run, progress=progress)
-    assert full[0] == 216  # 240 is saved after its progress is reported
-    assert full[1] == full[0]
-    assert read_info(run).state == "done"
-    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
-    assert [line["env_steps"] for line in lines] == [204, 408, 600, 804, 1008, 1200]
-    assert debris(run) == []
-    told = [record.getMessage() for record in caplog.records]
-    assert told
-    for text in told:
-        assert str(run) in text
-        assert "File too large" in text
-        assert "\n" not in text
-
-
-def test_a_disk_that_stays_full_ends_with_the_old_checkpoint(
-    small_config: Configure, tmp_path: Path
-) -> None:
-    run = tmp_path / "run"
-
-    def progress(now: object) -> None:
-        if now.env_steps == 240:  # type: ignore[attr-defined]
-            limit = resource.getrlimit(resource.RLIMIT_FSIZE)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (200, limit[1]))
-
-    with longest_file(resource.RLIM_INFINITY), pytest.raises(OSError, match=re.escape(str(run))):
-        train(small_config(**OFTEN), run, progress=progress)
-    assert read_saved(run).number == 216
-    assert resume(run) == run
-    assert read_info(run).state == "done"
 
 
 @pytest.mark.parametrize("name", ["weights", "state", "checkpoint", "rows", "metrics"])

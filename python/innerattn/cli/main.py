@@ -29,6 +29,7 @@ from innerattn.cli.replay import Replay
 from innerattn.cli.report import Report
 from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
+from innerattn.cli.seal import Seal
 from innerattn.cli.train import command_type
 from innerattn.cli.usage import parse, refuse, words_of
 from innerattn.cli.watch import Watch
@@ -54,6 +55,7 @@ COMMANDS: Mapping[str, Any] = {
     "robustness": Robustness,
     "reproduce": Reproduce,
     "export": Export,
+    "seal": Seal,
     "info": Info,
 }
 """What a user can do, by name, in the order in which help lists it."""

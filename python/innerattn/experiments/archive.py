@@ -2,13 +2,16 @@
 
 A row is a run: its case, configuration, ``run.json`` and summary as JSON, and of its own episodes
 of the standard length the lengths, rescues and reward sums. Weights, metrics, what was recorded
-step by step and the episodes of other policies are left out. A study takes an archived run for the
-run itself; what needs the rest, such as Fig. 4 and Fig. 5, refuses it.
+step by step and the episodes of other policies are left out. The file holds a digest of its
+contents. A study takes an archived run for the run itself; what needs the rest, such as Fig. 4 and
+Fig. 5, refuses it.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -21,7 +24,7 @@ from numpy.typing import NDArray
 from innerattn.config import RunConfig
 from innerattn.config.files import write_whole
 from innerattn.config.untrusted import parse_json, read_plain
-from innerattn.errors import RunError
+from innerattn.errors import RunError, UnsealedRunWarning
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import FinishedRun, check_summary
 from innerattn.records.record import Record, rescue_dtype
@@ -34,6 +37,7 @@ SCHEMA_VERSION = 1
 FILE = "archive.parquet"
 """The name of a study's archive in its folder."""
 
+_SHA256 = "sha256"
 _TEXTS = ("situation", "method", "variant", "name", "config", "info", "summary")
 _COMPRESSION_LEVEL = 19
 
@@ -57,9 +61,53 @@ def write_archive(runs: Iterable[FinishedRun], path: Path) -> None:
         "schema_version": SCHEMA_VERSION,
         "reward_names": list(names.pop()) if names else [],
     }
-    table = pa.table(columns).replace_schema_metadata({FORMAT: json.dumps(head)})
     path.parent.mkdir(parents=True, exist_ok=True)
+    _write(path, pa.table(columns), head)
+
+
+def seal_archive(path: Path) -> int:
+    """Write into an archive that has none the digest of what it holds.
+
+    Returns:
+        The number of its runs.
+
+    Raises:
+        RunError: it has one already; or as of `read_archive`, or of a run's records.
+        OSError: the file cannot be written.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnsealedRunWarning)
+        runs = read_archive(path)
+    for run in runs:
+        run.read()
+    table, head = read_table(read_plain(path, MOST_FILE_BYTES), path, FORMAT, SCHEMA_VERSION)
+    if _SHA256 in head:
+        raise RunError(f"{path}: holds the digest of its contents already, and fits it")
+    _write(path, table, head)
+    return len(runs)
+
+
+def _write(path: Path, table: pa.Table, head: dict[str, Any]) -> None:
+    text = json.dumps({**head, _SHA256: _digest(table, head)})
+    table = table.replace_schema_metadata({FORMAT: text})
     write_whole(path, table_bytes(table, _COMPRESSION_LEVEL))
+
+
+def _digest(table: pa.Table, head: dict[str, Any]) -> str:
+    """SHA-256 of all columns and of what the file says of itself, but for the digest."""
+    known = {key: value for key, value in head.items() if key != _SHA256}
+    digest = hashlib.sha256(json.dumps(known, sort_keys=True).encode())
+    for name in sorted(table.column_names):
+        column = table[name].combine_chunks()
+        digest.update(json.dumps([name, column.null_count]).encode())
+        if not pa.types.is_large_list(column.type):
+            digest.update(json.dumps(column.to_pylist()).encode())
+            continue
+        digest.update(np.asarray(column.value_lengths().to_numpy(False), "<i8").tobytes())
+        values = column.flatten().to_numpy(False)
+        kind = values.dtype.newbyteorder("<")
+        digest.update(kind.str.encode() + values.astype(kind).tobytes())
+    return digest.hexdigest()
 
 
 def read_archive(path: Path) -> list[FinishedRun]:
@@ -67,12 +115,20 @@ def read_archive(path: Path) -> list[FinishedRun]:
 
     Each run's ``folder`` is ``runs/NAME`` beside the archive, where it would lie in a study.
 
+    Warns:
+        UnsealedRunWarning: it holds no digest of its contents, as older archives do not.
+
     Raises:
         RunError: the file is missing, a link, damaged, of another format or version, or a run's
             summary does not fit its configuration.
     """
     data = read_plain(path, MOST_FILE_BYTES)
     table, head = read_table(data, path, FORMAT, SCHEMA_VERSION)
+    if _SHA256 not in head:
+        text = f"{path}: holds no digest; its runs are read unchecked"
+        warnings.warn(text, UnsealedRunWarning, stacklevel=1)
+    elif head[_SHA256] != _digest(table, head):
+        raise RunError(f"{path}: does not fit its own digest; it was altered")
     try:
         reward_names = tuple(head["reward_names"])
         texts = table.select([*_TEXTS, "seed"]).to_pylist()

@@ -24,6 +24,7 @@ from innerattn.learn.interruptions import Interruptions, NoInterruptions
 from innerattn.learn.networks import DrawNetworks, draw_networks
 from innerattn.learn.resume import State, take, take_generator, take_whole, whole
 from innerattn.learn.types import Team
+from innerattn.learn.undo import Undo
 from innerattn.nn import CriticOutput, action_noise, robots_of_each_kind, sample_actions
 
 
@@ -122,6 +123,7 @@ class ActorCritic:
         self._plain_networks: Networks | None = None
         self._compiled_for: set[int] | None = None
         self._rows: list[Tensor] = []
+        self._undo: Undo | None = None
 
     @property
     def updates(self) -> int:
@@ -227,13 +229,34 @@ class ActorCritic:
         return tensors
 
     def _update(self, *tensors: Tensor) -> Tensor:
-        """Do `_update_networks` with matrix products in `network.precision`, and count it."""
+        """Do `_update_networks` with matrix products in `network.precision`, and count it.
+
+        Raises:
+            DivergenceError: A metric is not finite; no network and no moment has changed, though
+                the critic may have stepped before the actor failed.
+        """
         with torch.autocast(self._device.type, torch.bfloat16, enabled=self._bfloat16):
+            undo = self._kept_for_undoing()
             metrics = self._update_networks(self._networks, *tensors, _as_tensor(self._rate))
             if not bool(metrics.isfinite().all()):
-                self._refuse(metrics, tensors)
+                try:  # by the new critic, as the actor that failed has met it
+                    self._refuse(metrics, tensors)
+                finally:
+                    undo.restore()
         self._updates += 1
         return metrics
+
+    def _kept_for_undoing(self) -> Undo:
+        """What undoes an update: it remembers all networks and moments as they are now."""
+        if self._undo is None:
+            parameters = [p for module in self._modules().values() for p in module.parameters()]
+            adams = (self._actor_adam, self._critic_adam)
+            moments = [
+                one for adam in adams for parts in adam.moments.values() for one in parts.values()
+            ]
+            self._undo = Undo([*parameters, *moments])
+        self._undo.keep()
+        return self._undo
 
     def _refuse(self, metrics: Tensor, tensors: Sequence[Tensor]) -> NoReturn:
         """Find out which gradient of an update is not finite, by its plain form; learn nothing.

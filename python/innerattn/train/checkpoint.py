@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import platform
-import shutil
 import subprocess
 import warnings
 from collections.abc import Mapping
@@ -28,6 +27,7 @@ from innerattn.records.run_folder import (
     State,
     read_info,
 )
+from innerattn.train.orphans import being_made, name_while_made, sweep_orphans
 from innerattn.train.saved import Checkpoints, Content, refuse_not_finite, whole_checkpoints
 from innerattn.train.weights import write_weights
 
@@ -53,6 +53,8 @@ class RunFolder:
     ) -> RunFolder:
         """Make the folder at ``path``; it appears with its files or not at all.
 
+        What killed processes left beside it, while they made a run folder, is removed.
+
         Raises:
             RunError: something is at ``path`` already, or the folder cannot be made.
         """
@@ -72,20 +74,17 @@ class RunFolder:
             seconds=0.0,
             warm_start=config.train.warm_start,
         )
-        partial = path.with_name(f".{path.name}.{os.getpid()}")
+        partial = name_while_made(path)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            partial.mkdir()
-            write_toml(config, partial / "config.toml")
-            _write_info(partial, info)
-            (partial / "checkpoints").mkdir()
-            os.rename(partial, path)
+            sweep_orphans(path.parent)
+            with being_made(partial):
+                write_toml(config, partial / "config.toml")
+                _write_info(partial, info)
+                (partial / "checkpoints").mkdir()
+                os.rename(partial, path)
         except OSError as error:
-            shutil.rmtree(partial, ignore_errors=True)
             raise RunError(f"{path}: cannot make the run folder ({error.strerror})") from error
-        except BaseException:
-            shutil.rmtree(partial, ignore_errors=True)
-            raise
         return cls(path, info)
 
     def save_weights(self, tensors: Mapping[str, Tensor], env_steps: int) -> None:

@@ -14,7 +14,8 @@ from innerattn.train.checkpoint_info import MOST_BYTES as MOST_INFO_BYTES
 from innerattn.train.checkpoint_info import CheckpointInfo, checkpoint_info
 from innerattn.train.metrics import MetricsFile
 from innerattn.train.parts import Parts
-from innerattn.train.row_files import read_rows
+from innerattn.train.row_files import FORMAT as ROWS_FORMAT
+from innerattn.train.row_files import file_name, read_rows
 from innerattn.train.saved import INFO, STATE_FORMAT, whole_checkpoints
 from innerattn.train.weights import FORMAT, MOST_BYTES, tensors_in
 
@@ -112,6 +113,34 @@ def read_saved(run: Path) -> Saved:
         )
     weights, state = read.values()
     return Saved(run, config, files.info, number, info, weights, state)
+
+
+def verify_checkpoints(run: Path) -> set[str]:
+    """Read every checkpoint of a run that is over, with all files that it needs.
+
+    Returns:
+        The names of these files in the run.
+
+    Raises:
+        RunError: a file is missing, damaged, or none of its checkpoint.
+    """
+    files, found = RunFiles(run), set()
+    for number in whole_checkpoints(run / "checkpoints"):
+        name = f"checkpoints/{number}/{INFO}"
+        info = _info(files.read(name, MOST_INFO_BYTES), run / name)
+        parts = {
+            f"checkpoints/{number}/weights.safetensors": (FORMAT, info.weights_sha256),
+            f"checkpoints/{number}/state.safetensors": (STATE_FORMAT, info.state_sha256),
+        }
+        for memory, rows in info.rows.items():
+            for one in rows.segments:
+                parts[f"checkpoints/rows/{file_name(memory, one)}"] = (ROWS_FORMAT, one.sha256)
+        for part, (form, sha256) in parts.items():
+            if part not in found:  # checkpoints share rows
+                tensors_in(files.read(part, MOST_BYTES), run / part, form, sha256)
+        MetricsFile(run / "metrics.jsonl").verified(info.metrics_bytes, info.metrics_sha256)
+        found |= {name, *parts}
+    return found
 
 
 def _info(data: bytes, path: Path) -> CheckpointInfo:

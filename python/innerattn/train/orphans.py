@@ -1,0 +1,110 @@
+"""Run folders that were being made when their process was killed: found and removed.
+
+A folder is made as ``.NAME.PID`` and then renamed; see `innerattn.train.checkpoint.RunFolder`. Its
+process holds a lock on it for as long. On Windows there is no such lock, and nothing is removed.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+if sys.platform != "win32":
+    import fcntl
+
+_NAME = re.compile(r"\..+\.([1-9][0-9]{0,9})")
+_FILE = re.compile(r"config\.toml|run\.json|\.(config\.toml|run\.json)\.[0-9]+\.[0-9a-f]{16}")
+
+
+def name_while_made(path: Path) -> Path:
+    """Where the run folder ``path`` lies while this process makes it."""
+    return path.with_name(f".{path.name}.{os.getpid()}")
+
+
+@contextmanager
+def being_made(folder: Path) -> Iterator[None]:
+    """Make a folder that no other process takes for an orphan inside the block.
+
+    If the block raises, the folder is removed.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    folder.mkdir()
+    try:
+        with _locked(folder):
+            yield
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    if sys.platform == "win32":
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        with suppress(OSError):  # not every file system has locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def sweep_orphans(parent: Path) -> None:
+    """Remove from a folder what processes left that were killed while they made a run folder.
+
+    What a living process makes stays, and so does everything that making a run does not write. What
+    cannot be removed stays too, without an error.
+    """
+    if sys.platform == "win32":
+        return
+    with suppress(OSError):
+        for entry in list(parent.iterdir()):
+            found = _NAME.fullmatch(entry.name)
+            if found and not entry.is_symlink() and entry.is_dir():
+                process = int(found[1])
+                # This process makes nothing yet: what has its number is of one before it.
+                if process == os.getpid() or not _lives(process):
+                    _remove_if_orphan(entry)
+
+
+def _remove_if_orphan(folder: Path) -> None:
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if _is_ours(folder):
+                shutil.rmtree(folder)
+        finally:
+            os.close(descriptor)
+
+
+def _is_ours(folder: Path) -> bool:
+    """Whether a folder holds nothing but what the making of a run writes."""
+    for entry in folder.iterdir():
+        if entry.is_symlink():
+            return False
+        if entry.is_dir():
+            if entry.name != "checkpoints" or any(entry.iterdir()):
+                return False
+        elif not (entry.is_file() and _FILE.fullmatch(entry.name)):
+            return False
+    return True
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # it is another user's
+        return True
+    return True
