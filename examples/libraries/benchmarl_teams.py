@@ -96,20 +96,20 @@ class RescueTask(Task):
         return RescueClass
 
 
-def configured(env_steps: int, folder: str) -> ExperimentConfig:
+def configured(algorithm: str, env_steps: int, folder: str) -> ExperimentConfig:
     """BenchMARL's own defaults but for lengths, rates and logs."""
     config = ExperimentConfig.get_from_yaml()
     config.prefer_continuous_actions = False
     config.max_n_frames = env_steps
-    config.gamma, config.lr = 0.98, 2e-3
+    config.gamma, config.lr = 0.98, 2e-3 if algorithm == "mappo" else 1e-3
     config.on_policy_n_envs_per_worker = 64
     config.on_policy_collected_frames_per_batch = 1_600
     config.on_policy_n_minibatch_iters = 4
     config.on_policy_minibatch_size = 1_600
     config.off_policy_n_envs_per_worker = 64
     config.off_policy_collected_frames_per_batch = 1_600
-    config.off_policy_n_optimizer_steps = 50
-    config.off_policy_train_batch_size = 512
+    config.off_policy_n_optimizer_steps = 60
+    config.off_policy_train_batch_size = 256
     config.off_policy_memory_size = 100_000
     config.evaluation = config.render = config.create_json = False
     config.loggers = []
@@ -121,16 +121,15 @@ def main() -> None:
     """Train for a number of env-steps and score the team."""
     algorithms = {"choices": list(ALGORITHMS), "default": "mappo"}
     given = options(__doc__, 200_000, algorithm=algorithms)
-    algorithm = ALGORITHMS[given.algorithm].get_from_yaml()
     with tempfile.TemporaryDirectory() as folder:
         experiment = Experiment(
             task=RescueTask.RESCUE.get_task({"situation": given.situation}),
-            algorithm_config=algorithm,
+            algorithm_config=ALGORITHMS[given.algorithm].get_from_yaml(),
             model_config=MlpConfig(
                 num_cells=[64, 64], activation_class=torch.nn.Tanh, layer_class=torch.nn.Linear
             ),
             seed=given.seed,
-            config=configured(given.env_steps, folder),
+            config=configured(given.algorithm, given.env_steps, folder),
         )
         began = time.perf_counter()
         experiment.run()

@@ -8,6 +8,9 @@ from __future__ import annotations
 import os
 import time
 
+os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # no cluster: Ray takes the loopback address
+os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+
 import ray
 import torch
 from numpy.typing import NDArray
@@ -45,7 +48,6 @@ def configured(situation: str, seed: int, robots: list[str]) -> PPOConfig:
 def main() -> None:
     """Train for a number of env-steps and score the team."""
     given = options(__doc__, 50_000)
-    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
     robots = [robot.name for robot in Scenario.preset(given.situation).robots]
     ray.init(_node_ip_address="127.0.0.1", include_dashboard=False, num_cpus=1, log_to_driver=False)
     try:

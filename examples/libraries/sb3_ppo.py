@@ -100,7 +100,11 @@ class RobotRows(VecEnv):
         """Rows share one batch, so no row has methods of its own."""
         raise NotImplementedError(method_name)
 
-    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+    def env_is_wrapped(
+        self,
+        wrapper_class: Any,  # noqa: ARG002
+        indices: Any = None,
+    ) -> list[bool]:
         """No row is wrapped."""
         return [False] * len(self._get_indices(indices))
 

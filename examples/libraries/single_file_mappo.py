@@ -157,9 +157,10 @@ def main() -> None:
     """Train for a number of env-steps and score the team."""
     given = options(__doc__, 500_000)
     began = time.perf_counter()
-    for done, team in train(Scenario.preset(given.situation), given.seed):
-        if done >= given.env_steps:
-            break
+    training = train(Scenario.preset(given.situation), given.seed)
+    done, team = next(training)
+    while done < given.env_steps:
+        done, team = next(training)
     seconds = time.perf_counter() - began
 
     def actor(obs: NDArray[np.float32]) -> NDArray[np.int64]:

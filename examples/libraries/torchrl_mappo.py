@@ -1,6 +1,7 @@
 """TorchRL's MAPPO on `RescueTorchRLEnv`: a policy for each robot, and critics that see the state.
 
-Robots of a kind are a group, as the environment has them. Every rollout is one whole episode of all worlds.
+Robots of a kind are a group, as the environment has them. Every rollout is one whole episode of all
+worlds.
 """
 
 from __future__ import annotations

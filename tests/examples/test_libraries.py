@@ -137,3 +137,23 @@ def test_the_single_file_bootstraps_at_the_end_of_an_episode() -> None:
                 if ends[t][world]:
                     break
             torch.testing.assert_close(advantage[start, world], total, rtol=1e-4, atol=1e-5)
+
+
+def test_the_table_of_baselines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import baselines
+
+    monkeypatch.setattr(baselines, "PAGE", tmp_path / "docs.md")
+    monkeypatch.setattr(baselines, "KNOWN", tmp_path / "runs" / "known.jsonl")
+    assert baselines.known() == {}
+    rows = {
+        ("torchrl-mappo", "mixed", seed, 100): {"score": score, "train_seconds": 10.0 + seed}
+        for seed, score in enumerate((0.25, 0.75))
+    }
+    baselines.remember(rows)
+    assert baselines.known() == rows
+    for _ in range(2):  # the second time the page is there
+        baselines.publish(rows, ["torchrl-mappo"], 100)
+    text = (tmp_path / "docs.md").read_text("utf-8")
+    line = "| `torchrl-mappo` | not run | not run | 0.50 (0.25 to 0.75) | 10 s |"
+    assert text.count(line) == 1
+    assert "seeds 0, 1; 100 env-steps each" in text
