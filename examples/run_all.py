@@ -36,12 +36,12 @@ class Example(NamedTuple):
 EXAMPLES = {
     "single-file-mappo": Example("single_file_mappo", 100_000),
     "sb3-gymnasium": Example("sb3_ppo", 50_000, ("--view", "gymnasium")),
-    "sb3-pettingzoo": Example("sb3_ppo", 50_000, ("--view", "pettingzoo")),
+    "sb3-pettingzoo": Example("sb3_ppo", 25_000, ("--view", "pettingzoo")),
     "torchrl-mappo": Example("torchrl_mappo", 50_000),
     "optuna": Example("optuna_search", 120_000, ("--trials", "2")),
     "benchmarl-mappo": Example("benchmarl_teams", 50_000, ("--algorithm", "mappo")),
     "benchmarl-masac": Example("benchmarl_teams", 50_000, ("--algorithm", "masac")),
-    "rllib-ppo": Example("rllib_ppo", 30_000),
+    "rllib-ppo": Example("rllib_ppo", 24_000),
     "xuance-mappo": Example("xuance_mappo", 50_000),
 }
 
