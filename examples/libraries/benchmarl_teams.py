@@ -121,10 +121,13 @@ def main() -> None:
     """Train for a number of env-steps and score the team."""
     algorithms = {"choices": list(ALGORITHMS), "default": "mappo"}
     given = options(__doc__, 200_000, algorithm=algorithms)
+    algorithm = ALGORITHMS[given.algorithm].get_from_yaml()
+    if given.algorithm == "masac":
+        algorithm.alpha_init = 0.01  # rewards are small: more entropy would hide them
     with tempfile.TemporaryDirectory() as folder:
         experiment = Experiment(
             task=RescueTask.RESCUE.get_task({"situation": given.situation}),
-            algorithm_config=ALGORITHMS[given.algorithm].get_from_yaml(),
+            algorithm_config=algorithm,
             model_config=MlpConfig(
                 num_cells=[64, 64], activation_class=torch.nn.Tanh, layer_class=torch.nn.Linear
             ),
