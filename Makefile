@@ -13,7 +13,7 @@ export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train robot test test-pool test-asan test-slow reliability soak lint format bench lock docs schemas dist smoke setup clean
+.PHONY: train robot test test-pool test-asan test-slow examples reliability soak lint format bench lock docs schemas dist smoke setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -39,6 +39,9 @@ test-asan: ## the pool and the parsing of snapshots under the address sanitizer;
 test-slow: setup test-pool ## the long checks: ten million env-steps of contacts, compilers at their slowest
 	INNERATTN_SLOW=1 cargo test --quiet --test worlds containment
 	pytest -m slow
+
+examples: setup ## train a little with each outside library, in an environment of its own; EXAMPLES='NAME ...' takes some of them
+	python examples/run_all.py $(EXAMPLES)
 
 reliability: setup ## every row of docs/reliability.md in full; fills its table
 	cargo test --quiet --locked --no-run --test worlds
@@ -115,4 +118,4 @@ smoke: dist ## try wheel and source archive in fresh environments of all PYTHONS
 	tests/smoke.sh $(PYTHON) dist/*.tar.gz
 
 clean: ## remove everything that was built
-	rm -rf $(VENV) target dist python/innerattn/_core*.so
+	rm -rf $(VENV) target dist python/innerattn/_core*.so examples/libraries/.venvs

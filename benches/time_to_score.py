@@ -7,15 +7,16 @@ writes its table into `docs/performance.md`. The clock stands still while a team
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from functools import partial
+from pathlib import Path
 from typing import Protocol
 
 import torch
 from page import machine, publish, table
-from plain_mappo import train as train_plain
 from torch import Tensor
 
 from innerattn.config import RunConfig, Scenario, load_run_config
@@ -29,6 +30,10 @@ from innerattn.train.compilation import compiles
 from innerattn.train.loop import training_worlds
 from innerattn.train.matmul_backend import best_matmul_backend
 from innerattn.train.schedule import Schedule
+
+sys.path.append(str(Path(__file__).parents[1] / "examples" / "libraries"))
+
+from single_file_mappo import train as train_plain
 
 SCORES = (0.5, 0.7, 0.8, 0.9)
 EPISODES = 500
@@ -148,7 +153,7 @@ def main() -> None:
         "td-inner, `fast`": partial(ours, "td-inner", "fast"),
         "td-inner, `short`": partial(ours, "td-inner", "short"),
         "ppo-inner, `short`": partial(ours, "ppo-inner", "short"),
-        "plain MAPPO loop": partial(train_plain, scenario, given.seed),
+        "single-file MAPPO": partial(train_plain, scenario, given.seed),
     }
     rows = []
     for name, begin in contestants.items():

@@ -1,14 +1,10 @@
-"""The clock of the benchmark of time to a score, and the stand-in that it trains."""
+"""The clock of the benchmark of time to a score."""
 
 from collections.abc import Iterator
-from itertools import islice
 
-import plain_mappo
 import pytest
 import time_to_score
 import torch
-
-from innerattn.config import Scenario
 
 
 class Clock:
@@ -60,12 +56,3 @@ def test_the_clock_stands_still_while_a_team_is_measured(clock: Clock, most_seco
         assert found == {0.5: 25.0, 0.7: 35.0, 0.8: 40.0, 0.9: 45.0}
         assert last == pytest.approx(0.94)
     assert speed == pytest.approx(100.0)
-
-
-def test_the_stand_in_trains() -> None:
-    updates = plain_mappo.train(Scenario.preset("single"), 0)
-    (first, team), (second, same) = islice(updates, 2)
-    assert (first, second) == (64 * 128, 2 * 64 * 128)
-    assert team is same
-    obs = torch.zeros(3, 4, team.actor[0].in_features - 4)
-    assert team.act(obs, greedy=True).shape == (3, 4)

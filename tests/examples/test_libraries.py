@@ -1,0 +1,159 @@
+"""The programs of examples/libraries: options, requirements, scores; and the one without a library.
+
+`make examples` runs the others, each in its own environment.
+"""
+
+import ast
+import json
+import re
+import subprocess
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from innerattn.config import Scenario
+from innerattn.envs import BatchEnv
+from innerattn.evaluate.play import run_episodes
+from innerattn.policies import scripted_policy
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+LIBRARIES = EXAMPLES / "libraries"
+PROGRAMS = sorted(path for path in LIBRARIES.glob("*.py") if path.name != "scoring.py")
+sys.path += [str(EXAMPLES), str(LIBRARIES)]
+
+import run_all  # noqa: E402
+import scoring  # noqa: E402
+import single_file_mappo  # noqa: E402
+
+
+def test_every_program_is_run_and_has_requirements() -> None:
+    names = {path.stem for path in PROGRAMS}
+    assert {example.program for example in run_all.EXAMPLES.values()} == names
+    assert {path.stem for path in (LIBRARIES / "requirements").glob("*.txt")} == names
+
+
+@pytest.mark.parametrize("program", PROGRAMS, ids=lambda path: path.stem)
+def test_a_program_compiles_and_pins_what_it_imports(program: Path) -> None:
+    tree = ast.parse(program.read_text("utf-8"))
+    compile(tree, str(program), "exec")
+    assert ast.get_docstring(tree)
+    lines = (LIBRARIES / "requirements" / f"{program.stem}.txt").read_text("utf-8").splitlines()
+    pins = [re.fullmatch(r"([\w-]+)(?:\[\w+\])?==[\w.]+", line) for line in lines]
+    assert all(pins), lines
+    pinned = {one[1].lower().replace("-", "_") for one in pins if one}
+    imported = {
+        name.partition(".")[0]
+        for node in ast.walk(tree)
+        for name in (
+            [one.name for one in node.names]
+            if isinstance(node, ast.Import)
+            else [node.module or ""]
+            if isinstance(node, ast.ImportFrom)
+            else []
+        )
+    }
+    ours = {"innerattn", "scoring"} | set(sys.stdlib_module_names)
+    assert imported - ours <= pinned
+
+
+def test_options_parse() -> None:
+    trials = {"type": int, "default": 4}
+    given = scoring.options("a", 10, ["--env-steps", "7", "--seed", "3"], trials=trials)
+    assert vars(given) == {"env_steps": 7, "situation": "mixed", "seed": 3, "trials": 4}
+    assert scoring.options("a", 10, []).env_steps == 10
+    with pytest.raises(SystemExit):
+        scoring.options("a", 10, ["--env-step", "many"])
+
+
+@pytest.mark.parametrize("script", ["random", "hungarian"])
+def test_a_script_is_scored_as_evaluation_counts_it(script: str) -> None:
+    scenario = Scenario.preset("mixed").replace(episode_steps=25)
+    policy = scripted_policy(script, scenario)
+    record = run_episodes(policy, scenario, scoring.EPISODES, scoring.SEED)
+    expected = len(record.rescues) / scoring.EPISODES
+    assert scoring.scripted(scenario, script) == pytest.approx(expected)
+
+
+def test_random_actions_score_zero_and_standing_still_less(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    source = np.random.default_rng(1)
+    given = Namespace(situation="mixed", seed=0)
+
+    def randomly(obs: NDArray[np.float32]) -> NDArray[np.int64]:
+        return source.integers(5, size=obs.shape[:2])
+
+    found = scoring.report("a", "b", given, 5, 1.0, randomly)
+    assert found == json.loads(capsys.readouterr().out)
+    assert abs(found["score"]) < 0.05
+    still = scoring.report("a", "b", given, 5, 1.0, lambda obs: np.zeros(obs.shape[:2], int))
+    assert still["rescues_per_episode"] < found["rescues_per_episode"]
+
+
+def test_the_single_file_learns() -> None:
+    done = subprocess.run(
+        [sys.executable, str(LIBRARIES / "single_file_mappo.py"), "--env-steps", "60000"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    result = json.loads(done.stdout)
+    assert 60_000 <= result["env_steps"] < 70_000
+    assert result["score"] > 0.1
+
+
+def test_the_single_file_bootstraps_at_the_end_of_an_episode() -> None:
+    import torch
+
+    torch.manual_seed(0)
+    worlds, steps = single_file_mappo.WORLDS, single_file_mappo.STEPS
+    scenario = Scenario.preset("single").replace(episode_steps=7)
+    team = single_file_mappo.Team(4, BatchEnv(scenario, 1).obs_width, 5)
+    with BatchEnv(scenario, worlds, seed=2, copy=False) as env:
+        rollout, _ = single_file_mappo.collect(env, team, np.array(env.reset()))
+    actions = rollout.actions.view(steps, worlds, 4)
+    gamma, decay = single_file_mappo.GAMMA, single_file_mappo.LAMBDA
+    with BatchEnv(scenario, worlds, seed=2) as env, torch.no_grad():
+        obs, deltas, ends = torch.from_numpy(env.reset()), [], []
+        for t in range(steps):
+            step = env.step(actions[t].numpy())
+            after = team.value(torch.from_numpy(step.final_obs))
+            after[step.terminated] = 0.0
+            deltas.append(torch.from_numpy(step.reward) + gamma * after - team.value(obs))
+            ends.append(torch.from_numpy(step.terminated | step.truncated))
+            obs = torch.from_numpy(step.obs)
+    assert torch.stack(ends).any()
+    advantage = rollout.advantage.view(steps, worlds, 4)
+    for world in (0, worlds - 1):
+        for start in range(steps):
+            total, weight = torch.zeros(4), 1.0
+            for t in range(start, steps):
+                total += weight * deltas[t][world]
+                weight *= gamma * decay
+                if ends[t][world]:
+                    break
+            torch.testing.assert_close(advantage[start, world], total, rtol=1e-4, atol=1e-5)
+
+
+def test_the_table_of_baselines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import baselines
+
+    monkeypatch.setattr(baselines, "PAGE", tmp_path / "docs.md")
+    monkeypatch.setattr(baselines, "KNOWN", tmp_path / "runs" / "known.jsonl")
+    assert baselines.known() == {}
+    rows = {
+        ("torchrl-mappo", "mixed", seed, 100): {"score": score, "train_seconds": 10.0 + seed}
+        for seed, score in enumerate((0.25, 0.75))
+    }
+    baselines.remember(rows)
+    assert baselines.known() == rows
+    for _ in range(2):  # the second time the page is there
+        baselines.publish(rows, ["torchrl-mappo"], 100)
+    text = (tmp_path / "docs.md").read_text("utf-8")
+    line = "| `torchrl-mappo` | not run | not run | 0.50 (0.25 to 0.75) | 10 s |"
+    assert text.count(line) == 1
+    assert "seeds 0, 1; 100 env-steps each" in text
