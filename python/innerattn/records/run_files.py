@@ -21,6 +21,7 @@ from innerattn.config.files import write_whole
 from innerattn.config.untrusted import parse_json, read_plain
 from innerattn.errors import RunError, UnsealedRunWarning
 from innerattn.records.run_info import RunInfo, run_info
+from innerattn.zoo import run_path
 
 MANIFEST = "manifest.json"
 _SCHEMA_VERSION = 1
@@ -52,7 +53,7 @@ class RunFiles:
     """
 
     def __init__(self, run: str | Path) -> None:
-        """Read ``run.json`` and the manifest.
+        """Read ``run.json`` and the manifest of a run, named by its folder or as ``zoo:NAME``.
 
         Warns:
             UnsealedRunWarning: the run is over and has no manifest.
@@ -61,7 +62,7 @@ class RunFiles:
             RunError: there is no such folder, it was not made by training, or ``run.json`` or the
                 manifest is missing, damaged or not of this run.
         """
-        self.path = Path(run)
+        self.path = run_path(run)
         if not self.path.is_dir():
             raise RunError(f"{self.path}: no such run folder")
         file = self.path / "run.json"

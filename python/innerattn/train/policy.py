@@ -17,6 +17,7 @@ from innerattn.records.run_files import RunFiles
 from innerattn.records.run_folder import config_of, weights_name
 from innerattn.train.build import build_learner
 from innerattn.train.weights import MOST_BYTES, weights_in
+from innerattn.zoo import run_path
 
 _TRIES = 5
 
@@ -40,7 +41,7 @@ def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learne
     """The configuration of a run and a learner with its newest weights.
 
     Args:
-        run: the run folder.
+        run: the run folder, or ``zoo:NAME``.
         device: where the networks are put; the device of training need not exist here.
 
     Raises:
@@ -58,7 +59,7 @@ def load_newest(run: str | Path, device: str = "cpu") -> NewestPolicy:
     Raises:
         RunError, ConfigError: as of `load_policy`.
     """
-    path = Path(run)
+    path = run_path(run)
     for _ in range(_TRIES - 1):
         files = RunFiles(path)
         if files.info.state != "running":

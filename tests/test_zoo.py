@@ -1,0 +1,102 @@
+"""The zoo: every team does what its card says; what a card cannot vouch for is not taken in."""
+
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_run import made_run
+
+from innerattn.config import RunConfig
+from innerattn.envs import BatchEnv
+from innerattn.errors import RunError
+from innerattn.evaluate import load_trained, run_episodes
+from innerattn.records.run_files import AlteredFileError, RunFiles
+from innerattn.records.run_folder import newest_weights
+from innerattn.report.marks import marked
+from innerattn.train import load_policy
+from innerattn.train.weights import digest_of
+from innerattn.zoo import CARD, FOLDER, PREFIX, read_card, run_path, zoo_names
+
+DOCS = Path(__file__).parents[1] / "docs"
+sys.path.insert(0, str(DOCS))
+import zoo as packing  # noqa: E402
+
+EPISODES = 150
+
+
+@pytest.fixture
+def packed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A team of an untrained run, in a zoo of its own."""
+    run = made_run(tmp_path / "runs", "single", "td-inner", 3)
+
+    def same(*_: object, **__: object) -> RunConfig:
+        return run.config
+
+    monkeypatch.setattr(packing, "load_run_config", same)
+    (tmp_path / "zoo").mkdir()
+    return packing.pack(run.folder, "single", "quick", tmp_path / "zoo")
+
+
+def test_there_is_a_team_of_each_situation() -> None:
+    assert {"single", "double", "mixed"} <= set(zoo_names())
+
+
+def test_the_zoo_is_small() -> None:
+    size = sum(file.stat().st_size for file in FOLDER.rglob("*") if file.is_file())
+    assert size < packing.MOST_BYTES
+
+
+@pytest.mark.parametrize("name", zoo_names())
+def test_a_team_scores_what_its_card_says(name: str) -> None:
+    card = read_card(name)
+    short = card["lengths"][0]
+    config, policy = load_trained(f"{PREFIX}{name}", greedy=True)
+    assert config.scenario.episode_steps == short["episode_steps"]
+    played = run_episodes(policy, config.scenario, EPISODES, card["worlds_seed"], num_threads=1)
+    rescues = played.rescue_counts()
+    card_mean = short["rescues_per_episode"]["mean"]
+    # Four standard errors: of the same worlds' first ones, it is seldom more than one.
+    assert abs(rescues.mean() - card_mean) < 4 * rescues.std() / np.sqrt(EPISODES)
+    assert short["score"]["mean"] > 0.9
+
+
+@pytest.mark.parametrize("name", zoo_names())
+def test_weights_are_those_of_the_card(name: str) -> None:
+    card = read_card(name)
+    config, _ = load_policy(f"{PREFIX}{name}")
+    assert digest_of(newest_weights(run_path(f"{PREFIX}{name}"))) == card["weights_sha256"]
+    assert RunFiles(f"{PREFIX}{name}").info.weights_sha256 == card["weights_sha256"]
+    assert f"--method {config.train.method} " in card["command"]
+    assert f"--seed {card['seed']} " in card["command"]
+
+
+def test_the_page_lists_the_zoo() -> None:
+    assert marked(DOCS / "zoo.md", "teams")[1].strip() == packing.table()
+
+
+def test_a_packed_run_loads_and_its_card_is_sealed(packed: Path) -> None:
+    with closing(BatchEnv("single", 1)) as env:
+        assert load_policy(packed)[0].scenario.num_robots == env.num_robots
+    assert packing.read_card("single", packed.parent)["seed"] == 3
+    assert "`zoo:single`" in packing.table(packed.parent)
+    assert not (packed / "metrics.jsonl").exists()
+    (packed / CARD).write_text((packed / CARD).read_text().replace('"seed": 3', '"seed": 4'))
+    with pytest.raises(AlteredFileError, match="altered"):
+        RunFiles(packed).read(CARD, 1 << 20)
+
+
+def test_a_run_of_another_command_is_refused(tmp_path: Path) -> None:
+    run = made_run(tmp_path / "runs", "single", "td-inner", 3)
+    (tmp_path / "zoo").mkdir()
+    with pytest.raises(RunError, match="trained otherwise than --preset single --budget quick"):
+        packing.pack(run.folder, "single", "quick", tmp_path / "zoo")
+    assert list((tmp_path / "zoo").iterdir()) == []
+
+
+def test_an_unknown_team_is_refused() -> None:
+    with pytest.raises(RunError, match=r"zoo:triple: no such team; there are .*zoo:single"):
+        run_path("zoo:triple")
+    with pytest.raises(RunError, match="no such team"):
+        load_policy("zoo:../records")
