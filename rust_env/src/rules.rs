@@ -70,6 +70,13 @@ impl Rules {
         if let Some(crowded) = spawn.find_crowding() {
             return Err(too_crowded(&scenario, crowded));
         }
+        if let Some(index) = spawn.blocked_place() {
+            return Err(Error::Scenario {
+                key: format!("scenario.victim_places_m[{index}]"),
+                value: format!("{:?}", scenario.victim_places_m[index]),
+                rule: "must be wall_clearance_m away from every obstacle that has a place".into(),
+            });
+        }
         Ok(Self {
             physics: Physics::new(&scenario, &team, &solids),
             layout: Layout::new(&scenario, &tasks),
@@ -103,7 +110,7 @@ fn too_crowded(scenario: &Scenario, crowded: Crowded) -> Error {
         Crowded::Robots => (
             "scenario.robots (their number)",
             scenario.robots.len().to_string(),
-            "no room for them without overlap; use fewer, smaller, or a wider arena",
+            "no room for them without overlap; use fewer, smaller, or a wider arena, and start_m that are apart",
         ),
         Crowded::Victims => (
             "scenario.spawn_clearance_m",
@@ -135,6 +142,7 @@ fn processes(scenario: &Scenario) -> Vec<Process> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::{Obstacle, Shape};
 
     fn refusal(change: impl Fn(&mut Scenario)) -> String {
         let mut scenario = Scenario::default();
@@ -148,6 +156,25 @@ mod tests {
         assert!(refused.starts_with("scenario.spawn_clearance_m = 3: no place is so far"), "{refused}");
         let refused = refusal(|scenario| scenario.robots.iter_mut().for_each(|robot| robot.radius_m = 0.45));
         assert!(refused.starts_with("scenario.robots (their number) = 4: no room for them"), "{refused}");
+        let refused = refusal(|scenario| {
+            for robot in &mut scenario.robots[..2] {
+                robot.start_m = Some([0.5, 0.5]);
+            }
+        });
+        assert!(refused.ends_with("start_m that are apart"), "{refused}");
+        let refused = refusal(|scenario| {
+            scenario.victim_places_m = vec![[0.0, 0.0], [0.5, 0.5]];
+            scenario.obstacles = vec![Obstacle {
+                shape: Shape::Disc,
+                radius_m: Some(0.1),
+                half_extents_m: None,
+                position_m: Some([0.5, 0.65]),
+            }];
+        });
+        assert!(
+            refused.starts_with("scenario.victim_places_m[1] = [0.5, 0.5]: must be wall_clear"),
+            "{refused}"
+        );
         let disc = r#"{"shape": "disc", "radius_m": 0.6}"#;
         let text = format!(r#"{{"obstacles": [{disc}, {disc}, {disc}]}}"#);
         let refused = Rules::from_json(&text).err().map(|error| error.to_string()).unwrap_or_default();

@@ -15,12 +15,16 @@ pub const MAX_ROBOTS: usize = 64;
 pub const MAX_VICTIMS: usize = 32;
 /// Most obstacles in an arena.
 pub const MAX_OBSTACLES: usize = 64;
+/// Most places in a list of those at which victims appear.
+pub const MAX_PLACES: usize = 256;
 /// Most different abilities in a scenario.
 pub const MAX_ABILITIES: usize = 32;
 /// Most faults in a scenario.
 pub const MAX_FAULTS: usize = 256;
 /// Most helpers that one victim may need.
 pub const MAX_NEEDS: usize = 8;
+/// Gap between robots, and between robots and solids, when an episode starts, m.
+pub const START_GAP_M: f64 = 1e-3;
 /// Most that the heaviest robot may weigh, in weights of the lightest: contacts are true up to here.
 pub const MAX_MASS_RATIO: f64 = 100.0;
 
@@ -123,6 +127,9 @@ pub struct Robot {
     /// Force of its drive, N.
     #[serde(default = "default_drive_force_n")]
     pub drive_force_n: f64,
+    /// Where it is when an episode starts, m; a random place in each episode if absent.
+    #[serde(default)]
+    pub start_m: Option<[f64; 2]>,
 }
 
 fn default_radius_m() -> f64 {
@@ -182,6 +189,11 @@ pub struct Scenario {
     pub spawn_clearance_m: f64,
     /// How far from walls and obstacles a victim appears, m.
     pub wall_clearance_m: f64,
+    /// Least x and y, then largest x and y, of the places at which victims appear, m; wherever the
+    /// clearances are kept if absent.
+    pub victim_area_m: Option<[f64; 4]>,
+    /// The only places at which victims appear, m; any if empty.
+    pub victim_places_m: Vec<[f64; 2]>,
     /// Control steps of an episode.
     pub episode_steps: u32,
     /// Terminates the episode after so many rescues; never if absent.
@@ -230,6 +242,7 @@ impl Default for Scenario {
             mass_kg,
             radius_m: default_radius_m(),
             drive_force_n: default_drive_force_n(),
+            start_m: None,
         };
         let task = |name: &str, needs: [&str; 2]| Task {
             name: name.into(),
@@ -250,6 +263,8 @@ impl Default for Scenario {
             rescue_radius_m: 0.15,
             spawn_clearance_m: 0.2,
             wall_clearance_m: 0.1,
+            victim_area_m: None,
+            victim_places_m: vec![],
             episode_steps: 25,
             end_when_rescued: None,
             dt_s: 0.1,

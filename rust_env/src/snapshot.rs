@@ -7,6 +7,7 @@ use crate::fault::NUM_KINDS;
 use crate::geometry::Vec2;
 use crate::robot::MAX_SET_SPEED_MPS;
 use crate::rules::Rules;
+use crate::scenario::Scenario;
 use crate::world::World;
 
 const MAGIC: &[u8; 8] = b"innerATT";
@@ -83,7 +84,7 @@ pub fn load(rules: &Rules, num_envs: usize, bytes: &[u8]) -> Result<Vec<World>> 
         return refuse(format!("version {version} was found; this version reads {VERSION}"));
     }
     let (head, mut rest) = postcard::take_from_bytes::<Head>(image).map_err(|_| unread())?;
-    if head.scenario != rules.scenario.to_json() {
+    if !is_of(&rules.scenario, &head.scenario) {
         return refuse("it was made with another scenario".into());
     }
     if head.num_envs != num_envs {
@@ -102,6 +103,12 @@ pub fn load(rules: &Rules, num_envs: usize, bytes: &[u8]) -> Result<Vec<World>> 
         return refuse(format!("{} bytes are left over after the last env", rest.len()));
     }
     Ok(worlds)
+}
+
+/// Whether a text describes this scenario; keys that it lacks, since they are newer, have their defaults.
+fn is_of(scenario: &Scenario, text: &str) -> bool {
+    let wanted = scenario.to_json();
+    text == wanted || Scenario::from_json(text).is_ok_and(|found| found.to_json() == wanted)
 }
 
 /// The first field of a world that no world of these rules may have. Every seed and stream is possible.

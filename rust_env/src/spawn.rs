@@ -32,6 +32,8 @@ pub struct Spawn {
     solids: Vec<Solid>,
     /// Given places of the obstacles, m; none for those that stand elsewhere in each episode.
     given: Vec<Option<Vec2>>,
+    /// Given places of the robots when an episode starts, m; none for those that start elsewhere each time.
+    starts: Vec<Option<Vec2>>,
     situation: Situation,
     num_tasks: usize,
     num_slots: usize,
@@ -47,6 +49,7 @@ impl Spawn {
             team: team.to_vec(),
             solids: solids.to_vec(),
             given: scenario.obstacles.iter().map(|obstacle| obstacle.position_m.map(given)).collect(),
+            starts: scenario.robots.iter().map(|robot| robot.start_m.map(given)).collect(),
             situation: scenario.situation,
             num_tasks: scenario.tasks.len(),
             num_slots: scenario.num_victims(),
@@ -59,9 +62,11 @@ impl Spawn {
         let given = self.solids.iter().zip(&self.given);
         let mut placed: Vec<Placed> = Vec::with_capacity(self.solids.len());
         placed.extend(given.filter_map(|(solid, at)| at.map(|at| (solid, at))));
+        let starts = self.team.iter().zip(&self.starts);
+        let starts: Vec<(&Body, Vec2)> = starts.filter_map(|(body, at)| at.map(|at| (body, at))).collect();
         for ((solid, given), obstacle) in self.solids.iter().zip(&self.given).zip(obstacles) {
             *obstacle = given.unwrap_or_else(|| {
-                let place = self.placing.obstacle(stream, solid, &placed);
+                let place = self.placing.obstacle(stream, solid, &placed, &starts);
                 clear &= place.clear;
                 placed.push((solid, place.at));
                 place.at
@@ -70,16 +75,19 @@ impl Spawn {
         clear
     }
 
-    /// Writes the robots' places. Returns whether none overlaps anything.
+    /// Writes the robots' places, those given first. Returns whether none overlaps anything.
     pub fn place_robots(&self, stream: &mut Stream, obstacles: &[Vec2], robots: &mut [Vec2]) -> bool {
         let mut clear = true;
         let solids = self.placed(obstacles);
         let mut others = Vec::with_capacity(self.team.len());
-        for (body, robot) in self.team.iter().zip(robots) {
-            let place = self.placing.robot(stream, body, &others, &solids);
-            clear &= place.clear;
-            others.push((body, place.at));
-            *robot = place.at;
+        for wanted in [true, false] {
+            let team = self.team.iter().zip(&self.starts).zip(&mut *robots);
+            for ((body, start), robot) in team.filter(|((_, start), _)| start.is_some() == wanted) {
+                let place = self.placing.robot(stream, body, *start, &others, &solids);
+                clear &= place.clear;
+                others.push((body, place.at));
+                *robot = place.at;
+            }
         }
         clear
     }
@@ -154,21 +162,30 @@ impl Spawn {
             Situation::Single | Situation::Double => slots.len(),
             Situation::Mixed => 1 + stream.below(slots.len()),
         };
-        for (index, slot) in slots.iter_mut().enumerate().take(wanted) {
-            if slot.is_some() {
+        for index in 0..wanted {
+            if slots[index].is_some() {
                 continue;
             }
             let task = match self.situation {
                 Situation::Double => index,
                 Situation::Single | Situation::Mixed => stream.below(self.num_tasks),
             };
-            let place = self.placing.victim(stream, robots, &solids);
+            let others = slots.iter().flatten().map(|victim| victim.position);
+            let place = self.placing.victim(stream, robots, &others, &solids);
             clear &= place.clear;
-            *slot =
+            slots[index] =
                 Some(Victim { id: *appeared, task: task as u32, appeared_step: step, position: place.at });
             *appeared += 1;
         }
         clear
+    }
+
+    /// Number of the first listed place of victims that is too near to an obstacle with a given place.
+    #[must_use]
+    pub fn blocked_place(&self) -> Option<usize> {
+        let fixed = self.solids.iter().zip(&self.given);
+        let placed: Vec<Placed> = fixed.filter_map(|(solid, at)| at.map(|at| (solid, at))).collect();
+        self.placing.blocked_place(&placed)
     }
 
     /// What does not fit into the arena in some of 64 trial episodes, if anything.

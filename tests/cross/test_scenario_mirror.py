@@ -145,7 +145,10 @@ def test_every_value_survives_the_way_there_and_back() -> None:
     """Values that are no default: a key read under another name, or not at all, would differ."""
     changed = {
         "situation": "double",
-        "robots": [*TEAM[1:], {**TEAM[0], "radius_m": 0.04, "drive_force_n": 3.5}],
+        "robots": [
+            *TEAM[1:],
+            {**TEAM[0], "radius_m": 0.04, "drive_force_n": 3.5, "start_m": [0.25, -0.5]},
+        ],
         "tasks": [TASK],
         "max_victims": 7,
         "obstacles": [{"shape": "box", "half_extents_m": [0.1, 0.2], "position_m": [0.3, 0.4]}],
@@ -153,6 +156,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         "rescue_radius_m": 0.25,
         "spawn_clearance_m": 0.125,
         "wall_clearance_m": 0.0625,
+        "victim_area_m": [-0.5, -0.25, 0.125, 0.75],
         "episode_steps": 99,
         "end_when_rescued": 4,
         "dt_s": 0.05,
@@ -171,12 +175,17 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         "faults": [{**FAULT, "onset_step": 3, "onset_rate_hz": 0.5, "duration_steps": 7}],
         "observe_faults": True,
     }
-    assert changed.keys() == Scenario.model_fields.keys() - {"engine"}
+    # Friction needs one engine, and an area excludes a list of places.
+    assert changed.keys() == Scenario.model_fields.keys() - {"engine", "victim_places_m"}
     scenario = Scenario.model_validate(changed)
     default = Scenario()
     for key in changed:
         assert getattr(scenario, key) != getattr(default, key)
     assert compiled(changed) == scenario.model_dump(mode="json")
+    del changed["victim_area_m"]
+    listed = {**changed, "victim_places_m": [[0.5, 0.25], [-1.5, 0.0]]}
+    assert compiled(listed) == Scenario.model_validate(listed).model_dump(mode="json")
+    assert compiled(listed)["victim_places_m"] == listed["victim_places_m"]
 
 
 def test_models_are_all_mirrored() -> None:

@@ -9,6 +9,7 @@ from innerattn.envs import BatchEnv
 from innerattn.policies import PolicyInput, WorldState
 from innerattn.policies.scripted.dispatch import HungarianPolicy
 
+SITUATIONS = ("single", "double", "mixed")
 LEAST_P = 1e-3
 WORLDS = 4000
 THREE_TASKS = (*Scenario().tasks, Task(name="task_3", needs=("medicine", "information")))
@@ -181,6 +182,49 @@ def test_clearances_are_kept() -> None:
         checked, nearest = checked + len(at), min(nearest, robots.min())
     assert checked >= 300
     assert nearest < 0.33  # the clearance binds: it is not kept by chance
+
+
+def test_robots_start_where_the_scenario_says() -> None:
+    team = Scenario().robots
+    robots = (team[0], team[1].replace(start_m=(0.5, -0.25)), *team[2:])
+    env = first_of(Scenario(robots=robots))
+    first = env.positions()
+    env.reset()
+    second = env.positions()
+    assert (first[:, 1] == [0.5, -0.25]).all()
+    assert (second[:, 1] == [0.5, -0.25]).all()
+    others = [0, 2, 3]
+    assert (first[:, others] != second[:, others]).any((1, 2)).all()
+    apart = np.linalg.norm(first[:, others] - first[:, [1]], axis=-1)
+    assert apart.min() >= 0.1
+
+
+@pytest.mark.parametrize("situation", SITUATIONS)
+def test_victims_appear_in_their_area_alone(situation: str) -> None:
+    area = (-0.5, 0.125, 0.25, 0.875)
+    scenario = Scenario(situation=situation, victim_area_m=area, episode_steps=150)
+    places = []
+    for _, _, before, after in driven(scenario, 200, 60):
+        places.append(place_of(after)[after["present"] & (after["id"] != before["id"])])
+    found = np.concatenate(places)
+    assert len(found) >= 300
+    assert (found >= area[:2]).all()
+    assert (found <= area[2:]).all()
+    assert np.ptp(found, axis=0) == pytest.approx([0.75, 0.75], abs=0.05)
+
+
+@pytest.mark.parametrize("situation", SITUATIONS)
+def test_victims_appear_at_listed_places_alone_and_never_two_at_one(situation: str) -> None:
+    listed = ((0.5, 0.5), (-0.5, 0.5), (0.0, -0.75), (0.875, 0.0))
+    scenario = Scenario(situation=situation, victim_places_m=listed, episode_steps=150)
+    counts = np.zeros(len(listed), int)
+    for _, _, before, after in driven(scenario, 200, 60):
+        same = (place_of(after)[:, :, None] == np.array(listed)).all(-1)  # (E, V, places)
+        assert (same.any(-1) == after["present"]).all()
+        assert same.sum(1).max() <= 1
+        new = after["present"] & (after["id"] != before["id"])
+        counts += (same & new[..., None]).sum((0, 1))
+    assert counts.min() >= 50
 
 
 def test_obstacles_without_a_place_move_each_episode() -> None:

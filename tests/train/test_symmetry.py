@@ -16,6 +16,8 @@ from innerattn.train.columns import vector_columns
 
 METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo")
 FAULTS = (Fault(robot="food_0", kind="heading_bias", value=0.4),)
+TEAM = Scenario().robots
+PLACED = (TEAM[0], TEAM[1].replace(start_m=(0.5, 0.0)), *TEAM[2:])
 
 
 def run(method: str, scenario: Scenario, symmetry: str = "canonical") -> RunConfig:
@@ -98,6 +100,30 @@ def test_obstacles_that_break_the_symmetry_are_refused(obstacle: Obstacle) -> No
         closing(BatchEnv(scenario, 1, num_threads=1)) as env,
         pytest.raises(ConfigError, match=r"scenario\.obstacles\[0\]: network\.symmetry"),
     ):
+        build_learner(run("td-inner", scenario), env)
+
+
+@pytest.mark.parametrize(
+    ("key", "changes"),
+    [
+        (r"robots\[1\]\.start_m", {"robots": PLACED}),
+        ("victim_places_m", {"victim_places_m": ((0.5, 0.5), (-0.5, -0.5))}),
+        ("victim_area_m", {"victim_area_m": (-0.5, -0.5, 0.5, 0.4)}),
+        ("victim_area_m", {"victim_area_m": (0.0, 0.0, 0.5, 0.5)}),
+    ],
+)
+def test_places_that_break_the_symmetry_are_refused(key: str, changes: dict[str, object]) -> None:
+    scenario = Scenario().replace(**changes)
+    with (
+        closing(BatchEnv(scenario, 1, num_threads=1)) as env,
+        pytest.raises(ConfigError, match=rf"scenario\.{key}: network\.symmetry"),
+    ):
+        build_learner(run("td-inner", scenario), env)
+
+
+def test_a_square_around_the_centre_is_not() -> None:
+    scenario = Scenario(victim_area_m=(-0.5, -0.5, 0.5, 0.5))
+    with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
         build_learner(run("td-inner", scenario), env)
 
 

@@ -62,8 +62,8 @@ BRIEF: Mapping[str, Brief] = {
         (
             (
                 "RUN|POLICY",
-                "a run (folder, latest, or how its name begins), or a script: "
-                "random, greedy, hungarian",
+                "a run (folder, latest, zoo:NAME, or how its name begins), or a "
+                "script: random, greedy, hungarian",
             ),
             ("--scenario FILE", "TOML file with the scenario to measure in"),
             ("--situation NAME", "single, double or mixed (that of the run)"),
@@ -74,15 +74,15 @@ BRIEF: Mapping[str, Brief] = {
             _JSON,
             _QUIET,
         ),
-        ("latest", "hungarian --situation double", "runs/mine --json - > mine.json"),
+        ("latest", "zoo:double", "hungarian --situation double", "runs/mine --json - > mine.json"),
     ),
     "replay": Brief(
         "[OPTIONS] RUN|POLICY|FILE ...",
         (
             (
                 "RUN|POLICY|FILE",
-                "up to four: runs, scripts (random, greedy, hungarian, oracle) or "
-                "episodes.parquet files",
+                "up to four: runs (also zoo:NAME), scripts (random, greedy, hungarian, "
+                "oracle) or episodes.parquet files",
             ),
             ("-o, --output FILE", "what to write: .html, .gif or .mp4 ({output})"),
             ("--episodes N", "play N new episodes instead of showing recorded ones"),
@@ -91,7 +91,7 @@ BRIEF: Mapping[str, Brief] = {
             ("--episode N", "which episode a moving picture shows"),
             ("--robot NAME", "robot whose attention a moving picture shows"),
         ),
-        ("latest", "latest hungarian -o both.html", "latest --episode 3 -o third.gif"),
+        ("latest", "zoo:mixed hungarian -o both.html", "latest --episode 3 -o third.gif"),
     ),
     "robustness": Brief(
         "[OPTIONS] RUN ...",

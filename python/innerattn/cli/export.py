@@ -8,8 +8,9 @@ from typing import Annotated
 
 import tyro
 
-from innerattn.cli.options import Command
+from innerattn.cli.options import Command, UsageError
 from innerattn.cli.runs import named_run
+from innerattn.zoo import in_zoo
 
 
 @dataclass(kw_only=True)
@@ -32,9 +33,12 @@ class Export(Command):
                 is missing, or an exported policy that differs from the trained one.
             OSError: a file cannot be written.
         """
+        run = named_run(self.run_folder)
+        if self.output is None and in_zoo(run):
+            raise UsageError(f"{self.run_folder}: -o FOLDER must say where to write")
         from innerattn.train.export import export_run
 
-        folder, contract = export_run(named_run(self.run_folder), self.output)
+        folder, contract = export_run(run, self.output)
         checked = contract.checked
         assert checked is not None  # as export_run always checks
         robots, actors = len(contract.robots), len(contract.actors)

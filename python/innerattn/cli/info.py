@@ -14,6 +14,7 @@ import tomli_w
 from innerattn.cli.options import Command
 from innerattn.config import BUDGETS, SCENARIOS, Scenario
 from innerattn.cores import usable_cores
+from innerattn.zoo import zoo_names
 
 _PACKAGES = ("torch", "numpy", "pydantic", "gymnasium", "pettingzoo")
 
@@ -23,7 +24,7 @@ class Info(Command):
     """Show versions, threads, device and presets, or check a scenario file."""
 
     scenario: Path | None = None
-    """TOML file with a scenario: check it and print it with all defaults."""
+    """TOML file with a scenario: check it, print it with all defaults, and draw its arena."""
     schema: Literal["scenario", "run"] | None = None
     """Print the JSON Schema of a scenario's file or a run's file, for editors."""
 
@@ -42,8 +43,11 @@ class Info(Command):
             print(schema_text(self.schema), end="")
             return 0
         if self.scenario is not None:
+            from innerattn.report.scenario_map import scenario_map
+
             scenario = Scenario.from_toml(self.scenario)
-            print(tomli_w.dumps(scenario.model_dump(exclude_none=True)), end="")
+            print(tomli_w.dumps(scenario.model_dump(exclude_none=True)))
+            print("\n".join(f"# {line}".rstrip() for line in scenario_map(scenario).splitlines()))
             return 0
         rows = {"innerattn": _version("innerattn"), "python": platform.python_version()}
         rows |= {name: _version(name) for name in _PACKAGES}
@@ -51,6 +55,7 @@ class Info(Command):
         rows["device"] = _device()
         rows["presets"] = ", ".join(SCENARIOS)
         rows["budgets"] = ", ".join(BUDGETS)
+        rows["zoo"] = ", ".join(zoo_names())
         for name, value in rows.items():
             print(f"{name:<11}{value}")
         return 0

@@ -23,6 +23,7 @@ from innerattn.cli.completion import completion_script
 from innerattn.cli.evaluate import Evaluate
 from innerattn.cli.export import Export
 from innerattn.cli.info import Info
+from innerattn.cli.new import New
 from innerattn.cli.options import UsageError
 from innerattn.cli.play import Play
 from innerattn.cli.replay import Replay
@@ -56,6 +57,7 @@ COMMANDS: Mapping[str, Any] = {
     "reproduce": Reproduce,
     "export": Export,
     "seal": Seal,
+    "new": New,
     "info": Info,
 }
 """What a user can do, by name, in the order in which help lists it."""

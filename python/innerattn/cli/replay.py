@@ -15,6 +15,7 @@ from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
 from innerattn.policies import SCRIPTED
+from innerattn.zoo import in_zoo
 
 if TYPE_CHECKING:
     from innerattn.records import Record
@@ -90,7 +91,8 @@ class Replay(Command):
 
     def _plays_anew(self) -> bool:
         given = (self.episodes, self.seed, self.scenario)
-        return given != (None, None, None) or all(one in SCRIPTS for one in self.policies)
+        unrecorded = [one in SCRIPTS or in_zoo(one) for one in self.policies]
+        return given != (None, None, None) or all(unrecorded)
 
     def _recorded(self) -> list[Record]:
         """What was recorded; scripts play in the same worlds."""

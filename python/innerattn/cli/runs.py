@@ -1,4 +1,4 @@
-"""Runs by name: a path, `latest`, or the beginning of the name of a folder under `runs`."""
+"""Runs by name: a path, `zoo:NAME`, `latest`, or the beginning of a name of a folder in `runs`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 from innerattn.config.near import did_you_mean
 from innerattn.errors import RunError
+from innerattn.zoo import PREFIX, run_path
 
 RUNS = Path("runs")
 """Where `innerattn train` makes run folders, unless it is told another place."""
@@ -20,19 +21,22 @@ def named_run(name: str) -> Path:
     """The run folder that ``name`` means; a path where something is always wins.
 
     Args:
-        name: a path; `latest`, the run in `runs` that was begun last; or the beginning of the name
-            of just one run folder in `runs`.
+        name: a path; `zoo:NAME`, a team that comes with the package; `latest`, the run in `runs`
+            that was begun last; or the beginning of the name of just one run folder in `runs`.
 
     Returns:
         The folder. Where nothing fits, ``name`` itself as a path, so that what reads it says what
         is missing.
 
     Raises:
-        RunError: the names of several runs begin so, or there is no run that could be the latest.
+        RunError: the names of several runs begin so, there is no run that could be the latest, or
+            no such team.
     """
     path = Path(name)
     if not name or os.path.lexists(path):
         return path
+    if name.startswith(PREFIX):
+        return run_path(name)
     if name == LATEST:
         runs = _runs()
         if not runs:

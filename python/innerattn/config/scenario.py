@@ -15,7 +15,7 @@ from pydantic import Field, PrivateAttr, ValidationError
 
 from innerattn import _core
 from innerattn.config.files import preset_names, preset_table, toml_table
-from innerattn.config.model import Model, config_error
+from innerattn.config.model import ADDED_LATER, Model, config_error
 from innerattn.config.near import did_you_mean
 from innerattn.errors import ConfigError
 from innerattn.shown import Shown
@@ -37,6 +37,9 @@ class Robot(Model):
     mass_kg: float = Field(description="mass [kg]")
     radius_m: float = Field(0.05, description="radius of the disc [m]")
     drive_force_n: float = Field(5.0, description="force of a full command [N]")
+    start_m: Annotated[tuple[float, float] | None, ADDED_LATER] = Field(
+        None, description="place when an episode starts [m]; None: a new random place each episode"
+    )
 
 
 class Task(Model):
@@ -165,6 +168,14 @@ class Scenario(Model, Shown):
         0.2, description="least distance of a new victim to robots [m]"
     )
     wall_clearance_m: float = Field(0.1, description="least distance of a new victim to walls [m]")
+    victim_area_m: Annotated[tuple[float, float, float, float] | None, ADDED_LATER] = Field(
+        None,
+        description="rectangle in which victims appear: least x, least y, most x, most y [m]; "
+        "None: the arena",
+    )
+    victim_places_m: Annotated[tuple[tuple[float, float], ...], ADDED_LATER] = Field(
+        (), description="the only places at which victims appear [m]; none given: any"
+    )
     episode_steps: Count = Field(25, description="length of an episode [control steps]")
     end_when_rescued: Count | None = Field(
         None, description="end an episode after so many rescues; None: never"

@@ -62,13 +62,14 @@ def _turning_columns(scenario: Scenario, names: Sequence[str]) -> VectorColumns:
     """The columns that turn with worlds of a scenario.
 
     Raises:
-        ConfigError: Obstacles make a turned world another one, which no robot could see.
+        ConfigError: What has a place makes a turned world another one, which no robot could see.
     """
-    index = _asymmetric_obstacle(scenario)
-    if index is not None:
+    asymmetry = _asymmetry(scenario)
+    if asymmetry is not None:
+        key, what = asymmetry
         raise ConfigError(
-            f"scenario.obstacles[{index}]: network.symmetry must be 'none' where an obstacle "
-            "has a fixed place or is an oblong box; a turned world would be another one"
+            f"scenario.{key}: network.symmetry must be 'none' where {what}; "
+            "a turned world would be another one"
         )
     return vector_columns(names)
 
@@ -77,17 +78,25 @@ def square_symmetry(
     scenario: Scenario, names: Sequence[str], device: torch.device
 ) -> SquareSymmetry | None:
     """The group for observations of these columns; None where worlds do not have its symmetry."""
-    if _asymmetric_obstacle(scenario) is not None:
+    if _asymmetry(scenario) is not None:
         return None
     return SquareSymmetry(vector_columns(names), device)
 
 
-def _asymmetric_obstacle(scenario: Scenario) -> int | None:
-    """Number of the first obstacle that makes a turned world another one."""
+def _asymmetry(scenario: Scenario) -> tuple[str, str] | None:
+    """The first key that makes a turned world another one, and what it says."""
     for index, obstacle in enumerate(scenario.obstacles):
         sides = obstacle.half_extents_m
         if obstacle.position_m is not None or (sides is not None and sides[0] != sides[1]):
-            return index
+            return f"obstacles[{index}]", "an obstacle has a fixed place or is an oblong box"
+    for index, robot in enumerate(scenario.robots):
+        if robot.start_m is not None:
+            return f"robots[{index}].start_m", "a robot has a fixed start"
+    if scenario.victim_places_m:
+        return "victim_places_m", "victims have fixed places"
+    area = scenario.victim_area_m
+    if area is not None and len({-area[0], -area[1], area[2], area[3]}) > 1:
+        return "victim_area_m", "the area is no square around the centre"
     return None
 
 

@@ -42,6 +42,11 @@ def run_path(run: str | Path) -> Path:
     return FOLDER / name
 
 
+def in_zoo(run: str | Path) -> bool:
+    """Whether a run, named by its path or as ``zoo:NAME``, is a team of the zoo."""
+    return str(run).startswith(PREFIX) or Path(run).resolve().is_relative_to(FOLDER.resolve())
+
+
 def read_card(name: str, zoo: Path = FOLDER) -> dict[str, Any]:
     """What the card of a team says: how it was made, and what it scored.
 

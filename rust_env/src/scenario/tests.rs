@@ -126,3 +126,25 @@ fn robots_too_fast_for_their_substeps_are_refused() {
     };
     assert!(fast(Engine::Rapier).is_err() && fast(Engine::Discs).is_ok());
 }
+
+#[test]
+fn given_places_are_inside_and_fit_together() {
+    let refused = refusal(|scenario| scenario.robots[1].start_m = Some([0.0, -0.95]));
+    assert!(refused.starts_with("scenario.robots[1].start_m[1] = -0.95: must be in"), "{refused}");
+    let refused = refusal(|scenario| scenario.victim_area_m = Some([-0.5, -0.5, 0.95, 0.5]));
+    assert!(refused.starts_with("scenario.victim_area_m[2] = 0.95: must be in -0.9..=0.9 m"), "{refused}");
+    let refused = refusal(|scenario| scenario.victim_area_m = Some([0.5, f64::NAN, 0.6, 0.5]));
+    assert!(refused.starts_with("scenario.victim_area_m[1] = NaN: must be"), "{refused}");
+    let refused = refusal(|scenario| scenario.victim_area_m = Some([-0.5, 0.5, 0.5, 0.25]));
+    let wanted = "scenario.victim_area_m[1] = 0.5: must be at most victim_area_m[3], which is 0.25";
+    assert_eq!(refused, wanted);
+    let refused = refusal(|scenario| scenario.victim_places_m = vec![[0.0, 0.0]]);
+    assert_eq!(refused, "scenario.victim_places_m (their number) = 1: must be in 2..=256");
+    let refused = refusal(|scenario| scenario.victim_places_m = vec![[0.0, 0.0], [0.0, 1.0]]);
+    assert!(refused.starts_with("scenario.victim_places_m[1][1] = 1: must be in"), "{refused}");
+    let refused = refusal(|scenario| {
+        scenario.victim_places_m = vec![[0.0, 0.0], [0.5, 0.0]];
+        scenario.victim_area_m = Some([-0.5, -0.5, 0.5, 0.5]);
+    });
+    assert!(refused.ends_with("= 2: must be 0 where victim_area_m is given"), "{refused}");
+}

@@ -3,8 +3,8 @@
 
 use super::check::{broken, counts, named, within};
 use super::{
-    Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_NEEDS, MAX_OBSTACLES, MAX_ROBOTS,
-    MAX_TRAVEL_RADII, MAX_VICTIMS, Robot, Scenario, Shape,
+    Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_NEEDS, MAX_OBSTACLES, MAX_PLACES, MAX_ROBOTS,
+    MAX_TRAVEL_RADII, MAX_VICTIMS, Robot, START_GAP_M, Scenario, Shape,
 };
 use crate::error::Result;
 use crate::fault::{Fault, Spec};
@@ -18,7 +18,9 @@ impl Scenario {
         self.validate_tasks()?;
         self.validate_obstacles()?;
         self.validate_faults()?;
-        self.validate_sizes()
+        self.validate_sizes()?;
+        self.validate_starts()?;
+        self.validate_victim_places()
     }
 
     fn validate_numbers(&self) -> Result<()> {
@@ -95,6 +97,49 @@ impl Scenario {
             self.robots.iter().enumerate().filter(has).fold(0_u64, |mask, (index, _)| mask | 1 << index)
         };
         fillable(&needs.iter().map(able).collect::<Vec<u64>>())
+    }
+
+    fn validate_starts(&self) -> Result<()> {
+        for (index, robot) in self.robots.iter().enumerate() {
+            let most = self.arena_half_width_m - robot.radius_m - START_GAP_M;
+            for (axis, value) in robot.start_m.iter().flatten().enumerate() {
+                within(&format!("robots[{index}].start_m[{axis}]"), *value, -most, most, "m")?;
+            }
+        }
+        Ok(())
+    }
+
+    fn validate_victim_places(&self) -> Result<()> {
+        let most = self.arena_half_width_m - self.wall_clearance_m;
+        if let Some(area) = self.victim_area_m {
+            for (index, value) in area.into_iter().enumerate() {
+                within(&format!("victim_area_m[{index}]"), value, -most, most, "m")?;
+            }
+            for (low, high) in [(0, 2), (1, 3)] {
+                if area[low] > area[high] {
+                    let rule = format!("must be at most victim_area_m[{high}], which is {}", area[high]);
+                    return broken(&format!("victim_area_m[{low}]"), &area[low], &rule);
+                }
+            }
+        }
+        let places = self.victim_places_m.len();
+        if places == 0 {
+            return Ok(());
+        }
+        if self.victim_area_m.is_some() {
+            return broken(
+                "victim_places_m (their number)",
+                &places,
+                "must be 0 where victim_area_m is given",
+            );
+        }
+        counts("victim_places_m (their number)", places, self.num_victims(), MAX_PLACES)?;
+        for (index, place) in self.victim_places_m.iter().enumerate() {
+            for (axis, value) in place.iter().enumerate() {
+                within(&format!("victim_places_m[{index}][{axis}]"), *value, -most, most, "m")?;
+            }
+        }
+        Ok(())
     }
 
     fn validate_faults(&self) -> Result<()> {

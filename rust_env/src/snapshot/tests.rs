@@ -91,3 +91,22 @@ fn another_version_and_bytes_left_over_are_refused() {
     let error = load(&rules, 1, &sealed(image)).expect_err("an extended image").to_string();
     assert_eq!(error, "snapshot: 3 bytes are left over after the last env");
 }
+
+#[test]
+fn an_image_from_before_a_key_was_added_is_taken() {
+    let rules = rules(Scenario::default());
+    let worlds = [World::new(&rules, 0, 0)];
+    let text = |older: &str| {
+        let head = Head { version: VERSION, scenario: older.into(), num_envs: 1 };
+        let mut bytes = postcard::to_extend(&head, MAGIC.to_vec()).expect("plain data serialises");
+        bytes = postcard::to_extend(&worlds[0], bytes).expect("plain data serialises");
+        load(&rules, 1, &sealed(bytes))
+    };
+    let older =
+        rules.scenario.to_json().replace(r#","victim_places_m":[]"#, "").replace(r#","start_m":null"#, "");
+    assert!(!older.contains("victim_places_m") && !older.contains("start_m"));
+    assert_eq!(text(&older), Ok(worlds.to_vec()));
+    let other = older.replace(r#""substeps":6"#, r#""substeps":7"#);
+    assert_eq!(text(&other), Err(Error::Snapshot("it was made with another scenario".into())));
+    assert!(text("{").is_err());
+}

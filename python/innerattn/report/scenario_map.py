@@ -1,0 +1,98 @@
+"""A scenario as a map of characters, for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from innerattn.config import Obstacle, Scenario
+
+_COLUMNS, _ROWS = 61, 31
+_CORNER, _SIDE, _UPRIGHT = "+", "-", "|"
+_FREE, _AREA, _PLACE, _SOLID = " ", "·", "x", "#"
+
+
+def scenario_map(scenario: Scenario) -> str:
+    """The arena with all that has a place of its own, and a legend; without a newline at the end.
+
+    Robots with a start are drawn by a letter, obstacles by ``#``, victims' places by ``x``, and the
+    area in which victims may appear by ``·``.
+    """
+    half = scenario.arena_half_width_m
+    wall = _CORNER + _SIDE * _COLUMNS + _CORNER
+    lines = [wall]
+    starts = {
+        (_column(at[0], half), _row(at[1], half)): letter
+        for letter, at in zip(_letters(), _starts(scenario), strict=False)
+    }
+    places = {(_column(x, half), _row(y, half)) for x, y in scenario.victim_places_m}
+    for row in range(_ROWS):
+        y = half * (1.0 - 2.0 * (row + 0.5) / _ROWS)
+        cells = []
+        for column in range(_COLUMNS):
+            x = half * (2.0 * (column + 0.5) / _COLUMNS - 1.0)
+            if letter := starts.get((column, row)):
+                cells.append(letter)
+            elif any(_covers(obstacle, x, y) for obstacle in scenario.obstacles):
+                cells.append(_SOLID)
+            elif (column, row) in places:
+                cells.append(_PLACE)
+            else:
+                cells.append(_AREA if _may_appear(scenario, x, y) else _FREE)
+        lines.append(_UPRIGHT + "".join(cells) + _UPRIGHT)
+    return "\n".join([*lines, wall, *_legend(scenario)])
+
+
+def _legend(scenario: Scenario) -> Iterator[str]:
+    yield f"{scenario.arena_half_width_m * 2:g} m from wall to wall"
+    placed = [robot for robot in scenario.robots if robot.start_m is not None]
+    for letter, robot in zip(_letters(), placed, strict=False):
+        yield f"{letter}  {robot.name} starts here ({', '.join(robot.abilities) or 'no ability'})"
+    if scenario.victim_places_m:
+        yield f"{_PLACE}  a victim may appear here"
+    else:
+        yield f"{_AREA}  victims appear here"
+    if any(obstacle.position_m is not None for obstacle in scenario.obstacles):
+        yield f"{_SOLID}  an obstacle"
+    robots = len(scenario.robots) - len(placed)
+    obstacles = sum(obstacle.position_m is None for obstacle in scenario.obstacles)
+    anywhere = [f"{count} {what}" for count, what in ((robots, "robots"), (obstacles, "obstacles"))]
+    if robots or obstacles:
+        shown = [text for text in anywhere if not text.startswith("0 ")]
+        yield f"At new random places in each episode: {', '.join(shown)}"
+
+
+def _letters() -> Iterator[str]:
+    """A letter for each robot with a start; after them an asterisk for all others."""
+    yield from "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwyz"
+    while True:
+        yield "*"
+
+
+def _starts(scenario: Scenario) -> list[tuple[float, float]]:
+    return [robot.start_m for robot in scenario.robots if robot.start_m is not None]
+
+
+def _column(x: float, half: float) -> int:
+    return min(int((x / half + 1.0) / 2.0 * _COLUMNS), _COLUMNS - 1)
+
+
+def _row(y: float, half: float) -> int:
+    return min(int((1.0 - y / half) / 2.0 * _ROWS), _ROWS - 1)
+
+
+def _covers(obstacle: Obstacle, x: float, y: float) -> bool:
+    """Whether an obstacle with a place lies over a point."""
+    if obstacle.position_m is None:
+        return False
+    dx, dy = x - obstacle.position_m[0], y - obstacle.position_m[1]
+    if obstacle.half_extents_m is not None:
+        return abs(dx) <= obstacle.half_extents_m[0] and abs(dy) <= obstacle.half_extents_m[1]
+    return dx * dx + dy * dy <= (obstacle.radius_m or 0.0) ** 2
+
+
+def _may_appear(scenario: Scenario, x: float, y: float) -> bool:
+    if scenario.victim_places_m:
+        return False
+    reach = scenario.arena_half_width_m - scenario.wall_clearance_m
+    left, bottom, right, top = scenario.victim_area_m or (-reach, -reach, reach, reach)
+    return left <= x <= right and bottom <= y <= top

@@ -1,0 +1,45 @@
+"""A scenario as a map of characters."""
+
+from innerattn.config import Obstacle, Scenario
+from innerattn.report.scenario_map import scenario_map
+
+
+def rows(scenario: Scenario) -> list[str]:
+    """What is inside the walls, from the top."""
+    return [line[1:-1] for line in scenario_map(scenario).splitlines() if line.startswith("|")]
+
+
+def test_places_are_where_they_belong() -> None:
+    team = Scenario().robots
+    robots = (team[0].replace(start_m=(-0.94, 0.94)), team[1], team[2].replace(start_m=(0.5, -0.5)))
+    obstacles = (
+        Obstacle(shape="box", half_extents_m=(0.5, 0.2), position_m=(0.0, 0.0)),
+        Obstacle(shape="disc", radius_m=0.1),
+    )
+    task = Scenario().tasks[1]
+    scenario = Scenario(robots=robots, tasks=(task,), obstacles=obstacles)
+    drawn = rows(scenario)
+    assert {len(row) for row in drawn} == {61}
+    assert drawn[0][1] == "A"
+    assert [row.index("B") for row in drawn if "B" in row] == [45]
+    solid = [row.count("#") for row in drawn]
+    assert solid.count(31) == 7  # half as wide as the arena, a fifth as high
+    assert solid[15] == 31
+    assert drawn[15][30] == "#"
+    legend = scenario_map(scenario)
+    assert "A  food_0 starts here (food)" in legend
+    assert "B  navigation_0 starts here (information)" in legend
+    assert "At new random places in each episode: 1 robots, 1 obstacles" in legend
+
+
+def test_areas_and_places_of_victims() -> None:
+    drawn = rows(Scenario(victim_area_m=(-0.5, 0.0, 0.5, 0.5)))
+    assert sum("·" in row for row in drawn) == 8
+    assert all(row.startswith("  ") and row.endswith("  ") for row in drawn)
+    everywhere = rows(Scenario())
+    assert everywhere[15].count("·") == 55
+    listed = Scenario(victim_places_m=((0.0, 0.0), (0.5, 0.5)))
+    assert rows(listed)[15][30] == "x"
+    assert sum(row.count("x") for row in rows(listed)) == 2
+    assert "x  a victim may appear here" in scenario_map(listed)
+    assert "·" not in scenario_map(listed)
