@@ -23,6 +23,9 @@ from innerattn.experiments.run import read_run
 from innerattn.records.run_files import RunFiles, seal
 from innerattn.records.run_folder import config_of, weights_name
 from innerattn.report.marks import fill
+from innerattn.train.policy import moments_in
+from innerattn.train.weights import MOST_BYTES as MAX_WEIGHTS
+from innerattn.train.weights import weights_in, write_weights
 from innerattn.zoo import CARD, FOLDER, PREFIX, read_card, zoo_names
 
 PAGE = Path(__file__).parent / "zoo.md"
@@ -51,6 +54,8 @@ def main() -> None:
 def pack(run: Path, name: str, budget: str, zoo: Path = FOLDER) -> Path:
     """Put a run into the zoo, in place of one of the same name.
 
+    The optimisers' moments, two thirds of the weights' file, are left out.
+
     Args:
         run: folder of a finished and measured run.
         name: of the built-in scenario that it was trained in, and of the team from now on.
@@ -74,14 +79,14 @@ def pack(run: Path, name: str, budget: str, zoo: Path = FOLDER) -> Path:
     if expected.digest() != config.digest():
         raise RunError(f"{run}: was trained otherwise than --preset {name} --budget {budget} says")
     found = read_run(Case(config.scenario.situation, method, seed), run, steps=False)
-    card = {
+    card: dict[str, Any] = {
         "schema_version": 1,
         "name": name,
         "command": f"innerattn train --preset {name} --method {method} --budget {budget} "
         f"--seed {seed} --train.threads {info.threads}",
         "seed": seed,
         "versions": info.versions,
-        "weights_sha256": info.weights_sha256,
+        "training_sha256": info.weights_sha256,
         "env_steps": info.env_steps,
         "lengths": [_length(one) for one in (found.summary, found.summary["long"])],
         "worlds_seed": config.evaluate.seed,
@@ -90,10 +95,13 @@ def pack(run: Path, name: str, budget: str, zoo: Path = FOLDER) -> Path:
     with TemporaryDirectory(dir=zoo, prefix=".") as work:
         made = Path(work) / name
         (made / weights).parent.mkdir(parents=True)
-        for file in ("config.toml", "checkpoints/latest", weights):
+        for file in ("config.toml", "checkpoints/latest"):
             shutil.copyfile(run / file, made / file)
+        tensors = weights_in(files.read(weights, MAX_WEIGHTS), run / weights, info.weights_sha256)
+        kept = {key: tensor for key, tensor in tensors.items() if key not in moments_in(tensors)}
+        card["weights_sha256"] = write_weights(made / weights, kept)
         write_whole(made / CARD, f"{json.dumps(card, indent=1)}\n".encode())
-        seal(made, replace(info, sealed=False))
+        seal(made, replace(info, sealed=False, weights_sha256=card["weights_sha256"]))
         shutil.rmtree(zoo / name, ignore_errors=True)
         made.rename(zoo / name)
     return zoo / name

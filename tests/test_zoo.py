@@ -59,7 +59,7 @@ def test_a_team_scores_what_its_card_says(name: str) -> None:
     card_mean = short["rescues_per_episode"]["mean"]
     # Four standard errors: of the same worlds' first ones, it is seldom more than one.
     assert abs(rescues.mean() - card_mean) < 4 * rescues.std() / np.sqrt(EPISODES)
-    assert short["score"]["mean"] > 0.9
+    assert short["score"]["mean"] > 0.8
 
 
 @pytest.mark.parametrize("name", zoo_names())

@@ -27,6 +27,9 @@ from innerattn.learn.types import Team
 from innerattn.learn.undo import Undo
 from innerattn.nn import CriticOutput, action_noise, robots_of_each_kind, sample_actions
 
+MOMENTS = ("actor_adam", "critic_adam")
+"""First parts of the names of the optimisers' moments in a state; acting does not need them."""
+
 
 @dataclass(frozen=True)
 class Networks:
@@ -223,7 +226,7 @@ class ActorCritic:
         tensors = self._running()
         for name, module in self._modules().items():
             tensors |= {f"{name}.{key}": value for key, value in module.named_parameters()}
-        for name, adam in (("actor_adam", self._actor_adam), ("critic_adam", self._critic_adam)):
+        for name, adam in zip(MOMENTS, (self._actor_adam, self._critic_adam), strict=True):
             for key, moments in adam.moments.items():
                 tensors |= {f"{name}.{key}.{part}": moments[part] for part in sorted(moments)}
         return tensors

@@ -9,15 +9,18 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
+from torch import Tensor
+
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
+from innerattn.learn.actor_critic import MOMENTS
 from innerattn.learn.types import Learner
 from innerattn.records.run_files import RunFiles
 from innerattn.records.run_folder import config_of, weights_name
 from innerattn.train.build import build_learner
 from innerattn.train.weights import MOST_BYTES, weights_in
-from innerattn.zoo import run_path
+from innerattn.zoo import CARD, run_path
 
 _TRIES = 5
 
@@ -75,6 +78,11 @@ def load_newest(run: str | Path, device: str = "cpu") -> NewestPolicy:
     return _load(files, weights_name(files), device)
 
 
+def moments_in(state: dict[str, Tensor]) -> dict[str, Tensor]:
+    """The part of a learner's state that acting does not need: the optimisers' moments."""
+    return {name: tensor for name, tensor in state.items() if name.split(".")[0] in MOMENTS}
+
+
 def _load(files: RunFiles, name: str, device: str) -> NewestPolicy:
     config = config_of(files)
     train = config.train.model_copy(update={"device": device})
@@ -83,6 +91,8 @@ def _load(files: RunFiles, name: str, device: str) -> NewestPolicy:
     weights = files.path / name
     known = files.info.weights_sha256 if files.info.state != "running" else None
     tensors = weights_in(files.read(name, MOST_BYTES), weights, known)
+    if (files.path / CARD).is_file():  # a team of the zoo comes without moments
+        tensors = moments_in(learner.state()) | tensors
     try:
         learner.load(tensors)
     except ValueError as error:

@@ -55,7 +55,8 @@ def read_card(name: str, zoo: Path = FOLDER) -> dict[str, Any]:
         zoo: where teams are.
 
     Returns:
-        ``name``, ``command``, ``seed``, ``versions``, ``weights_sha256``, ``env_steps``,
+        ``name``, ``command``, ``seed``, ``versions``, ``weights_sha256`` and ``training_sha256``
+        (of the tensors here, and of all that the training ended with), ``env_steps``,
         ``worlds_seed`` (of the worlds it was measured in), and ``lengths``: for each length of
         episodes ``episode_steps``, ``episodes``, and ``rescues_per_episode`` and ``score`` with
         ``mean``, ``low`` and ``high`` (95 % interval).
