@@ -21,7 +21,7 @@ from innerattn.zoo import CARD, FOLDER, PREFIX, read_card, run_path, zoo_names
 
 DOCS = Path(__file__).parents[1] / "docs"
 sys.path.insert(0, str(DOCS))
-import zoo as packing  # noqa: E402
+import publish_zoo as packing  # noqa: E402
 
 EPISODES = 150
 

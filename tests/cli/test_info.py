@@ -107,7 +107,7 @@ def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
 def test_only_what_exists_is_offered(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["--help"])
-    offered = "{train,evaluate,replay,report,watch,play,robustness,reproduce,info}"
+    offered = "{train,evaluate,replay,report,watch,play,robustness,reproduce,export,seal,new,info}"
     assert offered in capsys.readouterr().out
 
 

@@ -112,8 +112,8 @@ def scenario_with(**fields: object) -> dict:
         ({"robots": []}, "scenario.robots (their number) = 0: must be in 1..=64"),
         (
             {"robots": TEAM[:3]},
-            "scenario.tasks[0].needs = food + medicine: "
-            "the team has no distinct able robot for each need",
+            "scenario.tasks[0].needs: task 'task_1' needs 'medicine', which no robot of the team "
+            "can do; abilities of the team are food, information",
         ),
         (
             {"tasks": [{"name": "three", "needs": ["food", "food", "food"]}]},

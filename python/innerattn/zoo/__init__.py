@@ -1,8 +1,8 @@
 """Trained teams that come with the package: run folders, named ``zoo:NAME`` wherever a run is.
 
 Each folder here holds what a sealed run does, without its checkpoints before the last, its metrics
-and its recorded episodes, and a card: how the team was made and what it scores. `docs/zoo.py` puts
-runs here.
+and its recorded episodes, and a card: how the team was made and what it scores.
+`docs/publish_zoo.py` puts runs here.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Puts trained runs into the zoo that comes with the package, and lists it in `docs/zoo.md`.
 
-`python docs/zoo.py NAME=RUN ... --budget strong` takes the run that `innerattn train --preset NAME
---budget strong` makes, finished and measured. Run without arguments it lists the zoo anew.
+`python docs/publish_zoo.py NAME=RUN ... --budget fast` takes the run that `innerattn train
+--preset NAME --budget fast` makes, finished and measured. Without arguments it lists the zoo anew.
 """
 
 from __future__ import annotations
