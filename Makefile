@@ -73,6 +73,7 @@ bench: setup ## speed of worlds and learner on this machine, beside their peers;
 	python benches/fault_cost.py
 	python benches/copy_cost.py
 	python benches/view_cost.py
+	python benches/frame_time.py
 	python benches/checkpoint_cost.py
 	python benches/time_to_score.py
 	python benches/compare_learner.py $(if $(MAAC),--maac "$(MAAC)")
