@@ -27,6 +27,8 @@ pub const MAX_NEEDS: usize = 8;
 pub const START_GAP_M: f64 = 1e-3;
 /// Most that the heaviest robot may weigh, in weights of the lightest: contacts are true up to here.
 pub const MAX_MASS_RATIO: f64 = 100.0;
+/// The same for rapier, which squeezes lighter robots deep into heavier ones and into walls.
+pub const MAX_MASS_RATIO_RAPIER: f64 = 16.0;
 
 /// Farthest that a robot may move in a substep of rapier, in smallest radii: up to here nothing
 /// overlaps by more than a tenth of a radius.
@@ -334,11 +336,18 @@ impl Scenario {
         self.tasks.iter().map(|task| task.needs.len()).max().unwrap_or(0)
     }
 
+    /// The heaviest and the lightest robot; the first of several. None in an empty team.
+    #[must_use]
+    pub fn most_unlike(&self) -> Option<(&Robot, &Robot)> {
+        let heaviest = self.robots.iter().reduce(|a, b| if b.mass_kg > a.mass_kg { b } else { a })?;
+        let lightest = self.robots.iter().reduce(|a, b| if b.mass_kg < a.mass_kg { b } else { a })?;
+        Some((heaviest, lightest))
+    }
+
     /// What the heaviest robot weighs, in weights of the lightest.
     #[must_use]
     pub fn mass_ratio(&self) -> f64 {
-        let masses = || self.robots.iter().map(|robot| robot.mass_kg);
-        masses().fold(0.0, f64::max) / masses().fold(f64::INFINITY, f64::min)
+        self.most_unlike().map_or(1.0, |(heaviest, lightest)| heaviest.mass_kg / lightest.mass_kg)
     }
 }
 

@@ -109,6 +109,12 @@ def scenario_with(**fields: object) -> dict:
             {"robots": [*TEAM[:2], {**TEAM[2], "mass_kg": -1}, TEAM[3]]},
             "scenario.robots[2].mass_kg = -1: must be in 0.01..=1000 kg",
         ),
+        (
+            {"robots": [*TEAM[:2], {**TEAM[2], "mass_kg": 0.05}, TEAM[3]]},
+            'scenario.robots (heaviest to lightest mass_kg) = 20: "food_0" weighs 1 kg and '
+            '"navigation_0" 0.05 kg; must be at most 16 with engine = "rapier", and 100 with '
+            '"discs"',
+        ),
         ({"robots": []}, "scenario.robots (their number) = 0: must be in 1..=64"),
         (
             {"robots": TEAM[:3]},

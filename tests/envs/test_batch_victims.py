@@ -60,7 +60,7 @@ def test_a_victim_that_is_added_is_seen_and_rescued() -> None:
     assert names == {"food_0"}
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data())
 def test_what_is_accepted_is_what_is_there_then(data: st.DataObject) -> None:
     situation = data.draw(st.sampled_from(["single", "double", "mixed"]))

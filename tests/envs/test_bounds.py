@@ -17,6 +17,7 @@ MOST = {name: most for name, _, _, most, _, _ in _core.FAULT_KINDS}
 def scenario(half: float, engine: str, faulty: bool, seen: bool, heavy: float) -> Scenario:
     """Four robots in a small arena, one of them heavy, and with every fault at its worst."""
     team = list(Scenario().robots)
+    heavy = heavy if engine == "discs" else min(heavy, 8.0)  # rapier takes masses up to 16 : 1
     team[0] = team[0].replace(mass_kg=heavy, drive_force_n=200.0)
     faults = [
         Fault(robot=robot.name, kind=kind, value=MOST[kind] if kind != "motor_gain" else 0.5)
@@ -35,7 +36,7 @@ def scenario(half: float, engine: str, faulty: bool, seen: bool, heavy: float) -
     )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     half=st.floats(0.4, 3.0),
     engine=st.sampled_from(["rapier", "discs"]),

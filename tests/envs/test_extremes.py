@@ -39,7 +39,7 @@ def least_gap(positions: NDArray[np.float32], radii: NDArray[np.float64]) -> flo
     return float(gaps.min())
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     robots=st.integers(1, 64),
     victims=st.integers(1, 32),

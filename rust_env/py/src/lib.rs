@@ -7,6 +7,8 @@ mod door;
 mod rules;
 
 /// rapier makes and frees hundreds of small things a period, which this does faster than the system.
+/// The address sanitizer must know every piece of memory, and knows those of the system.
+#[cfg(not(asan))]
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

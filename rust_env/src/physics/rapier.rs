@@ -24,7 +24,6 @@ const MOST_IN_WALL: f32 = 0.04;
 /// a crowd of 16 unlike robots is left 15 % of a radius deep in each other.
 const LEAST_ITERATIONS: usize = 8;
 const MOST_FOR_ROBOTS: usize = 16;
-const MOST_FOR_MASSES: usize = 32;
 /// An overlap below the slop is left alone: it is small beside any radius, large beside rounding.
 /// What overlaps more is mended, unless it parts at some speed by itself.
 const TOUCH: Touch = Touch { slop: 5e-5, parting: 1e-2 };
@@ -258,7 +257,7 @@ fn quality(scenario: &Scenario) -> IntegrationParameters {
     let substep = scenario.dt_s / f64::from(scenario.substeps);
     let fastest = scenario.robots.iter().map(|robot| robot.max_speed_mps).fold(0.0, f64::max);
     let for_robots = (2 * scenario.robots.len()).min(MOST_FOR_ROBOTS);
-    let for_masses = ((2.0 * scenario.mass_ratio()) as usize).min(MOST_FOR_MASSES);
+    let for_masses = (2.0 * scenario.mass_ratio()) as usize;
     let iterations = LEAST_ITERATIONS.max(for_robots).max(for_masses);
     let mut parameters = IntegrationParameters {
         dt: substep as f32,

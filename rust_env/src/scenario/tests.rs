@@ -57,8 +57,21 @@ fn teams_have_their_limits() {
     assert!(refusal(|scenario| scenario.robots = team_of(65)).contains("= 65: must be in 1..=64"));
     assert!(refusal(|scenario| scenario.robots[1].name = "food_0".into()).contains("names must differ"));
     assert!(refusal(|scenario| scenario.robots[0].kind = "a b".into()).contains("robots[0].kind = \"a b\""));
-    let heavy = refusal(|scenario| scenario.robots[0].mass_kg = 51.0);
-    assert_eq!(heavy, "scenario.robots (heaviest to lightest mass_kg) = 102: must be at most 100");
+    let masses = "scenario.robots (heaviest to lightest mass_kg)";
+    let heavy = refusal(|scenario| scenario.robots[1].mass_kg = 8.5);
+    let pair = "\"food_1\" weighs 8.5 kg and \"navigation_0\" 0.5 kg";
+    let rule = "must be at most 16 with engine = \"rapier\", and 100 with \"discs\"";
+    assert_eq!(heavy, format!("{masses} = 17: {pair}; {rule}"));
+    let heavy = |mass_kg, engine| {
+        let mut scenario = Scenario { engine, ..Scenario::default() };
+        scenario.robots[1].mass_kg = mass_kg;
+        scenario.validate()
+    };
+    assert_eq!(heavy(8.0, Engine::Rapier), Ok(()));
+    assert_eq!(heavy(50.0, Engine::Discs), Ok(()));
+    let refused = heavy(51.0, Engine::Discs).expect_err("beyond what contacts are true for").to_string();
+    let pair = "\"food_1\" weighs 51 kg and \"navigation_0\" 0.5 kg";
+    assert_eq!(refused, format!("{masses} = 102: {pair}; must be at most 100"));
     let scenario = Scenario { robots: team_of(64), ..Scenario::default() };
     assert_eq!(scenario.validate(), Ok(()));
 }
@@ -142,6 +155,12 @@ fn given_places_are_inside_and_fit_together() {
     assert_eq!(refused, "scenario.victim_places_m (their number) = 1: must be in 2..=256");
     let refused = refusal(|scenario| scenario.victim_places_m = vec![[0.0, 0.0], [0.0, 1.0]]);
     assert!(refused.starts_with("scenario.victim_places_m[1][1] = 1: must be in"), "{refused}");
+    let refused = refusal(|scenario| {
+        scenario.victim_places_m = vec![[0.5, 0.0], [0.1, 0.0], [0.100_000_000_001, -0.0]];
+    });
+    let wanted = "scenario.victim_places_m[2] = [0.100000000001, -0.0]: is victim_places_m[1] once more; \
+                  places must differ";
+    assert_eq!(refused, wanted);
     let refused = refusal(|scenario| {
         scenario.victim_places_m = vec![[0.0, 0.0], [0.5, 0.0]];
         scenario.victim_area_m = Some([-0.5, -0.5, 0.5, 0.5]);

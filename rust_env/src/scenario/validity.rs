@@ -3,8 +3,8 @@
 
 use super::check::{broken, counts, named, within};
 use super::{
-    Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_NEEDS, MAX_OBSTACLES, MAX_PLACES, MAX_ROBOTS,
-    MAX_TRAVEL_RADII, MAX_VICTIMS, Robot, START_GAP_M, Scenario, Shape,
+    Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_MASS_RATIO_RAPIER, MAX_NEEDS, MAX_OBSTACLES,
+    MAX_PLACES, MAX_ROBOTS, MAX_TRAVEL_RADII, MAX_VICTIMS, Robot, START_GAP_M, Scenario, Shape,
 };
 use crate::error::Result;
 use crate::fault::{Fault, Spec};
@@ -65,12 +65,29 @@ impl Scenario {
             within(&key("radius_m"), robot.radius_m, 0.005, 10.0, "m")?;
             within(&key("drive_force_n"), robot.drive_force_n, 0.0, 1e5, "N")?;
         }
-        let ratio = self.mass_ratio();
-        if ratio > MAX_MASS_RATIO * (1.0 + 1e-12) {
-            let rule = format!("must be at most {MAX_MASS_RATIO}");
-            return broken("robots (heaviest to lightest mass_kg)", &ratio, &rule);
-        }
+        self.validate_masses()?;
         counts("robots (their different abilities)", self.abilities().len(), 0, MAX_ABILITIES)
+    }
+
+    /// Refuses masses so unlike that light robots are squeezed into heavier ones.
+    fn validate_masses(&self) -> Result<()> {
+        let (most, instead) = match self.engine {
+            Engine::Rapier => (
+                MAX_MASS_RATIO_RAPIER,
+                format!(" with engine = \"rapier\", and {MAX_MASS_RATIO} with \"discs\""),
+            ),
+            Engine::Discs => (MAX_MASS_RATIO, String::new()),
+        };
+        match self.most_unlike() {
+            Some((heaviest, lightest)) if self.mass_ratio() > most * (1.0 + 1e-12) => {
+                let rule = format!(
+                    "{:?} weighs {} kg and {:?} {} kg; must be at most {most}{instead}",
+                    heaviest.name, heaviest.mass_kg, lightest.name, lightest.mass_kg
+                );
+                broken("robots (heaviest to lightest mass_kg)", &self.mass_ratio(), &rule)
+            }
+            _ => Ok(()),
+        }
     }
 
     fn validate_tasks(&self) -> Result<()> {
@@ -137,6 +154,13 @@ impl Scenario {
         for (index, place) in self.victim_places_m.iter().enumerate() {
             for (axis, value) in place.iter().enumerate() {
                 within(&format!("victim_places_m[{index}][{axis}]"), *value, -most, most, "m")?;
+            }
+            // As the worlds hold them: numbers that differ by less are one place.
+            let held = |place: &[f64; 2]| place.map(|value| (value as f32 + 0.0).to_bits()); // −0 is 0
+            let same = |other: &[f64; 2]| held(other) == held(place);
+            if let Some(first) = self.victim_places_m[..index].iter().position(same) {
+                let rule = format!("is victim_places_m[{first}] once more; places must differ");
+                return broken(&format!("victim_places_m[{index}]"), &format!("{place:?}"), &rule);
             }
         }
         Ok(())

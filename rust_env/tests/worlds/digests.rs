@@ -10,6 +10,9 @@ use crate::common::{Table, options};
 
 const KEPT: &str = include_str!("../../../tests/cross/digests.json");
 
+/// Scenarios whose worlds do something else in this build.
+const OTHERS: [&str; 0] = [];
+
 /// The force of an action, for continuous actions; discrete ones are told by it.
 const DRIVES: [[f32; 2]; 5] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
 
@@ -45,9 +48,11 @@ fn worlds_do_what_they_did() {
     let number = |key: &str| kept[key].as_u64().expect("a number");
     let rows = kept["rows"].as_array().expect("rows");
     assert_eq!(rows.len(), 10);
-    for row in rows {
+    let others = rows.iter().filter(|row| {
         let scenario = Scenario::from_json(&row["scenario"].to_string()).expect("a scenario");
         let found = crc32(scenario, number("num_envs") as usize, number("steps"), number("seed"));
-        assert_eq!(Some(u64::from(found)), row["crc32"].as_u64(), "{}", row["name"]);
-    }
+        Some(u64::from(found)) != row["crc32"].as_u64()
+    });
+    let others: Vec<&str> = others.filter_map(|row| row["name"].as_str()).collect();
+    assert_eq!(others, OTHERS);
 }
