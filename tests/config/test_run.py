@@ -12,6 +12,7 @@ from innerattn.config import (
     NetworkConfig,
     PPOConfig,
     RunConfig,
+    Scenario,
     TDConfig,
     TrainConfig,
     load_run_config,
@@ -316,3 +317,42 @@ def test_a_key_added_later_changes_the_digest_of_a_run_that_uses_it() -> None:
     config = RunConfig(network=NetworkConfig(shared_gradients="mean"))
     assert config.digest() != RunConfig().digest()
     assert "shared_gradients" in RunConfig().in_use()["network"]
+
+
+CONTINUOUS = {"actions": "continuous"}
+
+
+@pytest.mark.parametrize("method", ["ppo-inner", "ppo-uniform", "mappo"])
+def test_the_value_head_follows_continuous_actions(method: str) -> None:
+    train = {"method": method}
+    given = RunConfig.model_validate({"scenario": CONTINUOUS, "train": train})
+    assert given.ppo.advantage == "value"
+    as_models = RunConfig(scenario=Scenario(**CONTINUOUS), train=TrainConfig(**train))
+    assert as_models == given
+    assert given.ppo.replace(advantage="counterfactual") == PPOConfig()
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (
+            {"train": {"method": "td-uniform"}},
+            "scenario.actions = 'continuous': train.method = 'td-uniform' learns 'discrete' "
+            "actions only; methods for continuous ones are ",
+        ),
+        (
+            {"train": {"method": "ppo-inner"}, "ppo": {"advantage": "counterfactual"}},
+            "ppo.advantage = 'counterfactual': scenario.actions = 'continuous' needs 'value'",
+        ),
+        (
+            {"train": {"method": "mappo", "warm_start": "hungarian"}},
+            "train.warm_start = 'hungarian': scenario.actions = 'continuous' needs 'none'",
+        ),
+    ],
+)
+def test_what_learns_discrete_actions_only_is_refused(
+    values: dict[str, dict[str, str]], message: str
+) -> None:
+    with pytest.raises(ValidationError, match=re.escape(message)):
+        RunConfig.model_validate({"scenario": CONTINUOUS, **values})
+    RunConfig.model_validate(values)

@@ -11,6 +11,7 @@ from torch import Tensor
 from innerattn.config import NetworkConfig, PPOConfig
 from innerattn.learn import PPO, Team, Transitions, ppo
 from innerattn.learn.types import Scheduled
+from innerattn.nn import actions
 
 CPU = torch.device("cpu")
 OBS_WIDTH, NUM_ACTIONS, ENVS, STEPS = 5, 3, 4, 3
@@ -236,13 +237,13 @@ def test_rollouts_and_updates_agree_with_the_plain_form(
     network = NetworkConfig(**NETWORK, attention=attention)
     plain = PlainPPO(learner.state(), network, learner._config)
     drawn: list[Tensor] = []
-    original = ppo.sample_actions
+    original = actions.sample_actions
 
     def recording(logits: Tensor, generator: torch.Generator) -> Tensor:
         drawn.append(original(logits, generator))
         return drawn[-1]
 
-    monkeypatch.setattr(ppo, "sample_actions", recording)
+    monkeypatch.setattr(actions, "sample_actions", recording)
     clipped = 0.0
     for round_ in range(2):
         steps = collect(learner, robots, round_)
@@ -254,8 +255,7 @@ def test_rollouts_and_updates_agree_with_the_plain_form(
         for first in (0, 3, 6):
             chosen = torch.arange(first, first + 6)
             rows = rollout.take(chosen)
-            obs, actions = rows.obs.transpose(0, 1), rows.actions.t()
-            figures = plain.update(rows, obs, actions)
+            figures = plain.update(rows, rows.obs.transpose(0, 1), rows.actions.t())
             found = dict(zip(ppo._METRICS, learner.update(rows).tolist(), strict=True))
             assert found == pytest.approx(figures, rel=1e-10, abs=1e-10)
             clipped += found["clip_share"]

@@ -23,7 +23,7 @@ def numbered(first: int, count: int) -> Transitions:
     )
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(capacity=st.integers(1, 9), sizes=st.lists(st.integers(0, 12), max_size=8))
 def test_it_holds_what_a_list_would(capacity: int, sizes: list[int]) -> None:
     replay = Replay(capacity, TEAM, seed=0)

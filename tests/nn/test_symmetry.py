@@ -90,6 +90,15 @@ def test_actions_turn_as_their_pushes(element: int) -> None:
     assert torch.equal(SYMMETRY.turn_actions_back(there, elements), actions)
 
 
+@pytest.mark.parametrize("element", range(NUM_ELEMENTS))
+def test_vectors_turn_as_by_hand_and_back_to_the_bit(element: int) -> None:
+    vectors = torch.tensor([[0.3, -0.7], [0.0, 0.5], [-1.0, 1.0]], dtype=torch.float64)
+    elements = torch.full((3,), element)
+    there = SYMMETRY.turn_actions(vectors, elements)
+    assert there.tolist() == [list(by_hand((x, y), element)) for x, y in vectors.tolist()]
+    assert torch.equal(SYMMETRY.turn_actions_back(there, elements), vectors)
+
+
 def test_columns_that_are_none_are_refused() -> None:
     with pytest.raises(ValueError, match="needs an anchor"):
         SquareSymmetry(VectorColumns(2, ((0, 1),), (), ()), CPU)

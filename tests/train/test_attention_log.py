@@ -7,10 +7,12 @@ import pytest
 import torch
 from torch import Tensor
 
+from innerattn.nn import DiscreteActions
 from innerattn.train.attention_log import AttentionLog
 
 ROBOTS, HEADS = 3, 2
 NAMES = ("a", "b", "c")
+DISCRETE = DiscreteActions(5)
 
 
 class Phased:
@@ -46,7 +48,7 @@ def add(log: AttentionLog, phase: float, worlds: int = 2) -> None:
 def test_the_entropy_is_the_mean_over_an_episode_in_whatever_phase(episode_steps: int) -> None:
     phases = [step / episode_steps for step in range(episode_steps)]
     expected = np.mean([plain(phase) for phase in phases])
-    log, learner = AttentionLog(NAMES, episode_steps), Phased()
+    log, learner = AttentionLog(NAMES, episode_steps, DISCRETE), Phased()
     for step in range(3 * episode_steps):
         add(log, phases[step % episode_steps])
         if step + 1 >= episode_steps:
@@ -58,14 +60,14 @@ def test_the_entropy_is_the_mean_over_an_episode_in_whatever_phase(episode_steps
 
 
 def test_what_there_is_counts_before_an_episode_is_over() -> None:
-    log = AttentionLog(NAMES, 10)
+    log = AttentionLog(NAMES, 10, DISCRETE)
     add(log, 0.0)
     add(log, 1.0)
     assert log.entropy(Phased())["b"] == pytest.approx([plain(0.0) / 2.0] * HEADS, abs=1e-6)
 
 
 def test_long_episodes_and_many_worlds_are_thinned_out() -> None:
-    log, learner = AttentionLog(NAMES, 101), Phased()
+    log, learner = AttentionLog(NAMES, 101, DISCRETE), Phased()
     for step in range(303):
         add(log, step % 101 / 101, worlds=70)
         found = log.entropy(learner)["a"][0]
@@ -79,6 +81,6 @@ def test_a_critic_without_attention_has_no_entropy() -> None:
         def attention(self, *_: Tensor) -> None:
             return None
 
-    log = AttentionLog(NAMES, 4)
+    log = AttentionLog(NAMES, 4, DISCRETE)
     add(log, 0.5)
     assert log.entropy(Without()) == {}

@@ -70,6 +70,13 @@ CASES: dict[str, dict[str, Any]] = {
     },
     "td-inner faults": {"train.method": "td-inner", **FAULTS},
     "ppo-inner faults": {"train.method": "ppo-inner", **FAULTS},
+    "ppo-inner continuous": {"train.method": "ppo-inner", "scenario.actions": "continuous"},
+    "mappo continuous canonical": {
+        "train.method": "mappo",
+        "scenario.actions": "continuous",
+        "network.symmetry": "canonical",
+        **POTENTIAL,
+    },
     "two threads": {"train.method": "td-inner", "train.threads": 2},
 }
 
@@ -169,9 +176,7 @@ def test_a_new_process_goes_on_alike(
     assert left_by(run) == whole(case)
 
 
-@settings(
-    deadline=None, max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     case=st.sampled_from(sorted(CASES)),
     cuts=st.lists(st.integers(1, 20), min_size=1, max_size=4),

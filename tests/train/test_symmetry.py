@@ -14,6 +14,7 @@ from innerattn.nn import NUM_ELEMENTS, SquareSymmetry
 from innerattn.train.build import build_learner
 from innerattn.train.columns import vector_columns
 
+CONTINUOUS_METHODS = ("ppo-inner", "ppo-uniform", "mappo")
 METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo")
 FAULTS = (Fault(robot="food_0", kind="heading_bias", value=0.4),)
 TEAM = Scenario().robots
@@ -35,7 +36,10 @@ def some_observations(scenario: Scenario) -> NDArray[np.float32]:
     with closing(BatchEnv(scenario, 200, seed=3, num_threads=1)) as env:
         env.reset()
         for _ in range(7):
-            step = env.step(draws.integers(0, 5, (200, env.num_robots)))
+            if env.continuous:
+                step = env.step(draws.uniform(-1, 1, (200, env.num_robots, 2)).astype(np.float32))
+            else:
+                step = env.step(draws.integers(0, 5, (200, env.num_robots)))
     return step.obs.copy()
 
 
@@ -131,3 +135,49 @@ def test_obstacles_at_random_places_are_not() -> None:
     scenario = Scenario(obstacles=(Obstacle(shape="disc", radius_m=0.1),))
     with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
         build_learner(run("td-inner", scenario), env)
+
+
+@pytest.mark.parametrize("method", CONTINUOUS_METHODS)
+def test_a_turned_world_gets_the_turned_forces(method: str) -> None:
+    scenario = Scenario.preset("mixed").replace(
+        actions="continuous", faults=FAULTS, observe_faults=True
+    )
+    obs = torch.from_numpy(some_observations(scenario))
+    with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
+        learner = build_learner(run(method, scenario), env)
+        symmetry = SquareSymmetry(vector_columns(env.observation_names()), torch.device("cpu"))
+    greedy = learner.act(obs, greedy=True)
+    assert greedy.shape == (200, 4, 2)
+    assert greedy.dtype == torch.float32
+    learner.seed_draws(5)
+    drawn = learner.act(obs)
+    weights = learner.attention(obs, drawn)
+    for number in range(NUM_ELEMENTS):
+        element = torch.full(obs.shape[:2], number)
+        there = symmetry.turn(obs, element)
+        assert torch.equal(learner.act(there, greedy=True), symmetry.turn_actions(greedy, element))
+        learner.seed_draws(5)
+        assert torch.equal(learner.act(there), symmetry.turn_actions(drawn, element))
+        if weights is not None:
+            turned = learner.attention(there, symmetry.turn_actions(drawn, element))
+            assert turned is not None
+            assert torch.equal(turned, weights)
+
+
+def test_a_turned_world_moves_as_turned_forces_say() -> None:
+    """The elements mean for forces what they mean in the worlds, not only for the network."""
+    scenario = Scenario.preset("mixed").replace(actions="continuous")
+    forces = torch.rand(1, 4, 2, generator=torch.Generator().manual_seed(1)) * 2 - 1
+    with closing(BatchEnv(scenario, 1, seed=2, num_threads=1)) as env:
+        env.reset()
+        symmetry = SquareSymmetry(vector_columns(env.observation_names()), torch.device("cpu"))
+        start = env.snapshot()
+        for number in range(NUM_ELEMENTS):
+            element = torch.full((1, 4), number)
+            env.restore(start)
+            env.step(symmetry.turn_actions(forces, element).numpy())
+            velocity = env.velocities()[0].copy()
+            env.restore(start)
+            env.step(forces.numpy())
+            expected = symmetry.turn_actions(torch.tensor(env.velocities()), element)[0]
+            np.testing.assert_allclose(velocity, expected, atol=1e-6)

@@ -46,7 +46,7 @@ class PPOConfig(AlgorithmConfig):
     advantage: Literal["counterfactual", "value"] = Field(
         "counterfactual",
         description="baseline: expectation of Q over the robot's own actions, or a value head; "
-        "mappo needs the value head",
+        "mappo and continuous actions need the value head",
     )
     attention_logit_penalty: float = Field(
         0.0,
@@ -81,6 +81,7 @@ PPO = Algorithm(
             "ppo": {"advantage": "value"},
         }
     },
+    continuous={"ppo": {"advantage": "value"}, "train": {"warm_start": "none"}},
     budgets=PRESETS / "budgets" / "ppo",
     warm_budgets=PRESETS / "budgets" / "ppo-warm",
 )

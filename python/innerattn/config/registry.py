@@ -58,6 +58,8 @@ class Algorithm:
         attends: Whether its critic takes any registered attention, so that there is a method
             NAME-ATTENTION for each, e.g. "td-inner".
         methods: Further methods by name, with the values they need.
+        continuous: Values that its methods need where actions are continuous; None: they learn
+            discrete actions only.
         budgets: Folder of what the algorithm changes in a built-in budget, BUDGET.toml; a budget
             without a file is not changed.
         warm_budgets: Likewise, on top of `budgets`, after a warm start.
@@ -67,6 +69,7 @@ class Algorithm:
     learner: str
     attends: bool = False
     methods: Mapping[str, Needs] = field(default_factory=dict)
+    continuous: Needs | None = None
     budgets: Traversable | None = None
     warm_budgets: Traversable | None = None
 

@@ -18,6 +18,7 @@ from innerattn.config.near import did_you_mean
 from innerattn.config.ppo import PPO, PPOConfig
 from innerattn.config.registry import (
     AlgorithmConfig,
+    Needs,
     algorithms,
     methods,
     register_algorithm,
@@ -50,7 +51,7 @@ def refuse_late_faults(scenario: Scenario, evaluate: EvaluateConfig) -> None:
 
 
 class RunConfig(Model):
-    """A whole run. What `train.method` needs follows from it where it is not given.
+    """A whole run. What `train.method` and continuous actions need follows where it is not given.
 
     An algorithm of an extension has a section of its own where it is given or in use.
 
@@ -116,7 +117,11 @@ class RunConfig(Model):
             return data
         method = methods().get(str(_given(data.get("train")).get("method")))
         if method is not None:
-            for section, values in {method.algorithm.name: {}, **method.needs}.items():
+            needs = {method.algorithm.name: {}, **method.needs}
+            if _given(data.get("scenario")).get("actions") == "continuous":
+                for section, values in (method.algorithm.continuous or {}).items():
+                    needs[section] = {**needs.get(section, {}), **values}
+            for section, values in needs.items():
                 if isinstance(data.get(section, {}), Mapping | BaseModel):  # else its check says so
                     data = {**data, section: {**values, **_given(data.get(section))}}
         return {
@@ -127,13 +132,9 @@ class RunConfig(Model):
     @model_validator(mode="after")
     def _check(self) -> Self:
         name = self.train.method
-        for section, values in methods()[name].needs.items():
-            for key, wanted in values.items():
-                value = getattr(getattr(self, section), key)
-                if value != wanted:
-                    raise ValueError(
-                        f"{section}.{key} = {value!r}: train.method = {name!r} needs {wanted!r}"
-                    )
+        self._check_needs(methods()[name].needs, f"train.method = {name!r}")
+        if self.scenario.actions == "continuous":
+            self._check_continuous()
         refuse_late_faults(self.scenario, self.evaluate)
         self._check_potential()
         gamma, world = self.algorithm.gamma, self.scenario
@@ -149,6 +150,25 @@ class RunConfig(Model):
                 f"{gamma!r}"
             )
         return self
+
+    def _check_needs(self, needs: Needs, what: str) -> None:
+        for section, values in needs.items():
+            for key, wanted in values.items():
+                value = getattr(getattr(self, section), key)
+                if value != wanted:
+                    raise ValueError(f"{section}.{key} = {value!r}: {what} needs {wanted!r}")
+
+    def _check_continuous(self) -> None:
+        """Refuse what learns discrete actions only."""
+        what, known = "scenario.actions = 'continuous'", methods()
+        needs = known[self.train.method].algorithm.continuous
+        if needs is None:
+            able = (name for name, one in known.items() if one.algorithm.continuous is not None)
+            raise ValueError(
+                f"{what}: train.method = {self.train.method!r} learns 'discrete' actions only; "
+                f"methods for continuous ones are {', '.join(able)}"
+            )
+        self._check_needs(needs, what)
 
     def _check_potential(self) -> None:
         """Refuse keys of a potential that do not go together."""

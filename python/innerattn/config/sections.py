@@ -15,6 +15,8 @@ from innerattn.config.schedule import ScheduleConfig
 
 add_attention("inner", "innerattn.nn:InnerAttention")
 add_attention("uniform", "innerattn.nn:UniformAttention")
+add_attention("frozen", "innerattn.nn:FrozenAttention")
+add_attention("oracle", "innerattn.nn:OracleAttention")
 
 Method = Annotated[str, OneOf(methods)]
 Attention = Annotated[str, OneOf(lambda: (*attentions(), "none"))]
@@ -31,7 +33,8 @@ class NetworkConfig(Model):
     attention_heads: int = Field(4, ge=1, le=64, description="attention heads of the critic")
     attention: Attention = Field(
         "inner",
-        description="learnt, fixed at 1/(N-1), or none; follows from the method",
+        description="inner: learnt; uniform: 1/(N-1); frozen: as drawn, untrained; oracle: all on "
+        "the partner that the first victim needs; or none; follows from the method",
     )
     mask_unavailable: bool = Field(
         False, description="keep unavailable teammates out of the attention"

@@ -25,7 +25,7 @@ from innerattn.learn.networks import DrawNetworks, draw_networks
 from innerattn.learn.resume import State, take, take_generator, take_whole, whole
 from innerattn.learn.types import Team
 from innerattn.learn.undo import Undo
-from innerattn.nn import CriticOutput, action_noise, robots_of_each_kind, sample_actions
+from innerattn.nn import CriticOutput, action_noise, robots_of_each_kind
 
 MOMENTS = ("actor_adam", "critic_adam")
 """First parts of the names of the optimisers' moments in a state; acting does not need them."""
@@ -118,7 +118,7 @@ class ActorCritic:
         if network.shared_gradients == "mean" and team.kinds is not None:
             self._robots_of_each_kind = robots_of_each_kind(team.kinds).to(device, dtype)
         self._acted: tuple[Tensor, Tensor] | None = None
-        self._team = team
+        self._team, self._actions = team, team.actions
         self._updates = 0
         self.interruptions: Interruptions = NoInterruptions()
         self.skips_divergence = False
@@ -149,18 +149,18 @@ class ActorCritic:
 
     @torch.no_grad()
     def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
-        """Choose actions (E, R) int64 for observations (E, R, D); see `Learner.act`."""
-        logits = self.actor(self._robots_first(obs))
-        self._acted = (obs, logits)
+        """Choose actions (E, R, ...) for observations (E, R, D); see `Learner.act`."""
+        outputs = self.actor(self._robots_first(obs))
+        self._acted = (obs, outputs)
         if greedy:
-            actions: Tensor = logits.argmax(dim=1)
+            actions = self._actions.likeliest(outputs)
         else:
-            actions = sample_actions(logits, self._draw(logits.shape))
-        return actions.t().contiguous().to(obs.device)
+            actions = self._actions.draw(outputs, self._noise)
+        return actions.transpose(0, 1).contiguous().to(obs.device)
 
     @torch.no_grad()
     def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
-        """Train the policies to take given actions; see `Learner.imitate`."""
+        """Train the policies to take given discrete actions; see `Learner.imitate`."""
         seen, wanted = self._robots_first(obs), actions.to(self._device).t()
 
         def loss_of(actor: Forward) -> tuple[Tensor, Tensor]:
@@ -182,7 +182,7 @@ class ActorCritic:
         obs = self._robots_first(obs)
         with torch.no_grad():
             output: CriticOutput = self.critic(
-                obs, actions.to(self._device).t(), self._available(obs)
+                obs, actions.to(self._device).transpose(0, 1), self._available(obs)
             )
         return None if output.attended is None else output.attended.weights
 
@@ -347,8 +347,11 @@ class ActorCritic:
             self._rows = list(take(state, "rows", self._dtype, None, None).to(self._device))
 
     def _log_probs_of(self, obs: Tensor) -> Tensor | None:
-        """(R, A, E) log-probabilities with which `act` drew actions for just these observations."""
-        if self._acted is None or self._acted[0] is not obs:
+        """(R, A, E) log-probabilities with which `act` drew actions for just these observations.
+
+        None where they are not known, or actions are continuous.
+        """
+        if self._acted is None or self._acted[0] is not obs or self._team.action_width:
             return None
         return self._acted[1].log_softmax(dim=1)
 

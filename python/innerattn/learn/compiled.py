@@ -29,6 +29,7 @@ from innerattn.nn.attention import (
     UniformAttention,
     visible_teammates,
 )
+from innerattn.nn.partner import OracleAttention
 
 _BETA_1, _BETA_2, _EPSILON = 0.9, 0.999, 1e-8  # torch's defaults, those of the paper on Adam
 
@@ -135,6 +136,6 @@ def _with_fused_attention(module: nn.Module) -> nn.Module:
     for layer in copied.modules():
         if isinstance(layer, InnerAttention):
             layer.attend = fused_dot_product_attention
-        elif isinstance(layer, UniformAttention):
+        elif isinstance(layer, UniformAttention | OracleAttention):
             layer.attend = fused_mean_attention
     return copied

@@ -17,7 +17,10 @@ from innerattn.nn import (
     Critic,
     EntityColumns,
     JointCritic,
+    OracleAttention,
+    PartnerColumns,
     TeammateAttention,
+    VectorCritic,
     share_by_kind,
 )
 
@@ -40,29 +43,32 @@ def draw_networks(
         team: What is known of the team.
         network: Sizes and kind of the networks.
         generator: Source of the parameters, on the CPU.
-        critic_outputs: Values that the critic gives for each robot; None: one for each action.
+        critic_outputs: Values that the critic gives for each robot; None: one for each action, of
+            which there must be a number.
 
     Raises:
         ValueError: `network.encoder` is "entities" and `team.entities` are not the columns of an
             observation, or `network.parameter_sharing` is "kind" and `team.kinds` are not those of
-            the team.
+            the team, or `network.attention` is "oracle" and `team.partners` is missing.
     """
     entities = _entities(team) if network.encoder == "entities" else None
     kinds = _kinds(team) if network.parameter_sharing == "kind" else None
     robots, obs_width, num_actions, *_ = team
-    width = network.hidden_width
+    width, outputs_of_actor = network.hidden_width, team.actions.outputs
     if network.attention == "none":
-        actor = Actor(robots, obs_width, num_actions, width, generator, entities)
+        actor = Actor(robots, obs_width, outputs_of_actor, width, generator, entities)
         outputs = critic_outputs or num_actions
         joint = CentralCritic if network.joint_critic == "central" else JointCritic
         critic: nn.Module = joint(robots, obs_width, outputs, width, generator)
     else:
         kind: type[TeammateAttention] = resolve_name(attentions()[network.attention])
         attention = kind(width, network.attention_heads, generator)
-        actor = Actor(robots, obs_width, num_actions, width, generator, entities)
-        critic = Critic(
-            robots, obs_width, num_actions, attention, generator, critic_outputs, entities
-        )
+        if isinstance(attention, OracleAttention):
+            attention.partners = _partners(team)
+        actor = Actor(robots, obs_width, outputs_of_actor, width, generator, entities)
+        form = VectorCritic if team.action_width else Critic
+        inputs = team.action_width or num_actions
+        critic = form(robots, obs_width, inputs, attention, generator, critic_outputs, entities)
         if kinds is not None:
             share_by_kind(critic, kinds)
     if kinds is not None:
@@ -77,6 +83,14 @@ def _entities(team: Team) -> EntityColumns:
             f"{team.obs_width} columns of an observation"
         )
     return team.entities
+
+
+def _partners(team: Team) -> PartnerColumns:
+    if team.partners is None:
+        raise ValueError(
+            "partners = None: network.attention = 'oracle' needs the columns that tell who can help"
+        )
+    return team.partners
 
 
 def _kinds(team: Team) -> tuple[str, ...]:

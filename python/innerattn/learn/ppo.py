@@ -31,7 +31,6 @@ from innerattn.learn.resume import (
 from innerattn.learn.ring import Ring
 from innerattn.learn.rollout import Rollout, RolloutBuffer, rows_of, standardised, steps_of
 from innerattn.learn.types import Scheduled, Team, Transitions
-from innerattn.nn import sample_actions
 
 _METRICS = (
     "critic_loss",
@@ -70,8 +69,8 @@ class PPO(ActorCritic):
     """The on-policy learner; its contract is `innerattn.learn.types.Learner`.
 
     The baseline of robot i does not depend on its own action. With `advantage = "counterfactual"`
-    it is sum_a pi_i(a) Q_i(o, a, a_-i), and Q_i of the action taken is fitted to the lambda-return.
-    With "value" it is a value head, of the same critic or of one without attention.
+    it is ``sum_a pi_i(a) Q_i(o, a, a_-i)``, and Q_i of the action taken is fitted to the
+    lambda-return. With "value" it is a value head, of the same critic or of one without attention.
 
     Attributes:
         scale: Running standard deviation of returns, by which rewards are divided.
@@ -92,8 +91,10 @@ class PPO(ActorCritic):
         """Build networks and optimisers; arguments as in `ActorCritic`, numbers in ``ppo``.
 
         Raises:
-            ValueError: As in `ActorCritic`.
+            ValueError: As in `ActorCritic`, or continuous actions have no counterfactual baseline.
         """
+        if team.action_width and ppo.advantage != "value":
+            raise ValueError(f"ppo.advantage = {ppo.advantage!r}: continuous actions need 'value'")
         outputs = None if ppo.advantage == "counterfactual" else 1
         super().__init__(
             team,
@@ -247,9 +248,8 @@ class PPO(ActorCritic):
         config = self._config
 
         def loss_of(actor: Forward) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
-            log_prob = actor(obs).log_softmax(dim=1)
-            taken = losses.gather_actions(log_prob, actions)
-            entropy = losses.entropy(log_prob).mean(dim=1)
+            taken, entropies = self._actions.scored(actor(obs), actions)
+            entropy = entropies.mean(dim=1)
             surrogate = losses.clipped_policy_loss(taken, before, advantage, config.clip)
             loss = surrogate - entropy_weight * entropy.sum()
             return loss, (loss.detach(), entropy.detach().mean(), taken.detach() - before)
@@ -279,8 +279,7 @@ class PPO(ActorCritic):
         # step, and after the last of the rollout, it takes actions drawn for that state.
         next_value = torch.cat([value[1:], torch.zeros_like(value[:1])])
         step, env = steps.cut.nonzero(as_tuple=True)
-        logits = self.actor(steps.after)
-        next_actions = sample_actions(logits, self._draw(logits.shape))
+        next_actions = self._actions.draw(self.actor(steps.after), self._noise)
         next_value[step, :, env] = self._evaluate(steps.after, next_actions)[2].t()
         advantage = generalised_advantage(
             reward,
@@ -307,23 +306,27 @@ class PPO(ActorCritic):
 
         Args:
             obs: (R, B, D).
-            actions: (R, B) int64.
-            log_probs: (R, A, B) of all actions, if they are known.
+            actions: (R, B) int64, or (R, B, W).
+            log_probs: (R, A, B) of all discrete actions, if they are known.
         """
         parts = []
         for first in range(0, obs.shape[1], _CHUNK):
             chunk = slice(first, first + _CHUNK)
             some_obs, some_actions = obs[:, chunk], actions[:, chunk]
-            if log_probs is None:
-                log_prob = self.actor(some_obs).log_softmax(dim=1)
-            else:
-                log_prob = log_probs[:, :, chunk]
             q = self.critic(some_obs, some_actions, self._available(some_obs)).q
-            if self._config.advantage == "counterfactual":
-                baseline = (log_prob.exp() * q).sum(dim=1)
-            else:
+            if self._team.action_width:
+                taken = self._actions.log_prob(self.actor(some_obs), some_actions)
                 baseline = q.squeeze(1)
-            taken = losses.gather_actions(log_prob, some_actions)
+            else:
+                if log_probs is None:
+                    log_prob = self.actor(some_obs).log_softmax(dim=1)
+                else:
+                    log_prob = log_probs[:, :, chunk]
+                taken = losses.gather_actions(log_prob, some_actions)
+                if self._config.advantage == "counterfactual":
+                    baseline = (log_prob.exp() * q).sum(dim=1)
+                else:
+                    baseline = q.squeeze(1)
             parts.append((taken, self._fitted(q, some_actions), baseline))
         taken, values, baselines = (torch.cat(found, dim=1) for found in zip(*parts, strict=True))
         return taken, values, baselines

@@ -16,7 +16,7 @@ class Steps(NamedTuple):
 
     Attributes:
         obs: (R, T * E, D).
-        actions: (R, T * E) int64.
+        actions: (R, T * E) int64, or (R, T * E, W) float32.
         log_probs: (R, A, T * E) of all actions when these were drawn; None if they are not known.
         reward: (T, R, E).
         terminated: (T, E) bool.
@@ -75,7 +75,7 @@ class RolloutBuffer:
             self._reserve(len(batch.obs))
         step = self._filled
         self._obs[:, step].copy_(batch.obs.transpose(0, 1))
-        self._actions[:, step].copy_(batch.actions.t())
+        self._actions[:, step].copy_(batch.actions.transpose(0, 1))
         self._reward[step].copy_(batch.reward.t())
         self._terminated[step].copy_(batch.terminated)
         ended = self._ended[step]
@@ -123,7 +123,7 @@ class RolloutBuffer:
         self.clear()
         if not state:
             return
-        robots, width, actions = self._team[:3]
+        robots, width, num_actions = self._team[:3]
         found = take(state, "obs", self._dtype, robots, None, None, width)
         held, envs = found.shape[1:3]
         if not (0 < held <= self._num_steps and envs):
@@ -132,9 +132,7 @@ class RolloutBuffer:
             )
         self._reserve(envs)
         self._obs[:, :held] = found
-        most = actions - 1
-        chosen = take_within(state, "actions", torch.int64, 0, most, robots, held, envs)
-        self._actions[:, :held] = chosen
+        self._actions[:, :held] = _take_actions(state, self._team, held, envs)
         self._reward[:held] = take(state, "reward", torch.float32, held, robots, envs)
         flags = {
             name: take_within(state, name, torch.uint8, 0, 1, held, envs)
@@ -144,7 +142,7 @@ class RolloutBuffer:
         self._ended[:held] = flags["ended"].bool()
         self._all_known = "log_probs" in state
         if self._all_known:
-            known = take(state, "log_probs", self._dtype, robots, actions, held, envs)
+            known = take(state, "log_probs", self._dtype, robots, num_actions, held, envs)
             self._log_probs[:, :, :held] = known
         self._filled = held
         cut = int(flags["ended"].sum())
@@ -160,7 +158,8 @@ class RolloutBuffer:
         like = torch.empty((), dtype=self._dtype, device=self._device)
         self._obs = like.new_empty(robots, steps, envs, self._team.obs_width)
         self._log_probs = like.new_empty(robots, self._team.num_actions, steps, envs)
-        self._actions = like.new_empty(robots, steps, envs, dtype=torch.int64)
+        kind = self._team.actions
+        self._actions = like.new_empty(robots, steps, envs, *kind.shape, dtype=kind.dtype)
         self._reward = like.new_empty(steps, robots, envs, dtype=torch.float32)
         self._terminated = like.new_empty(steps, envs, dtype=torch.bool)
         self._ended = like.new_empty(steps, envs, dtype=torch.bool)
@@ -172,7 +171,7 @@ class Rollout(NamedTuple):
 
     Attributes:
         obs: (R, B, D).
-        actions: (R, B) int64.
+        actions: (R, B) int64, or (R, B, W) float32.
         log_prob: (R, B) of the actions, under the policy that acted.
         value: (R, B) the critic's, when the steps were collected.
         advantage: (R, B).
@@ -202,14 +201,26 @@ class Rollout(NamedTuple):
         Raises:
             ValueError: As in `take`.
         """
-        robots, width, actions = team[:3]
+        robots, width = team[:2]
         obs = take(state, "obs", like.dtype, robots, None, width)
         shape = (robots, obs.shape[1])
         found: dict[str, Any] = {"obs": obs}
-        found["actions"] = take_within(state, "actions", torch.int64, 0, actions - 1, *shape)
+        found["actions"] = _take_actions(state, team, shape[1])
         for name in ("log_prob", "value", "advantage", "target"):
             found[name] = take(state, name, like.dtype, *shape)
         return cls(**{name: tensor.to(like.device) for name, tensor in found.items()})
+
+
+def _take_actions(state: State, team: Team, *shape: int) -> Tensor:
+    """Actions (R, *shape, ...) of a state, all of which there are.
+
+    Raises:
+        ValueError: As in `take`, or one is out of range.
+    """
+    kind = team.actions
+    found = take(state, "actions", kind.dtype, team.num_robots, *shape, *kind.shape)
+    kind.refuse_unknown(found)
+    return found
 
 
 def rows_of(steps: Tensor) -> Tensor:

@@ -11,7 +11,13 @@ from innerattn.config import NetworkConfig
 from innerattn.learn.interruptions import Interruptions
 from innerattn.learn.resume import State
 from innerattn.learn.ring import Ring
-from innerattn.nn import EntityColumns
+from innerattn.nn import (
+    Actions,
+    DiscreteActions,
+    EntityColumns,
+    PartnerColumns,
+    SquashedActions,
+)
 
 
 class Team(NamedTuple):
@@ -20,12 +26,15 @@ class Team(NamedTuple):
     Attributes:
         num_robots: R.
         obs_width: D, columns of one robot's observation.
-        num_actions: A, discrete actions of one robot.
+        num_actions: A, discrete actions of one robot; 0 where actions are continuous.
         kinds: Kind of each robot, R words; needed only where `network.parameter_sharing` is "kind".
         availability_column: Column of a robot's observation that says whether the robot is
             available (above 0.5); needed only where `network.mask_unavailable` is set.
         entities: To whom the columns of an observation belong; needed only where `network.encoder`
             is "entities".
+        partners: The columns of an observation that tell who can help whom; needed only where
+            `network.attention` is "oracle".
+        action_width: W, numbers of a continuous action; 0 where actions are discrete.
     """
 
     num_robots: int
@@ -34,6 +43,15 @@ class Team(NamedTuple):
     kinds: tuple[str, ...] | None = None
     availability_column: int | None = None
     entities: EntityColumns | None = None
+    partners: PartnerColumns | None = None
+    action_width: int = 0
+
+    @property
+    def actions(self) -> Actions:
+        """The kind of actions of one robot."""
+        if self.action_width:
+            return SquashedActions(self.action_width)
+        return DiscreteActions(self.num_actions)
 
 
 class Scheduled(NamedTuple):
@@ -55,7 +73,7 @@ class Transitions(NamedTuple):
 
     Attributes:
         obs: (B, R, D) float32.
-        actions: (B, R) int64.
+        actions: (B, R) int64, or (B, R, W) float32 where actions are continuous, as everywhere.
         reward: (B, R) float32.
         next_obs: (B, R, D) float32, the observation after the step, before any reset.
         terminated: (B,) bool; a time limit is not a termination.
@@ -86,10 +104,11 @@ class Learner(Protocol):
 
         Args:
             obs: (E, R, D) float32.
-            greedy: Take the likeliest action instead of drawing one.
+            greedy: Take the likeliest action instead of drawing one; tanh of the mean where actions
+                are continuous.
 
         Returns:
-            (E, R) int64, on the device of `obs`.
+            (E, R) int64, or (E, R, W) float32 in [-1, 1], on the device of `obs`.
         """
 
     def seed_draws(self, seed: int) -> None:

@@ -4,36 +4,46 @@ Robots are the first dimension of tensors, (R, B, ...), so that every layer is o
 product. Networks know no environment, no loss and no file.
 """
 
+from innerattn.nn.actions import Actions, DiscreteActions, SquashedActions
 from innerattn.nn.actor import Actor, action_noise, sample_actions
 from innerattn.nn.attention import (
     Attended,
+    FrozenAttention,
     InnerAttention,
     TeammateAttention,
     UniformAttention,
 )
-from innerattn.nn.critic import Critic, CriticOutput
+from innerattn.nn.critic import Critic, CriticOutput, VectorCritic
 from innerattn.nn.encoder import EntityColumns, EntityEncoder
 from innerattn.nn.joint_critic import CentralCritic, JointCritic
 from innerattn.nn.linear import PerRobotLinear
+from innerattn.nn.partner import OracleAttention, PartnerColumns
 from innerattn.nn.sharing import is_shared_by_kind, robots_of_each_kind, share_by_kind
 from innerattn.nn.symmetry import NUM_ELEMENTS, SquareSymmetry, VectorColumns
 
 __all__ = [
     "NUM_ELEMENTS",
+    "Actions",
     "Actor",
     "Attended",
     "CentralCritic",
     "Critic",
     "CriticOutput",
+    "DiscreteActions",
     "EntityColumns",
     "EntityEncoder",
+    "FrozenAttention",
     "InnerAttention",
     "JointCritic",
+    "OracleAttention",
+    "PartnerColumns",
     "PerRobotLinear",
     "SquareSymmetry",
+    "SquashedActions",
     "TeammateAttention",
     "UniformAttention",
     "VectorColumns",
+    "VectorCritic",
     "action_noise",
     "is_shared_by_kind",
     "robots_of_each_kind",

@@ -1,6 +1,7 @@
 """The actors: each robot's policy, from its own observation to its own actions.
 
-It computes logits and draws actions from them; losses are in `innerattn.learn`.
+It computes logits and draws actions from them; losses are in `innerattn.learn`. What the outputs of
+another kind of actions mean is in `innerattn.nn.actions`.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class Actor(nn.Module):
         Args:
             num_robots: R.
             obs_width: D.
-            num_actions: A.
+            num_actions: A, or the outputs for another kind of actions.
             hidden_width: Width of both hidden layers.
             generator: Source of the initial parameters, on the CPU.
             entities: Columns of the entities to encode separately; None: encode the whole row.

@@ -1,4 +1,4 @@
-"""Attention of each robot over its teammates, learnt or uniform, with the same parameters.
+"""Attention of each robot over its teammates: learnt, untrained or uniform, of the same parameters.
 
 Sources: eqs. 2-4 of the paper, read as in Iqbal & Sha 2019, section 3.2. The softmax is over
 teammates j != i, and the query comes from an encoding without the robot's own action.
@@ -39,14 +39,17 @@ def visible_teammates(num_robots: int, available: Tensor | None, device: torch.d
 
     Args:
         num_robots: R.
-        available: (B, R) bool; None: all are available.
+        available: (B, R) bool; or (B, R, R), where robot i sees robot j only if [b, i, j] is set;
+            None: all are available.
         device: Where the result lies.
 
     Returns:
         (1 or B, R, R) bool, row i, column j.
     """
     others = ~torch.eye(num_robots, dtype=torch.bool, device=device).unsqueeze(0)
-    return others if available is None else others & available.unsqueeze(1)
+    if available is None:
+        return others
+    return others & (available if available.dim() == 3 else available.unsqueeze(1))
 
 
 class TeammateAttention(nn.Module):
@@ -87,8 +90,8 @@ class TeammateAttention(nn.Module):
         raise NotImplementedError
 
 
-class _SharedMatrices(TeammateAttention):
-    """The parameters of inner and uniform attention.
+class MatrixAttention(TeammateAttention):
+    """The parameters that all attentions of this package have.
 
     Attributes:
         query: (W, W), rows h*d..(h+1)*d belong to head h; likewise `key` and `value`.
@@ -103,11 +106,12 @@ class _SharedMatrices(TeammateAttention):
         self.value = uniform_parameter((width, width), width, generator)
         self.value_bias = uniform_parameter((width,), width, generator)
 
-    def _values(self, others: Tensor) -> Tensor:
+    def values(self, others: Tensor) -> Tensor:
+        """(R, B, W) v_j of state-action encodings (R, B, W)."""
         return functional.leaky_relu_(functional.linear(others, self.value, self.value_bias))
 
 
-class InnerAttention(_SharedMatrices):
+class InnerAttention(MatrixAttention):
     """Learnt attention: alpha_ij = softmax over j != i of q_i . k_j / sqrt(d), per head.
 
     Attributes:
@@ -123,10 +127,23 @@ class InnerAttention(_SharedMatrices):
         """Attend to teammates; arguments as in `TeammateAttention.forward`."""
         queries = functional.linear(own, self.query)
         keys = functional.linear(others, self.key)
-        return self.attend(queries, keys, self._values(others), self.heads, available)
+        return self.attend(queries, keys, self.values(others), self.heads, available)
 
 
-class UniformAttention(_SharedMatrices):
+class FrozenAttention(InnerAttention):
+    """A control: the formula of `InnerAttention`, with queries and keys as they were drawn.
+
+    Weights vary with what robots see, but nothing is learnt of whom to attend to.
+    """
+
+    def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
+        """Draw the parameters; arguments as in `TeammateAttention`."""
+        super().__init__(width, heads, generator)
+        self.query.requires_grad_(False)
+        self.key.requires_grad_(False)
+
+
+class UniformAttention(MatrixAttention):
     """The baseline: alpha_ij = 1/(N-1) for every teammate that robot i sees.
 
     It has the parameters of `InnerAttention`, but does not use or train query and key: 2 W^2 fewer
@@ -146,7 +163,7 @@ class UniformAttention(_SharedMatrices):
     def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
         """Average over teammates; arguments as in `TeammateAttention.forward`."""
         del own
-        return self.attend(self._values(others), self.heads, available)
+        return self.attend(self.values(others), self.heads, available)
 
 
 def dot_product_attention(

@@ -15,14 +15,15 @@ from torch.nn import functional
 from innerattn.nn.attention import Attended, TeammateAttention
 from innerattn.nn.encoder import EntityColumns, observation_encoder
 from innerattn.nn.linear import PerRobotLinear
+from innerattn.nn.partner import OracleAttention, right_partners
 
 
 class CriticOutput(NamedTuple):
     """Values of a batch.
 
     Attributes:
-        q: (R, A, B) Q_i(o, a, a_-i) for every own action a, or (R, outputs, B) other values. The
-            own action of robot i is not an input of its values.
+        q: (R, A, B) ``Q_i(o, a, a_-i)`` for every own action a, or (R, outputs, B) other values.
+            The own action of robot i is not an input of its values.
         attended: Result of the attention; None if the critic has no attention.
     """
 
@@ -76,6 +77,8 @@ class Critic(nn.Module):
             available: (B, R) bool; the attention masks unavailable robots. None: all are
                 available.
         """
+        if isinstance(self.attention, OracleAttention):
+            available = right_partners(obs, self.attention.partners, available)
         return self.value(*self.encode(obs, actions), available)
 
     def encode(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor]:
@@ -88,14 +91,30 @@ class Critic(nn.Module):
         Returns:
             Both (R, B, W).
         """
-        chosen = obs.new_zeros(*actions.shape, self.num_actions)
-        chosen.scatter_(2, actions.unsqueeze(2), 1.0)
+        chosen = self.action_inputs(obs, actions)
         own = functional.leaky_relu_(self.state_encoder(obs))
         others = functional.leaky_relu_(self.action_encoder(torch.cat([obs, chosen], dim=2)))
         return own, others
+
+    def action_inputs(self, obs: Tensor, actions: Tensor) -> Tensor:
+        """Actions as numbers (R, B, A): one column for each action, 1 for the one taken."""
+        chosen = obs.new_zeros(*actions.shape, self.num_actions)
+        return chosen.scatter_(2, actions.unsqueeze(2), 1.0)
 
     def value(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> CriticOutput:
         """Value every own action from the encodings that `encode` gives, (R, B, W) each."""
         attended = self.attention(own, others, available)
         hidden = functional.leaky_relu_(self.hidden.side_by_side(own, attended.mixed))
         return CriticOutput(self.output.batch_last(hidden), attended)
+
+
+class VectorCritic(Critic):
+    """The same critics where an action is a vector, whose A numbers are inputs as they are.
+
+    It values states, not every own action, so the number of outputs must be given. Actions are
+    (R, B, A) numbers wherever `Critic` takes (R, B) int64.
+    """
+
+    def action_inputs(self, obs: Tensor, actions: Tensor) -> Tensor:
+        """The actions, of the dtype of the observations."""
+        return actions.to(obs.dtype)

@@ -1,4 +1,4 @@
-"""The eight symmetries of the square world, acting on observations and on discrete actions.
+"""The eight symmetries of the square world, acting on observations and on actions.
 
 An element of the group is a number 0 to 7: bit 0 mirrors x, bit 1 mirrors y, and bit 2 then swaps
 x and y. Everything here moves columns, changes signs and looks up actions: turning there and back
@@ -72,6 +72,8 @@ class SquareSymmetry:
         )
         self._forward = forward.to(device)
         self._back = forward.argsort(dim=1).to(device)
+        mirrors = [_turned(element & 3, 1, 1) for element in range(NUM_ELEMENTS)]
+        self._mirrors = torch.tensor(mirrors, dtype=torch.float32).to(device)
 
     def frame(self, obs: Tensor) -> Tensor:
         """The elements (...) int64 that bring observations (..., D) into their frames."""
@@ -100,12 +102,26 @@ class SquareSymmetry:
         return rows.view(obs.shape)
 
     def turn_actions(self, actions: Tensor, element: Tensor) -> Tensor:
-        """The actions (...) int64 that do in turned worlds what ``actions`` do in these."""
+        """The actions that do in turned worlds what ``actions`` do in these.
+
+        Args:
+            actions: (...) int64, or (..., 2) of a floating-point type.
+            element: (...) int64.
+        """
+        if actions.is_floating_point():
+            x, y = self._mirrored(actions, element).unbind(-1)
+            return _swapped(x, y, element)
         return self._forward[element, actions]
 
     def turn_actions_back(self, actions: Tensor, element: Tensor) -> Tensor:
         """The inverse of `turn_actions`."""
+        if actions.is_floating_point():
+            x, y = actions.unbind(-1)
+            return self._mirrored(_swapped(x, y, element), element)
         return self._back[element, actions]
+
+    def _mirrored(self, vectors: Tensor, element: Tensor) -> Tensor:
+        return vectors * self._mirrors[element].to(vectors.dtype)
 
     def _first_sign(self, values: Tensor) -> Tensor:
         """A number with the sign of the first of (..., K) values that is not zero, else 0."""
@@ -115,6 +131,12 @@ class SquareSymmetry:
 
 def _element(mirror_x: Tensor, mirror_y: Tensor, swap: Tensor) -> Tensor:
     return mirror_x.long() + 2 * mirror_y.long() + 4 * swap.long()
+
+
+def _swapped(x: Tensor, y: Tensor, element: Tensor) -> Tensor:
+    """Vectors (..., 2) of their parts (...), which swap where the element says so."""
+    swap = element >= 4
+    return torch.stack([torch.where(swap, y, x), torch.where(swap, x, y)], dim=-1)
 
 
 def _turned(element: int, x: int, y: int) -> tuple[int, int]:

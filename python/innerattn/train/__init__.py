@@ -7,7 +7,11 @@ from innerattn.records.run_folder import RunInfo, read_info
 from innerattn.train.checkpoint import RunFolder
 from innerattn.train.loop import Progress, resume, train
 from innerattn.train.policy import NewestPolicy, load_newest, load_policy
-from innerattn.train.resume import DamagedCheckpointError, NothingToResumeError
+from innerattn.train.resume import (
+    DamagedCheckpointError,
+    NothingToResumeError,
+    newest_checkpoint,
+)
 
 __all__ = [
     "DamagedCheckpointError",
@@ -18,6 +22,7 @@ __all__ = [
     "RunInfo",
     "load_newest",
     "load_policy",
+    "newest_checkpoint",
     "read_info",
     "resume",
     "train",

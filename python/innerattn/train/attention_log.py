@@ -14,10 +14,10 @@ from math import ceil
 import torch
 from torch import Tensor
 
-from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
-from innerattn.learn.resume import State, take, take_whole, take_within, whole
+from innerattn.learn.resume import State, take, take_whole, whole
 from innerattn.learn.types import Learner
 from innerattn.measures.attention import attention_entropy
+from innerattn.nn import Actions
 
 _MOST_WORLDS = 64
 _MOST_STEPS = 50
@@ -26,9 +26,15 @@ _MOST_STEPS = 50
 class AttentionLog:
     """What the critic attended to in the last control steps, as many as an episode has."""
 
-    def __init__(self, robot_names: Sequence[str], episode_steps: int) -> None:
-        """Keep steps of an episode of ``episode_steps``, evenly spread where they are many."""
-        self._robot_names = tuple(robot_names)
+    def __init__(self, robot_names: Sequence[str], episode_steps: int, actions: Actions) -> None:
+        """Keep steps of an episode, evenly spread where they are many.
+
+        Args:
+            robot_names: of the team.
+            episode_steps: length of an episode.
+            actions: which actions there are.
+        """
+        self._robot_names, self._actions = tuple(robot_names), actions
         self._stride = ceil(episode_steps / _MOST_STEPS)
         self._seen: deque[tuple[Tensor, Tensor]] = deque(maxlen=ceil(episode_steps / self._stride))
         self._steps = 0
@@ -38,7 +44,7 @@ class AttentionLog:
 
         Args:
             obs: (E, R, D) float32, before the step.
-            actions: (E, R) int64.
+            actions: (E, R) int64, or (E, R, W) float32.
         """
         if self._steps % self._stride == 0:
             self._seen.append((obs[:_MOST_WORLDS].clone(), actions[:_MOST_WORLDS].clone()))
@@ -59,8 +65,9 @@ class AttentionLog:
         if "obs" in state:
             robots = len(self._robot_names)
             obs = take(state, "obs", torch.float32, None, None, robots, None)
-            most = NUM_DISCRETE_ACTIONS - 1
-            actions = take_within(state, "actions", torch.int64, 0, most, *obs.shape[:3])
+            shape = (*obs.shape[:3], *self._actions.shape)
+            actions = take(state, "actions", self._actions.dtype, *shape)
+            self._actions.refuse_unknown(actions)
             self._seen.extend(zip(obs, actions, strict=True))
 
     def entropy(self, learner: Learner) -> dict[str, list[float]]:

@@ -18,7 +18,7 @@ from innerattn.errors import ConfigError
 from innerattn.learn.framed import FramedLearner
 from innerattn.learn.types import Learner, LearnerClass, Team
 from innerattn.nn import SquareSymmetry, VectorColumns
-from innerattn.train.columns import entity_columns, vector_columns
+from innerattn.train.columns import entity_columns, partner_columns, vector_columns
 
 
 def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -> Learner:
@@ -30,23 +30,10 @@ def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -
         training: whether it will be trained; worlds are turned at random only then.
 
     Raises:
-        ConfigError: the device does not exist here, the actions are continuous, or the scenario
-            does not allow `network.symmetry`.
+        ConfigError: the device does not exist here, or the scenario does not allow
+            `network.symmetry`.
     """
-    if env.num_actions == 0:
-        raise ConfigError(
-            "scenario.actions = 'continuous': learning needs 'discrete'; "
-            "continuous worlds are for scripted policies"
-        )
-    names = env.observation_names()
-    team = Team(
-        env.num_robots,
-        env.obs_width,
-        env.num_actions,
-        kinds=tuple(robot.kind for robot in config.scenario.robots),
-        availability_column=names.index("own.available"),
-        entities=entity_columns(names) if config.network.encoder == "entities" else None,
-    )
+    names, team = env.observation_names(), team_of(config, env)
     make: LearnerClass = resolve_name(methods()[config.train.method].algorithm.learner)
     device = _device(config.train.device)
     learner = make(team, config.network, config.algorithm, seed=config.train.seed, device=device)
@@ -56,6 +43,21 @@ def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -
     if config.network.symmetry == "canonical":
         return FramedLearner(learner, symmetry, None)
     return FramedLearner(learner, symmetry, config.train.seed) if training else learner
+
+
+def team_of(config: RunConfig, env: BatchEnv) -> Team:
+    """What learners know of the team in ``env``."""
+    names = env.observation_names()
+    return Team(
+        env.num_robots,
+        env.obs_width,
+        env.num_actions,
+        kinds=tuple(robot.kind for robot in config.scenario.robots),
+        availability_column=names.index("own.available"),
+        entities=entity_columns(names) if config.network.encoder == "entities" else None,
+        partners=partner_columns(names) if config.network.attention == "oracle" else None,
+        action_width=2 if env.continuous else 0,
+    )
 
 
 def _turning_columns(scenario: Scenario, names: Sequence[str]) -> VectorColumns:

@@ -1,4 +1,4 @@
-"""Finds out from their names what the columns of an observation are: whose, and which turn."""
+"""Finds out from names what columns of an observation are: whose, turning, or of who can help."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import zip_longest
 
 from innerattn.errors import ConfigError
-from innerattn.nn import EntityColumns, VectorColumns
+from innerattn.nn import EntityColumns, PartnerColumns, VectorColumns
 
 
 def entity_columns(names: Sequence[str]) -> EntityColumns:
@@ -74,6 +74,35 @@ def vector_columns(names: Sequence[str]) -> VectorColumns:
         vectors=tuple(pairs.values()),
         handed=tuple(place[name] for name in names if name.endswith(".fault.heading_bias")),
         anchors=tuple(anchors),
+    )
+
+
+def partner_columns(names: Sequence[str]) -> PartnerColumns:
+    """The columns that tell who can help whom: abilities, places, and the first victim's needs.
+
+    Args:
+        names: Of all columns, as the worlds name them.
+    """
+    place = {name: column for column, name in enumerate(names)}
+    abilities = [
+        name.removeprefix("own.ability.") for name in names if name.startswith("own.ability.")
+    ]
+    teammates = dict.fromkeys(
+        name.partition(".")[0] for name in names if name.startswith("teammate_")
+    )
+
+    def at(who: str) -> tuple[int, int]:
+        return place[f"{who}.relative_position.x"], place[f"{who}.relative_position.y"]
+
+    return PartnerColumns(
+        abilities=tuple(place[f"own.ability.{one}"] for one in abilities),
+        teammate_abilities=tuple(
+            tuple(place[f"{who}.ability.{one}"] for one in abilities) for who in teammates
+        ),
+        teammate_places=tuple(at(who) for who in teammates),
+        victim_present=place["victim_0.present"],
+        victim_needs=tuple(place[f"victim_0.need.{one}"] for one in abilities),
+        victim_place=at("victim_0"),
     )
 
 

@@ -14,7 +14,7 @@ from innerattn.learn.resume import Resumable, State, inside, take, under
 from innerattn.learn.ring import Ring
 from innerattn.learn.types import Learner, ResumableLearner
 from innerattn.train.attention_log import AttentionLog
-from innerattn.train.build import build_learner
+from innerattn.train.build import build_learner, team_of
 from innerattn.train.checkpoint_info import Stage
 from innerattn.train.collect import Collector
 from innerattn.train.imitate import Imitation
@@ -52,7 +52,8 @@ class Parts:
         self.collector = Collector(env, self.learner, device, self.schedule, stagger)
         warm = stage == "imitating" and config.train.warm_start != "none"
         self.imitation = Imitation(config, env, self.learner, self.collector) if warm else None
-        self.attention = AttentionLog(env.robot_names, env.scenario.episode_steps)
+        actions = team_of(config, env).actions
+        self.attention = AttentionLog(env.robot_names, env.scenario.episode_steps, actions)
         self.interval = Interval()
         within = self.learner.learner if isinstance(self.learner, FramedLearner) else self.learner
         if isinstance(within, ActorCritic):

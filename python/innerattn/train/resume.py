@@ -73,6 +73,15 @@ class Saved:
             raise _damaged(f"{place / 'state.safetensors'}: {error}") from error
 
 
+def newest_checkpoint(run: Path) -> int | None:
+    """How many env-steps the newest checkpoint of a run has done; None without a checkpoint.
+
+    After a `kill -9` this is less than `run.json` says, which is written more often.
+    """
+    numbers = whole_checkpoints(run / "checkpoints")
+    return numbers[-1] if numbers else None
+
+
 def read_saved(run: Path) -> Saved:
     """The newest checkpoint of a run.
 
@@ -87,10 +96,9 @@ def read_saved(run: Path) -> Saved:
     if files.info.state == "done":
         raise NothingToResumeError(f"{run}: is done; measure it with: innerattn evaluate {run}")
     folder = run / "checkpoints"
-    numbers = whole_checkpoints(folder)
-    if not numbers:
+    number = newest_checkpoint(run)
+    if number is None:
         raise NothingToResumeError(f"{run}: holds no checkpoint that training could go on from")
-    number = numbers[-1]
     name = f"checkpoints/{number}"
     try:
         info = _info(files.read(f"{name}/{INFO}", MOST_INFO_BYTES), run / name / INFO)
@@ -105,7 +113,7 @@ def read_saved(run: Path) -> Saved:
         }
         MetricsFile(run / "metrics.jsonl").verified(info.metrics_bytes, info.metrics_sha256)
     except RunError as error:
-        raise _damaged(str(error), folder, numbers) from error
+        raise _damaged(str(error), folder, whole_checkpoints(folder)) from error
     if info.config_sha256 != config.digest():
         raise RunError(
             f"{run / 'config.toml'}: is not the configuration of checkpoint {number}; a run goes "

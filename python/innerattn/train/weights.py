@@ -45,8 +45,18 @@ def write_weights(path: Path, tensors: Mapping[str, Tensor], form: str = FORMAT)
     plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
     digest = _digest(plain)
     metadata = {"format": form, "schema_version": SCHEMA_VERSION, "sha256": digest}
-    write_whole(path, save(plain, metadata))
+    write_whole(path, _in_order(save(plain, metadata)))
     return digest
+
+
+def _in_order(data: bytes) -> bytes:
+    """The same file with its metadata in one order; `save` writes them in a new one each time."""
+    size = int.from_bytes(data[:8], "little")
+    header = json.loads(data[8 : 8 + size])
+    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
+    text = json.dumps(header, ensure_ascii=False, separators=(",", ":")).encode()
+    text = text.ljust(-(-len(text) // 8) * 8)  # tensors begin at a multiple of 8 bytes
+    return b"".join((len(text).to_bytes(8, "little"), text, memoryview(data)[8 + size :]))
 
 
 def read_weights(path: Path) -> dict[str, Tensor]:
@@ -62,8 +72,7 @@ def read_weights(path: Path) -> dict[str, Tensor]:
 def digest_of(path: Path) -> str:
     """SHA-256 of the tensors in ``path``, in hexadecimal.
 
-    It is that of names, dtypes, shapes and bytes: the same training gives the same one, while the
-    file may differ in the order of its header.
+    It is that of names, dtypes, shapes and bytes: the same training gives the same one.
 
     Raises:
         RunError: as of `read_weights`.

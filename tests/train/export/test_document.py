@@ -60,7 +60,7 @@ def test_rows_of_every_preset_are_those_of_the_worlds(preset: str) -> None:
     check(Scenario.preset(preset), seed=1)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     seed=st.integers(0, 2**32),
     robots=st.integers(1, 6),

@@ -56,6 +56,54 @@ def test_an_exported_team_plays_as_the_trained_one(
     assert len(np.unique(taken)) > 2
 
 
+@pytest.mark.parametrize("values", [FRAMED, {}], ids=["framed", "plain"])
+def test_a_team_of_forces_plays_as_the_trained_one(
+    tmp_path: Path, values: dict[str, object]
+) -> None:
+    run, folder = made_export(tmp_path, "ppo-inner", **{"scenario.actions": "continuous"}, **values)
+    config, learner = load_policy(run)
+    teams = [Exported(folder, backend=one, greedy=True) for one in ("numpy", "onnxruntime")]
+    contract = teams[0].contract
+    assert (contract.action_kind, contract.actions, contract.outputs) == ("continuous", (), 4)
+    assert contract.checked is not None
+    assert contract.checked.same_greedy_action == contract.checked.observations
+    assert (contract.network.frame is None) == (not values)
+    with closing(BatchEnv(config.scenario, 64, seed=9, num_threads=1)) as env:
+        obs = env.reset()
+        taken = []
+        for _ in range(30):
+            forces = learner.act(torch.tensor(obs), greedy=True).numpy()
+            for team in teams:
+                found = team.act(PolicyInput(obs))
+                assert found.dtype == np.float32
+                np.testing.assert_allclose(found, forces, atol=1e-5)
+            taken.append(forces)
+            obs = env.step(forces).obs
+    assert len(np.unique(np.sign(taken).reshape(-1, 2), axis=0)) == 4
+    for team in teams:
+        decision = team.decide("food_1", obs[0, 1])
+        assert (decision.action, len(decision.probabilities)) == (None, 0)
+        np.testing.assert_allclose(decision.force, team.act(PolicyInput(obs[:1]))[0, 1], atol=1e-6)
+
+
+def test_forces_are_drawn_as_in_training(tmp_path: Path) -> None:
+    run, folder = made_export(
+        tmp_path, "mappo", **{"scenario.actions": "continuous", "network.symmetry": "canonical"}
+    )
+    config, learner = load_policy(run)
+    team = Exported(folder, backend="numpy", greedy=False, seed=3)
+    with closing(BatchEnv(config.scenario, 1, seed=4, num_threads=1)) as env:
+        obs = np.repeat(env.reset(), 20_000, axis=0)
+    drawn, expected = team.act(PolicyInput(obs)), learner.act(torch.tensor(obs)).numpy()
+    np.testing.assert_allclose(drawn.mean(axis=0), expected.mean(axis=0), atol=0.02)
+    np.testing.assert_allclose(drawn.std(axis=0), expected.std(axis=0), atol=0.02)
+    team.reset(3)
+    np.testing.assert_array_equal(team.act(PolicyInput(obs)), drawn)
+    forces = np.array([team.decide("food_0", obs[0, 0]).force for _ in range(200)])
+    assert np.linalg.norm(forces, axis=1).max() <= 1.0 + 1e-6
+    assert len(np.unique(forces)) == 400
+
+
 def test_the_contract_says_what_was_trained(framed: Made) -> None:
     run, folder = framed
     contract = Exported(folder, backend="numpy").contract

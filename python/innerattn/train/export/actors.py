@@ -15,7 +15,9 @@ from innerattn.errors import ExportError
 from innerattn.learn.framed import FramedLearner
 from innerattn.learn.types import Learner
 from innerattn.nn import Actor, EntityColumns, PerRobotLinear
-from innerattn.policies.exported.frame import Frame
+from innerattn.nn.actions import mean_and_log_std
+from innerattn.policies.exported.backend import FORCE, LOGITS, POLICY, PROBABILITIES
+from innerattn.policies.exported.frame import SWAPPED, Frame
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,13 @@ def _layers(actor: Actor) -> dict[str, PerRobotLinear]:
 
 
 class OnnxForm(nn.Module):
-    """One robot's policy from the row in the frame of the world to the actions of the world."""
+    """One robot's policy from the row in the frame of the world to the actions of the world.
+
+    Attributes:
+        names: of the outputs.
+    """
+
+    names: tuple[str, str] = (LOGITS, PROBABILITIES)
 
     def __init__(self, actor: Actor, frame: Frame | None) -> None:
         """Put the frame around the actor, if there is one."""
@@ -103,7 +111,7 @@ class OnnxForm(nn.Module):
         if frame is not None:
             self.signs = _table(frame.signs)
             self.swapped = _table(frame.swapped)
-            self.actions = _table(frame.forward)
+            self.actions = _table(frame.mirrors if frame.forward is None else frame.forward)
             self.x, self.y = _table(frame.x), _table(frame.y)
             self.importance = _table(frame.importance)
 
@@ -113,11 +121,14 @@ class OnnxForm(nn.Module):
             logits = self._logits(observation)
         else:
             element = self._element(observation)
-            turned = observation * self.signs[element]
-            swapped = turned.index_select(1, self.swapped)
-            turned = torch.where((element >= 4).unsqueeze(1), swapped, turned)
+            turned = self._turned(observation, element)
             logits = self._logits(turned).gather(1, self.actions[element])
         return logits, logits.softmax(dim=1)
+
+    def _turned(self, observation: Tensor, element: Tensor) -> Tensor:
+        turned = observation * self.signs[element]
+        swapped = turned.index_select(1, self.swapped)
+        return torch.where((element >= 4).unsqueeze(1), swapped, turned)
 
     def _logits(self, rows: Tensor) -> Tensor:
         logits: Tensor = self.actor(rows.unsqueeze(0))
@@ -132,6 +143,28 @@ class OnnxForm(nn.Module):
 
     def _negative(self, values: Tensor) -> Tensor:
         return values.sign().double() @ self.importance < 0
+
+
+class OnnxVectorForm(OnnxForm):
+    """The same where actions are forces."""
+
+    names = (POLICY, FORCE)
+
+    def forward(self, observation: Tensor) -> tuple[Tensor, Tensor]:
+        """Map observations (B, D) to `Contract.outputs` (B, 4) and the likeliest force (B, 2)."""
+        if not self.framed:
+            policy = self._policy(observation)
+        else:
+            element = self._element(observation)
+            inside = self._policy(self._turned(observation, element))
+            swapped = inside[:, SWAPPED]
+            policy = torch.where((element >= 4).unsqueeze(1), swapped, inside)
+            policy = policy * self.actions[element]
+        return policy, policy[:, :2].tanh()
+
+    def _policy(self, rows: Tensor) -> Tensor:
+        mean, log_std = mean_and_log_std(self.actor(rows.unsqueeze(0)))
+        return torch.cat([mean[0], log_std[0]]).t()
 
 
 def _table(values: NDArray[Any]) -> nn.Buffer:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import closing
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -15,6 +16,7 @@ from innerattn.errors import ExportError
 from innerattn.learn.framed import FramedLearner
 from innerattn.learn.types import Learner
 from innerattn.nn import Actor
+from innerattn.nn.actions import mean_and_log_std
 from innerattn.policies.exported.contract import Checked
 from innerattn.policies.exported.network import probabilities_of
 from innerattn.policies.exported.team import Exported
@@ -22,7 +24,8 @@ from innerattn.policies.exported.team import Exported
 OBSERVATIONS = 10_000
 """Observations that are compared at least, those of all robots together."""
 MOST_DIFFERENCE = 1e-5
-"""Largest difference of a probability, and of a logit as a share of the largest one, if above 1."""
+"""Largest difference of a probability or force, and of an output as a share of the largest one, if
+above 1."""
 _STEPS = 25
 _SEED = 20_260
 
@@ -81,7 +84,12 @@ def check_export(
 
 @torch.no_grad()
 def logits_of(learner: Learner, actor: Actor, obs: torch.Tensor) -> NDArray[np.float32]:
-    """Logits (B, R, A) of the world's actions for observations (B, R, D), as training has them."""
+    """Logits (B, R, A) of the world's actions for observations (B, R, D), as training has them.
+
+    (B, R, 4) where actions are continuous, as `innerattn.policies.exported.contract` has them.
+    """
+    if learner.act(obs[:1], greedy=True).is_floating_point():
+        return _vectors_of(learner, actor, obs)
     if not isinstance(learner, FramedLearner):
         return np.asarray(actor(obs.transpose(0, 1)).permute(2, 0, 1).numpy())
     seen, _ = learner.as_seen(obs, torch.zeros(obs.shape[:2], dtype=torch.int64))
@@ -93,25 +101,48 @@ def logits_of(learner: Learner, actor: Actor, obs: torch.Tensor) -> NDArray[np.f
     return np.asarray(inside.gather(2, torch.stack(named, dim=2)).numpy())
 
 
+def _vectors_of(learner: Learner, actor: Actor, obs: torch.Tensor) -> NDArray[np.float32]:
+    """Means and log standard deviations (B, R, 4) in the frame of the world."""
+    if not isinstance(learner, FramedLearner):
+        parts = mean_and_log_std(actor(obs.transpose(0, 1)))
+        return np.asarray(torch.cat(parts, dim=1).permute(2, 0, 1).numpy())
+    nothing = torch.zeros(*obs.shape[:2], 2)
+    seen, _ = learner.as_seen(obs, nothing)
+    mean, log_std = (one.permute(2, 0, 1) for one in mean_and_log_std(actor(seen.transpose(0, 1))))
+    # What x and y of the world are called in the frames: a vector's x is its part along the first.
+    axes = [learner.as_seen(obs, nothing + axis)[1] for axis in torch.eye(2)]
+    back = [(mean * axis).sum(dim=2) for axis in axes]
+    back += [(log_std * axis.abs()).sum(dim=2) for axis in axes]
+    return np.asarray(torch.stack(back, dim=2).numpy())
+
+
 def _compare(
     robot: str,
     logits: NDArray[np.float32],
-    greedy: NDArray[np.int64],
+    greedy: NDArray[Any],
     rows: NDArray[np.float32],
     onnx: Exported,
     plain: Exported,
     tally: _Tally,
 ) -> None:
     rows = np.ascontiguousarray(rows)
-    best = np.sort(logits, axis=1)
+    continuous = greedy.ndim == 2
     scale = np.maximum(1.0, np.abs(logits).max(axis=1))
-    tied = best[:, -1] - best[:, -2] <= 2 * MOST_DIFFERENCE * scale
+    tied = np.zeros(len(rows), bool)
+    if not continuous:
+        best = np.sort(logits, axis=1)
+        tied = best[:, -1] - best[:, -2] <= 2 * MOST_DIFFERENCE * scale
     differ = np.zeros(len(rows), bool)
     for team, name in ((onnx, "onnx"), (plain, "numpy")):
         # One by one, as a robot asks: other numbers of rows round in another way.
         found = np.concatenate([team.logits(robot, row[None]) for row in rows])
         differences = np.abs(found - logits).max(axis=1) / scale
-        chances = np.abs(probabilities_of(found) - probabilities_of(logits)).max(axis=1)
+        if continuous:
+            away = np.abs(np.tanh(found[:, :2]) - greedy).max(axis=1)
+            chances, others = away, away >= MOST_DIFFERENCE
+        else:
+            chances = np.abs(probabilities_of(found) - probabilities_of(logits)).max(axis=1)
+            others = found.argmax(axis=1) != greedy
         largest = float(np.maximum(differences, chances).max())
         if not largest < MOST_DIFFERENCE:  # NaN too
             raise ExportError(
@@ -119,7 +150,6 @@ def _compare(
                 f"{largest:.1e}: must be below {MOST_DIFFERENCE:.0e}; nothing was written"
             )
         setattr(tally, name, max(getattr(tally, name), largest))
-        others = found.argmax(axis=1) != greedy
         if (others & ~tied).any():
             raise ExportError(
                 f"{robot}: the exported policy ({team.backend}) takes another likeliest action in "

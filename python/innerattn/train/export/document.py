@@ -11,11 +11,13 @@ from typing import Any
 
 from innerattn.config import RunConfig
 from innerattn.nn import EntityColumns
+from innerattn.nn.actions import LOG_STD_RANGE, LOG_STD_SHIFT
 from innerattn.policies.exported.contract import (
     FORMAT,
     VERSION,
     Entities,
     FrameColumns,
+    LogStd,
     Network,
     digest_of,
 )
@@ -60,6 +62,16 @@ _ABOUT = {
     "probabilities": "softmax of the logits. With greedy_actions the likeliest action is taken, "
     "else one is drawn.",
 }
+_ABOUT_FORCES = _ABOUT | {
+    "action": "One force for each control period, as a share of full force along x and y. A vector "
+    "longer than 1 is shortened to 1. It is held for the whole period. Without contact that is the "
+    "velocity clip((1 - damping) v + force * drive_force_n / mass_kg * control_period_s, "
+    "max_speed_mps), set at the start of the period, where v is the present velocity and clip "
+    "shortens the vector.",
+    "probabilities": "The output `policy` holds means x and y, then log standard deviations x and "
+    "y, of a normal distribution. Its draws go through tanh on each axis. With greedy_actions the "
+    "force is tanh of the means, the output `force`, else one is drawn.",
+}
 
 
 def contract_document(
@@ -86,12 +98,18 @@ def contract_document(
         files: the bytes of each file beside the contract.
     """
     scenario = config.scenario
+    continuous = scenario.actions == "continuous"
+    parts = asdict(network)
+    if network.log_std is None:
+        del parts["log_std"]  # so that earlier versions read the contract
+    kind = {"action_kind": scenario.actions} if continuous else {}
+    forces = () if continuous else _FORCES
     worlds = scenario.model_dump(mode="json")
     return _plain(
         {
             "format": FORMAT,
             "version": VERSION,
-            "about": _ABOUT,
+            "about": _ABOUT_FORCES if continuous else _ABOUT,
             "made_with": {
                 name: version(name) for name in ("innerattn", "torch", "onnx", "onnxscript")
             },
@@ -124,9 +142,9 @@ def contract_document(
             "observation": [_column(name) for name in names],
             "actions": [
                 {"number": number, "name": name, "force": force}
-                for number, (name, force) in enumerate(_FORCES)
+                for number, (name, force) in enumerate(forces)
             ],
-            "network": asdict(network),
+            "network": parts,
             "actors": dict(actors),
             "weights_sha256": weights_sha256,
             "files": {
@@ -134,6 +152,7 @@ def contract_document(
                 for name, data in files.items()
             },
             "checked": None,
+            **kind,
         }
     )
 
@@ -156,7 +175,13 @@ def network_of(config: RunConfig, names: Sequence[str], entities: EntityColumns 
         leaky_relu_slope=LEAKY_RELU_SLOPE,
         entities=None if entities is None else Entities(**asdict(entities)),
         frame=frame,
+        log_std=_log_std() if config.scenario.actions == "continuous" else None,
     )
+
+
+def _log_std() -> LogStd:
+    low, high = LOG_STD_RANGE
+    return LogStd(low, high, LOG_STD_SHIFT)
 
 
 def _abilities(names: Sequence[str]) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import torch
 
-from innerattn.policies.exported.backend import INPUT, LOGITS, MARK, PROBABILITIES
+from innerattn.policies.exported.backend import INPUT, MARK
 from innerattn.train.export.actors import OnnxForm
 
 
@@ -30,7 +30,7 @@ def onnx_bytes(form: OnnxForm, width: int, mark: str) -> bytes:
             dynamo=True,
             external_data=False,
             input_names=[INPUT],
-            output_names=[LOGITS, PROBABILITIES],
+            output_names=[*form.names],
             dynamic_shapes=({0: torch.export.Dim("batch", min=1)},),
             verbose=False,
         )

@@ -28,7 +28,7 @@ from innerattn.policies.exported.frame import Frame
 from innerattn.policies.exported.team import Exported
 from innerattn.records.run_files import RunFiles, amend
 from innerattn.train.columns import entity_columns
-from innerattn.train.export.actors import OnnxForm, inner_actor, team_actors
+from innerattn.train.export.actors import OnnxForm, OnnxVectorForm, inner_actor, team_actors
 from innerattn.train.export.check import check_export
 from innerattn.train.export.document import PUSHES, contract_document, network_of
 from innerattn.train.export.onnx_file import onnx_bytes
@@ -102,11 +102,14 @@ def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: 
     weights_sha256 = write_weights(out / WEIGHTS, team.tensors(), FORMAT)
     files = {name: f"{name}.onnx" for name in team.actors}
     network = network_of(config, names, entities)
-    frame = None if network.frame is None else Frame(network.frame, len(names), PUSHES)
+    continuous = config.scenario.actions == "continuous"
+    form = OnnxVectorForm if continuous else OnnxForm
+    pushes = None if continuous else PUSHES
+    frame = None if network.frame is None else Frame(network.frame, len(names), pushes)
     scenario_sha256 = digest_of(config.scenario.model_dump(mode="json"))
     for name, one in team.actors.items():
         mark = onnx_mark(weights_sha256, scenario_sha256, name)
-        write_whole(out / files[name], onnx_bytes(OnnxForm(one, frame), len(names), mark))
+        write_whole(out / files[name], onnx_bytes(form(one, frame), len(names), mark))
     document = contract_document(
         config,
         names,

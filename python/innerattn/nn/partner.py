@@ -1,0 +1,112 @@
+"""A control for learnt attention: the whole weight on the teammate that a robot should mind.
+
+A robot's own observation tells who that is, so the control knows nothing that the critic does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from innerattn.nn.attention import Attended, MatrixAttention, mean_attention
+
+
+@dataclass(frozen=True)
+class PartnerColumns:
+    """The columns of an observation that tell who can help whom.
+
+    Attributes:
+        abilities: (A,) own abilities.
+        teammate_abilities: (T, A) those of each teammate.
+        teammate_places: (T, 2) x and y of each teammate, relative to the robot.
+        victim_present: Whether there is a first victim.
+        victim_needs: (A,) what it needs of each ability.
+        victim_place: (2,) x and y, relative to the robot.
+    """
+
+    abilities: tuple[int, ...]
+    teammate_abilities: tuple[tuple[int, ...], ...]
+    teammate_places: tuple[tuple[int, int], ...]
+    victim_present: int
+    victim_needs: tuple[int, ...]
+    victim_place: tuple[int, int]
+
+
+def right_partners(obs: Tensor, columns: PartnerColumns, available: Tensor | None) -> Tensor:
+    """The one teammate of each robot that it needs most, else all of them.
+
+    A robot's first victim is the nearest one that the robot can help. The right partner is the
+    teammate nearest to this victim among those that have an ability that the victim still needs
+    beside the robot's own. Where there is no such victim or no such teammate, there is no right
+    partner, and the robot may attend to all teammates.
+
+    Args:
+        obs: (R, B, D) observations.
+        columns: Where they say it.
+        available: (B, R) bool, robots that can be partners at all; None: all.
+
+    Returns:
+        (B, R, R) bool: whether robot i may attend to robot j.
+    """
+    robots, batch, _ = obs.shape
+    teammates = len(columns.teammate_places)
+    others = ~torch.eye(robots, dtype=torch.bool, device=obs.device)
+    there = others.expand(batch, -1, -1)
+    if available is not None:
+        there = there & available.unsqueeze(1)
+    if not teammates:
+        return there
+    own = obs[:, :, list(columns.abilities)] > 0.0  # (R, B, A)
+    needs = obs[:, :, list(columns.victim_needs)]
+    helps = (own & (needs > 0.0)).any(2) & (obs[:, :, columns.victim_present] > 0.5)
+    missing = needs - own.to(needs.dtype) > 0.0
+    flat = [column for one in columns.teammate_abilities for column in one]
+    has = obs[:, :, flat].view(robots, batch, teammates, -1) > 0.0
+    useful = (has & missing.unsqueeze(2)).any(3)  # (R, B, T)
+    numbers = _teammates(robots, obs.device)  # (R, T)
+    there_by_teammate = there.gather(2, numbers.expand(batch, -1, -1)).transpose(0, 1)
+    useful = useful & there_by_teammate
+    flat = [column for one in columns.teammate_places for column in one]
+    place = obs[:, :, flat].view(robots, batch, teammates, 2)
+    away = (place - obs[:, :, list(columns.victim_place)].unsqueeze(2)).square().sum(3)
+    nearest = away.masked_fill(~useful, torch.inf).argmin(2)
+    chosen = functional.one_hot(numbers.gather(1, nearest), robots).bool()  # (R, B, R)
+    known = (helps & useful.any(2)).unsqueeze(2)
+    return torch.where(known, chosen, there.transpose(0, 1)).transpose(0, 1)
+
+
+def _teammates(robots: int, device: torch.device) -> Tensor:
+    """(R, R - 1) the numbers of each robot's teammates, in the order of their columns."""
+    number = torch.arange(robots - 1, device=device).expand(robots, -1)
+    return number + (number >= torch.arange(robots, device=device).unsqueeze(1))
+
+
+class OracleAttention(MatrixAttention):
+    """The whole weight on `right_partners`; equal weights for a robot that has none.
+
+    It has the parameters of `InnerAttention`, but does not use or train query and key.
+
+    Attributes:
+        partners: Where observations say who the right partner is; set by whoever builds the critic.
+        attend: From values to the result; a compiled update has another form.
+    """
+
+    partners: PartnerColumns
+
+    def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
+        """Draw the parameters; arguments as in `TeammateAttention`."""
+        super().__init__(width, heads, generator)
+        self.query.requires_grad_(False)
+        self.key.requires_grad_(False)
+        self.attend = mean_attention
+
+    def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
+        """Average over those that a robot may attend to; arguments as in `TeammateAttention`.
+
+        ``available`` is what `right_partners` gives.
+        """
+        del own
+        return self.attend(self.values(others), self.heads, available)
