@@ -39,7 +39,7 @@ def played(env: BatchEnv, steps: int, seed: int) -> np.ndarray:
 
 
 @BOTH
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32), steps=st.integers(0, 30))
 def test_rows_are_those_of_the_worlds_to_the_bit(
     request: pytest.FixtureRequest, name: str, seed: int, steps: int

@@ -36,7 +36,7 @@ def reference(cost: np.ndarray) -> tuple[int, float]:
 
 
 # 4 x 4 and 3 x 5 go by enumeration, 7 x 7 and 3 x 30 world by world.
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     shape=st.sampled_from(
         [(1, 1), (1, 4), (4, 1), (4, 2), (2, 4), (4, 4), (3, 5), (7, 7), (3, 30)]
@@ -109,7 +109,7 @@ def test_a_robot_with_two_abilities_fills_one_need() -> None:
     np.testing.assert_array_equal(chosen, [[1, 0]])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(shape=st.sampled_from([(1, 1, 1), (3, 2, 2), (5, 1, 3), (4, 3, 4)]), seed=st.integers(0, 99))
 def test_who_can_be_rescued_by_trying_every_order(shape: tuple[int, int, int], seed: int) -> None:
     robots, victims, needs = shape

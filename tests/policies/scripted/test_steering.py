@@ -90,7 +90,7 @@ def test_faults_of_the_drive_by_hand() -> None:
 coordinate = st.floats(-1, 1, width=32)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.integers(0, 3), *[st.tuples(coordinate, coordinate) for _ in range(3)])
 def test_the_action_is_the_best_of_the_five(
     robot: int, p: tuple[float, float], v: tuple[float, float], target: tuple[float, float]

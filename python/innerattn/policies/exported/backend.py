@@ -9,30 +9,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.errors import ExportError, MissingLibraryError, missing_library
+from innerattn.policies.exported.contract import Contract
 
 Backend = Literal["onnxruntime", "numpy"]
 INPUT, LOGITS, PROBABILITIES = "observation", "logits", "probabilities"
 """Names of the input and the outputs of an ONNX file."""
+POLICY, FORCE = "policy", "force"
+"""Names of the outputs where actions are continuous; the second is tanh of the means."""
 
 
 class Actor(Protocol):
     """A robot's policy."""
 
     def logits(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Map observations (B, D) float32 to logits (B, A) float32 of the world's actions."""
+        """Map observations (B, D) float32 to outputs (B, O) float32 for the world's actions.
+
+        See `Contract.outputs`.
+        """
 
 
 class OnnxActor:
     """An ONNX file in onnxruntime."""
 
-    def __init__(self, data: bytes, name: str, width: int, num_actions: int, mark: str) -> None:
+    def __init__(self, data: bytes, name: str, contract: Contract, mark: str) -> None:
         """Load a file.
 
         Args:
             data: the file.
             name: what to call it in messages.
-            width: D.
-            num_actions: A.
+            contract: of the team.
             mark: what the file must say of itself, as of `onnx_mark`.
 
         Raises:
@@ -55,14 +60,19 @@ class OnnxActor:
         shapes = [
             [one.name, *one.shape[1:]] for one in (*session.get_inputs(), *session.get_outputs())
         ]
-        expected = [[INPUT, width], [LOGITS, num_actions], [PROBABILITIES, num_actions]]
+        width, outputs = len(contract.observation), contract.outputs
+        if contract.action_kind == "continuous":
+            self._output, expected = POLICY, [[INPUT, width], [POLICY, outputs], [FORCE, 2]]
+        else:
+            self._output = LOGITS
+            expected = [[INPUT, width], [LOGITS, outputs], [PROBABILITIES, outputs]]
         if shapes != expected:
             raise ExportError(f"{name}: has {shapes}, must have {expected}")
         self._session: Any = session
 
     def logits(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
         """See `Actor.logits`."""
-        (found,) = self._session.run([LOGITS], {INPUT: rows})
+        (found,) = self._session.run([self._output], {INPUT: rows})
         return np.asarray(found)
 
 

@@ -15,6 +15,8 @@ FORMAT = "innerattn.export"
 VERSION = 1
 NAME = "contract.json"
 WEIGHTS = "weights.safetensors"
+CONTINUOUS_OUTPUTS = 4
+"""Of a policy over forces: mean x and y, then log standard deviation x and y, before tanh."""
 
 _Sha256 = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
 _Name = Annotated[str, StringConstraints(pattern="^[A-Za-z0-9_-]{1,200}$")]
@@ -101,8 +103,19 @@ class FrameColumns:
 
 
 @dataclass(frozen=True)
+class LogStd:
+    """Log standard deviations of outputs z: lowest + (highest - lowest) sigmoid(z + shift)."""
+
+    __pydantic_config__ = _STRICT
+
+    lowest: _Number
+    highest: _Number
+    shift: _Number
+
+
+@dataclass(frozen=True)
 class Network:
-    """How the numbers of `weights.safetensors` make a policy."""
+    """How the numbers of `weights.safetensors` make a policy; `log_std` of continuous actions."""
 
     __pydantic_config__ = _STRICT
 
@@ -111,6 +124,7 @@ class Network:
     leaky_relu_slope: Annotated[float, Field(ge=0, lt=1)]
     entities: Entities | None
     frame: FrameColumns | None
+    log_std: LogStd | None = None
 
 
 @dataclass(frozen=True)
@@ -160,7 +174,8 @@ class Contract:
         tasks: kinds of victims.
         robots: the team, in the order of the worlds.
         observation: the columns.
-        actions: the actions.
+        actions: the actions; none where they are continuous.
+        action_kind: "continuous" where a policy gives a force itself; see `about`.
         network: what numpy needs.
         actors: the ONNX file of each actor.
         weights_sha256: that of the tensors of `weights.safetensors`: names, types, shapes, bytes.
@@ -189,12 +204,18 @@ class Contract:
     tasks: tuple[NeededAbilities, ...]
     robots: Annotated[tuple[Member, ...], Field(min_length=1, max_length=64)]
     observation: Annotated[tuple[Column, ...], Field(min_length=1)]
-    actions: Annotated[tuple[Action, ...], Field(min_length=1)]
+    actions: tuple[Action, ...]
     network: Network
     actors: dict[_Name, _File]
     weights_sha256: _Sha256
     files: dict[_File, FileEntry]
     checked: Checked | None
+    action_kind: Literal["discrete", "continuous"] = "discrete"
+
+    @property
+    def outputs(self) -> int:
+        """O, numbers that a policy gives: a logit for each action, or two means and log stds."""
+        return CONTINUOUS_OUTPUTS if self.action_kind == "continuous" else len(self.actions)
 
 
 _CHECK = TypeAdapter(Contract)
@@ -243,6 +264,11 @@ def _checked(document: dict[str, Any]) -> Contract:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         raise ValueError(f"{place}: {first['msg']}") from error
+    discrete = contract.action_kind == "discrete"
+    if bool(contract.actions) != discrete or (contract.network.log_std is None) != discrete:
+        raise ValueError(
+            "action_kind: 'discrete' needs actions, 'continuous' network.log_std; never both"
+        )
     if digest_of(contract.scenario) != contract.scenario_sha256:
         raise ValueError("scenario_sha256: is not that of the scenario beside it")
     if missing := {WEIGHTS, *contract.actors.values()} - contract.files.keys():

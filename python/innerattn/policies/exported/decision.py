@@ -14,13 +14,13 @@ class Decision(NamedTuple):
     """The answer for one robot and one control period.
 
     Attributes:
-        action: number of the action.
-        probabilities: (A,) float32 of all actions.
-        force: (2,) float32, share of full force along x and y of the world.
+        action: number of the action; None where actions are continuous.
+        probabilities: (A,) float32 of all actions; empty where actions are continuous.
+        force: (2,) float32, share of full force along x and y of the world, of length 1 at most.
         row: (D,) float32, the observation that was acted on.
     """
 
-    action: int
+    action: int | None
     probabilities: NDArray[np.float32]
     force: NDArray[np.float32]
     row: NDArray[np.float32]

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from innerattn.policies.exported.contract import FrameColumns
 
 _ELEMENTS = 8
+SWAPPED = [1, 0, 3, 2]
+"""Outputs of a policy over vectors in their order once x and y are swapped."""
 
 
 class Frame:
@@ -21,19 +23,23 @@ class Frame:
     Attributes:
         signs: (8, D) float32, signs of the columns before they are swapped.
         swapped: (D,) int64, the columns in their order once x and y are swapped.
-        forward: (8, A) int64, what each action of the world is called in the frame.
+        forward: (8, A) int64, what each action of the world is called in the frame; None where
+            actions are vectors.
+        mirrors: (8, 4) float32, signs of the outputs of a policy over vectors.
         x: (K,) int64, columns of the anchors' x, the most important first.
         y: (K,) int64, those of their y.
         importance: (K,) float64, each more than the sum of all later ones.
     """
 
-    def __init__(self, columns: FrameColumns, width: int, pushes: list[tuple[int, int]]) -> None:
+    def __init__(
+        self, columns: FrameColumns, width: int, pushes: list[tuple[int, int]] | None
+    ) -> None:
         """Make the tables.
 
         Args:
             columns: what turns.
             width: D.
-            pushes: direction of each of the A actions.
+            pushes: direction of each of the A actions; None: actions are vectors.
 
         Raises:
             ValueError: a column is not one of the observation, or the actions do not turn into each
@@ -50,10 +56,9 @@ class Frame:
             self.swapped[x], self.swapped[y] = y, x
         for element in range(_ELEMENTS):
             self.signs[element, list(columns.handed)] = (-1.0) ** element.bit_count()
-        turned = [[_turned(element, *push) for push in pushes] for element in range(_ELEMENTS)]
-        if any(set(row) != set(pushes) for row in turned):
-            raise ValueError("actions: must turn into each other, as the frame needs")
-        self.forward = np.array([[pushes.index(push) for push in row] for row in turned])
+        self.forward = None if pushes is None else _turned_actions(pushes)
+        signs = [_turned(element & 3, 1, 1) for element in range(_ELEMENTS)]
+        self.mirrors = np.array([(x, y, 1, 1) for x, y in signs], np.float32)
         self.x = np.array([x for x, _ in columns.anchors])
         self.y = np.array([y for _, y in columns.anchors])
         self.importance = 2.0 ** np.arange(len(columns.anchors) - 1, -1, -1)
@@ -81,12 +86,29 @@ class Frame:
     def turn_back(
         self, logits: NDArray[np.float32], elements: NDArray[np.int64]
     ) -> NDArray[np.float32]:
-        """Logits (B, A) of the world's actions from those in the frame."""
+        """Outputs (B, O) for the world's actions from those in the frame: `Contract.outputs`."""
+        if self.forward is None:
+            swaps = elements >= 4
+            back = logits.copy()
+            back[swaps] = logits[swaps][:, SWAPPED]
+            return np.asarray(back * self.mirrors[elements])
         return np.asarray(logits[np.arange(len(logits))[:, None], self.forward[elements]])
 
     def _negative(self, values: NDArray[np.float32]) -> NDArray[np.int64]:
         """Whether the first of (B, K) values that is not zero is negative: 1 or 0."""
         return np.asarray(np.sign(values) @ self.importance < 0, np.int64)
+
+
+def _turned_actions(pushes: list[tuple[int, int]]) -> NDArray[np.int64]:
+    """(8, A): what each action of the world is called in the frame of each element.
+
+    Raises:
+        ValueError: the actions do not turn into each other.
+    """
+    turned = [[_turned(element, *push) for push in pushes] for element in range(_ELEMENTS)]
+    if any(set(row) != set(pushes) for row in turned):
+        raise ValueError("actions: must turn into each other, as the frame needs")
+    return np.array([[pushes.index(push) for push in row] for row in turned])
 
 
 def _turned(element: int, x: int, y: int) -> tuple[int, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import astuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ class NumpyActor:
         network: Network,
         tensors: Mapping[str, Array],
         width: int,
-        num_actions: int,
+        outputs: int,
         frame: Frame | None,
     ) -> None:
         """Take the arrays of one actor.
@@ -32,13 +33,13 @@ class NumpyActor:
             network: what kind it is.
             tensors: weights (out, in) and biases (out,) by name of the layer.
             width: D.
-            num_actions: A.
+            outputs: O, as `Contract.outputs`.
             frame: what observations are turned by first; None: nothing.
 
         Raises:
             ValueError: an array is missing, of another shape, or unknown.
         """
-        shapes = layer_shapes(network, width, num_actions)
+        shapes = layer_shapes(network, width, outputs)
         names = {f"{layer}.{part}" for layer in shapes for part in ("weight", "bias")}
         if difference := names ^ tensors.keys():
             raise ValueError(f"{min(difference)}: is missing or unknown")
@@ -54,9 +55,10 @@ class NumpyActor:
         self._slope = np.float32(network.leaky_relu_slope)
         self._entities = network.entities
         self._frame = frame
+        self._log_std = network.log_std
 
     def logits(self, rows: Array) -> Array:
-        """Map observations (B, D) float32 to logits (B, A) float32 of the world's actions."""
+        """Map observations (B, D) float32 to outputs (B, O) float32 for the world's actions."""
         if self._frame is None:
             return self._forward(rows)
         elements = self._frame.elements(rows)
@@ -68,7 +70,12 @@ class NumpyActor:
         else:
             hidden = self._encode(rows, self._entities)
         hidden = self._linear("second", self._relu(hidden))
-        return self._linear("output", self._relu(hidden))
+        outputs = self._linear("output", self._relu(hidden))
+        if self._log_std is not None:
+            low, high, shift = astuple(self._log_std)
+            half = np.tanh((outputs[:, 2:] + np.float32(shift)) * np.float32(0.5))
+            outputs[:, 2:] = np.float32(low) + np.float32((high - low) / 2) * (half + 1)
+        return outputs
 
     def _encode(self, rows: Array, columns: Entities) -> Array:
         """The entity encoder; see `innerattn.nn.EntityEncoder`."""
@@ -112,14 +119,14 @@ class NumpyActor:
         return found
 
 
-def layer_shapes(network: Network, width: int, num_actions: int) -> dict[str, tuple[int, int]]:
+def layer_shapes(network: Network, width: int, outputs: int) -> dict[str, tuple[int, int]]:
     """Shape (out, in) of the weights of each layer, by its name.
 
     Raises:
         ValueError: the network's encoder and its columns do not fit.
     """
     hidden = network.hidden_width
-    rest = {"second": (hidden, hidden), "output": (num_actions, hidden)}
+    rest = {"second": (hidden, hidden), "output": (outputs, hidden)}
     columns = network.entities
     if (network.encoder == "entities") != (columns is not None):
         raise ValueError("network.entities: must be there for the encoder 'entities' alone")

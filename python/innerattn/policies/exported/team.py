@@ -26,6 +26,8 @@ from innerattn.policies.exported.readings import RowBuilder
 from innerattn.policies.exported.tensors import tensors_in
 from innerattn.policies.policy import PolicyInput
 
+_NOTHING = np.zeros(0, np.float32)
+
 
 class Exported:
     """An exported team; a `Policy`, too, so that it can be played and measured in worlds.
@@ -79,6 +81,7 @@ class Exported:
             raise ExportError(f"{found.path}: {error}") from error
         self._builders = [RowBuilder(self.contract, i, age) for i in range(len(self._numbers))]
         self._forces = np.array([action.force for action in self.contract.actions], np.float32)
+        self._continuous = self.contract.action_kind == "continuous"
         self._draws = np.random.default_rng(seed)
 
     @property
@@ -111,6 +114,10 @@ class Exported:
         else:
             row = builder.checked_row(readings)
         logits = self._actors[number].logits(row[None])
+        if self._continuous:
+            force = self._drawn(logits)[0]
+            length = np.sqrt((force * force).sum())
+            return Decision(None, _NOTHING, force / length if length > 1.0 else force, row)
         action = int(self._chosen(logits)[0])
         return Decision(action, probabilities_of(logits)[0], self._forces[action], row)
 
@@ -148,7 +155,7 @@ class Exported:
         )
 
     def act(self, view: PolicyInput) -> NDArray[Any]:
-        """Choose the actions of whole worlds; see `Policy.act`.
+        """Choose the actions of whole worlds, (E, R) or (E, R, 2); see `Policy.act`.
 
         Raises:
             ReadingError: the observations are not those of this team, or not finite.
@@ -162,10 +169,15 @@ class Exported:
             raise ReadingError("obs", "holds a number that is not finite")
         rows = np.ascontiguousarray(view.obs.transpose(1, 0, 2), np.float32)
         logits = [actor.logits(row) for actor, row in zip(self._actors, rows, strict=True)]
-        return self._chosen(np.stack(logits, axis=1))
+        stacked = np.stack(logits, axis=1)
+        return self._drawn(stacked) if self._continuous else self._chosen(stacked)
 
     def logits(self, robot: str, rows: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Logits (B, A) float32 of a robot's actions for observations (B, D) float32."""
+        """Logits (B, A) float32 of a robot's actions for observations (B, D) float32.
+
+        (B, 4) where actions are continuous: means x and y, then log standard deviations of both,
+        before tanh.
+        """
         return self._actors[self._number(robot)].logits(rows)
 
     def reset(self, seed: int) -> None:
@@ -177,6 +189,15 @@ class Exported:
         if self.greedy:
             return np.asarray(logits.argmax(axis=-1))
         return np.asarray((logits + self._draws.gumbel(size=logits.shape)).argmax(axis=-1))
+
+    def _drawn(self, policy: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The likeliest or drawn forces (..., 2) of means and log standard deviations (..., 4)."""
+        mean, log_std = policy[..., :2], policy[..., 2:]
+        if not self.greedy:
+            noise: NDArray[np.float32] = np.exp(log_std)
+            noise *= self._draws.standard_normal(mean.shape, np.float32)
+            mean = mean + noise
+        return np.tanh(mean)
 
     def _number(self, robot: str) -> int:
         try:
@@ -209,13 +230,13 @@ def _check_columns(contract: Contract) -> None:
 def _actors(found: ExportFolder, backend: Backend) -> list[Actor]:
     """The policy of each robot."""
     contract = found.contract
-    width, num_actions = len(contract.observation), len(contract.actions)
+    width = len(contract.observation)
     made: dict[str, Actor] = {}
     if backend == "onnxruntime":
         for name, file in contract.actors.items():
             mark = onnx_mark(contract.weights_sha256, contract.scenario_sha256, name)
             place = str(found.path / file)
-            made[name] = OnnxActor(found.files[file], place, width, num_actions, mark)
+            made[name] = OnnxActor(found.files[file], place, contract, mark)
     else:
         tensors = tensors_in(found.files[WEIGHTS])
         frame = _frame_of(contract)
@@ -225,7 +246,7 @@ def _actors(found: ExportFolder, backend: Backend) -> list[Actor]:
                 for key, value in tensors.items()
                 if key.startswith(f"{name}.")
             }
-            made[name] = NumpyActor(contract.network, own, width, num_actions, frame)
+            made[name] = NumpyActor(contract.network, own, width, contract.outputs, frame)
     return [made[robot.actor] for robot in contract.robots]
 
 
@@ -233,5 +254,7 @@ def _frame_of(contract: Contract) -> Frame | None:
     """The frame that the policies see in; None where they see the world as it is."""
     if contract.network.frame is None:
         return None
+    if contract.action_kind == "continuous":
+        return Frame(contract.network.frame, len(contract.observation), None)
     pushes = [(int(x), int(y)) for x, y in (action.force for action in contract.actions)]
     return Frame(contract.network.frame, len(contract.observation), pushes)
