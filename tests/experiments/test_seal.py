@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -154,6 +155,31 @@ def test_an_older_archive_is_read_with_a_warning_and_sealed(
     assert contents(path) == expected  # without a warning, which would be an error
     with pytest.raises(RunError, match="holds the digest of its contents already"):
         seal_archive(path)
+
+
+def test_an_archive_with_a_broken_text_is_refused(runs: list[FinishedRun], tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    write_archive(runs, path)
+    table = pq.read_table(path)
+    broken = pa.array([b"mixed\x9b"] * len(table), pa.binary()).view(pa.string())
+    place = table.column_names.index("situation")
+    pq.write_table(table.set_column(place, table.schema.field(place), broken), path)
+    with pytest.raises(RunError, match="does not fit its own digest"):
+        read_archive(path)
+
+
+def test_an_archive_with_other_columns_is_refused(runs: list[FinishedRun], tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    write_archive(runs, path)
+    table = pq.read_table(path)
+    seeds, place = table["seed"].cast(pa.int32()), table.column_names.index("seed")
+    for other, told in (
+        (table.set_column(place, "seed", seeds), "column 'seed' holds int32: must hold int64"),
+        (table.append_column("seed", table["seed"]), "two columns have the same name"),
+    ):
+        pq.write_table(other, path)
+        with pytest.raises(RunError, match=told):
+            read_archive(path)
 
 
 @pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.slow)])

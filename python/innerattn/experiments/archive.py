@@ -110,6 +110,27 @@ def _digest(table: pa.Table, head: dict[str, Any]) -> str:
     return digest.hexdigest()
 
 
+def _fits(table: pa.Table, head: dict[str, Any]) -> bool:
+    """Whether columns that were read have the digest that the file says; no text may be broken."""
+    try:
+        return bool(head[_SHA256] == _digest(table, head))
+    except UnicodeDecodeError:
+        return False
+
+
+def _refuse_other_columns(path: Path, table: pa.Table) -> None:
+    """Refuse names that are broken or there twice, and types that are not those of their names."""
+    try:
+        types = {field.name: field.type for field in table.schema}
+    except UnicodeDecodeError as error:
+        raise RunError(f"{path}: a column's name is broken") from error
+    if len(types) != table.num_columns:
+        raise RunError(f"{path}: two columns have the same name")
+    for name, found in types.items():
+        if found != _type(name):
+            raise RunError(f"{path}: column {name!r} holds {found}: must hold {_type(name)}")
+
+
 def read_archive(path: Path) -> list[FinishedRun]:
     """The runs that `write_archive` wrote, in their order, with ``archived`` set.
 
@@ -124,10 +145,11 @@ def read_archive(path: Path) -> list[FinishedRun]:
     """
     data = read_plain(path, MOST_FILE_BYTES)
     table, head = read_table(data, path, FORMAT, SCHEMA_VERSION)
+    _refuse_other_columns(path, table)
     if _SHA256 not in head:
         text = f"{path}: holds no digest; its runs are read unchecked"
         warnings.warn(text, UnsealedRunWarning, stacklevel=1)
-    elif head[_SHA256] != _digest(table, head):
+    elif not _fits(table, head):
         raise RunError(f"{path}: does not fit its own digest; it was altered")
     try:
         reward_names = tuple(head["reward_names"])

@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 
 from innerattn.config.untrusted import parse_json
 from innerattn.errors import RunError
+from innerattn.records.footer import sizes_of
 
 MOST_FILE_BYTES = 4 << 30
 _LEAST_LIMIT_BYTES = 64 << 20
@@ -40,7 +41,7 @@ def read_table(
     """
     try:
         with _opened(data) as file:
-            _refuse_large(file.metadata, len(data), path)
+            _refuse_large(file.metadata.num_rows, data, path)
             found = file.schema_arrow.metadata or {}
             head = parse_json(found[form.encode()])
             known = head["schema_version"]
@@ -80,7 +81,7 @@ def refuse_damaged(data: bytes, path: Path) -> None:
     """
     try:
         with _opened(data) as file:
-            _refuse_large(file.metadata, len(data), path)
+            _refuse_large(file.metadata.num_rows, data, path)
     except (OSError, pa.ArrowException) as error:
         raise RunError(f"{path}: not a whole Parquet file") from error
 
@@ -93,23 +94,21 @@ def _opened(data: bytes) -> pq.ParquetFile:
     )
 
 
-def _refuse_large(metadata: pq.FileMetaData, size: int, path: Path) -> None:
+def _refuse_large(rows: int, data: bytes, path: Path) -> None:
     """Refuse a table that would be much larger than its file, by what the file says of it."""
-    groups = metadata.num_row_groups
-    if metadata.num_columns > _MOST_COLUMNS or groups > _MOST_ROW_GROUPS:
+    try:
+        sizes = sizes_of(data)
+    except ValueError as error:
+        raise RunError(f"{path}: not a whole Parquet file ({error})") from error
+    columns, groups = sizes.columns // max(1, sizes.row_groups), sizes.row_groups
+    if columns > _MOST_COLUMNS or groups > _MOST_ROW_GROUPS:
         raise RunError(
-            f"{path}: has {metadata.num_columns} columns in {groups} row groups: must have at most "
+            f"{path}: has {columns} columns in {groups} row groups: must have at most "
             f"{_MOST_COLUMNS} in {_MOST_ROW_GROUPS}"
         )
-    unpacked = values = 0
-    for index in range(groups):
-        group = metadata.row_group(index)
-        for column in range(group.num_columns):
-            chunk = group.column(column)
-            unpacked += chunk.total_uncompressed_size
-            values += chunk.num_values
+    size = len(data)
     most = max(_LEAST_LIMIT_BYTES, _MOST_RATIO * size)
     # Repeated values take no room in a file; a number takes eight bytes in memory.
-    needed = max(unpacked, 8 * values, 8 * metadata.num_rows)
+    needed = max(sizes.unpacked_bytes, 8 * sizes.values, 8 * rows)
     if needed > most:
         raise RunError(f"{path}: {size} bytes unpack to {needed}: must be at most {most}")
