@@ -39,6 +39,10 @@ def test_what_each_target_needs() -> None:
     assert needs["fig5"] == (inner, SITUATIONS)
     assert needs["crossed"] == (td, ("single", "mixed"))
     assert needs["learning"] == (METHODS, ("mixed", "double", "single"))
+    assert needs["attention"] == (
+        ("ppo-inner", "ppo-uniform", "mappo", "ppo-frozen", "ppo-oracle"),
+        ("mixed", "mixed-8", "mixed-16"),
+    )
     assert needs["robustness"] == (METHODS, ("mixed",))
     assert {name for name, target in TARGETS.items() if target.steps} == {"fig4", "fig5", "all"}
     assert {name for name, one in TARGETS.items() if not one.archived} == {"fig4", "fig5"}

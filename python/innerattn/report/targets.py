@@ -12,9 +12,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+from innerattn.experiments.attention.arms import METHODS as ATTENTION_METHODS
+from innerattn.experiments.attention.arms import SITUATIONS as ATTENTION_SITUATIONS
 from innerattn.experiments.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
 from innerattn.experiments.crossed.arms import plan_crossed
-from innerattn.experiments.learning.variants import ENTITIES, WARM_START
+from innerattn.experiments.learning.variants import CONTINUOUS, ENTITIES, WARM_START
 from innerattn.experiments.learning.variants import SITUATIONS as LEARNING_SITUATIONS
 from innerattn.experiments.plan import METHODS, SITUATIONS, PlannedRun, plan
 from innerattn.experiments.robustness.design import plan_robustness
@@ -147,6 +149,12 @@ def _learning(name: str) -> Callable[[], Report]:
     return load
 
 
+def _attention() -> Report:
+    from innerattn.report.attention.write import FILES, write_attention
+
+    return Report(FILES, write_attention)
+
+
 def _robustness() -> Report:
     from innerattn.report.robustness.write import FILES, write_robustness
 
@@ -221,11 +229,28 @@ TARGETS: dict[str, Target] = {
             situations=LEARNING_SITUATIONS,
         ),
         Target(
+            name="learning-continuous",
+            shows="what PPO learns with continuous actions",
+            plan=CONTINUOUS.plan,
+            report=_learning("learning_continuous"),
+            methods=("ppo-inner",),
+            further=("ppo-uniform", "mappo"),
+            situations=LEARNING_SITUATIONS,
+        ),
+        Target(
             name="learning-warm-start",
             shows="what each method learns after it imitated hungarian",
             plan=WARM_START.plan,
             report=_learning("learning_warm_start"),
             situations=LEARNING_SITUATIONS,
+        ),
+        Target(
+            name="attention",
+            shows="what learnt attention is worth in teams of 4, 8 and 16",
+            plan=plan,
+            report=_attention,
+            methods=ATTENTION_METHODS,
+            situations=ATTENTION_SITUATIONS,
         ),
         Target(
             name="robustness",

@@ -133,7 +133,7 @@ kinds = st.sampled_from(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(kinds, st.dictionaries(fields, json_values), st.binary(max_size=60))
 def test_any_message_is_answered(kind: str, values: dict[str, Any], noise: bytes) -> None:
     sessions = SHARED

@@ -40,5 +40,7 @@ class Variant:
 
 ENTITIES = Variant("entities", {"network.encoder": "entities"})
 """Networks that encode teammates and victims one by one."""
+CONTINUOUS = Variant("continuous", {"scenario.actions": "continuous"})
+"""Robots that command forces in the plane instead of one of five actions."""
 WARM_START = Variant("from-hungarian", {"train.warm_start": "hungarian"})
 """Teams that imitate a script before they learn from rewards."""

@@ -59,7 +59,10 @@ def scores_table(found: Learning, budget: str) -> Table:
     first = f"{budget}, seed{'s' if len(seeds) > 1 else ''} {format_seeds(seeds)}"
     numbers = [f"rescues, {standard} steps", f"score, {standard} steps", f"score, {long} steps"]
     rows = [
-        [f"{one.trained}, {one.situation}", *map(_cell, (one.rescues, one.score, one.long_score))]
+        [
+            f"{one.trained}, {one.situation}",
+            *map(score_cell, (one.rescues, one.score, one.long_score)),
+        ]
         for one in found.learnt
     ]
     return plain_table(columns([first], numbers), rows)
@@ -91,7 +94,8 @@ def curve_lines(found: Learning) -> list[CurveLine]:
     ]
 
 
-def _cell(values: BySeed) -> str:
+def score_cell(values: BySeed) -> str:
+    """The mean over seeds with half its interval, and the value of each seed."""
     mean = values.mean
     if mean is None:
         return NONE

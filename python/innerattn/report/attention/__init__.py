@@ -1,0 +1,1 @@
+"""What learnt attention is worth, as a page with a figure."""
