@@ -14,7 +14,8 @@ from innerattn.cli.progress import (
     SeveralRuns,
     Training,
 )
-from innerattn.config import RunConfig
+from innerattn.config import RunConfig, load_run_config
+from innerattn.evaluate.training_score import ScriptedRescues, scripted_rescues
 from innerattn.experiments.side_by_side import Run
 from innerattn.train import Progress
 
@@ -59,6 +60,12 @@ def test_a_last_batch_may_pass_the_end() -> None:
     assert line.startswith("training 100% | 0:00 left | no episode yet")
 
 
+def test_rescues_stay_where_no_episode_ended_since() -> None:
+    steps = [progress(10.0, 400, 2.5), progress(20.0, 800, None)]
+    lines = shown(terminal=False, steps=steps).splitlines()
+    assert [line.split(" | ")[2] for line in lines] == ["2.50 rescues/episode"] * 2
+
+
 def test_terminal_shows_a_bar() -> None:
     text = shown(terminal=True, steps=[progress(90.0, 500)])
     assert "━" in text
@@ -72,8 +79,60 @@ def test_the_loss_is_shown_once_it_is_known() -> None:
         progress(10.0, 400), metrics={"rescues_per_episode": 1.5, "losses": {"critic_loss": 0.0123}}
     )
     (line,) = shown(terminal=False, steps=[known]).splitlines()
-    assert line.endswith("1.50 rescues/episode | 40 env-steps/s | 4.0 updates/s | loss 0.0123")
+    assert line.endswith("1.50 rescues/episode | 40 env-steps/s | loss 0.0123")
     assert "loss 0.0123" in shown(terminal=True, steps=[known])  # the whole line fits
+
+
+def test_the_score_is_between_scripts_which_are_played_once() -> None:
+    played = []
+
+    def scripts() -> ScriptedRescues:
+        played.append(True)
+        return ScriptedRescues(random=0.5, hungarian=2.5)
+
+    console = Console(file=(out := io.StringIO()), width=120)
+    seconds = iter([0.0, 10.0, 20.0, 30.0])
+    with Training(console, lambda: next(seconds), scripts) as show:
+        show(progress(10.0, 400, None))
+        assert not played  # there is nothing to score yet
+        show(progress(20.0, 800))
+        show(progress(30.0, 900, 2.5))
+    assert [line.split(" | ")[2] for line in out.getvalue().splitlines()] == [
+        "no episode yet",
+        "1.50 rescues/episode, score 0.50",
+        "2.50 rescues/episode, score 1.00",
+    ]
+    assert len(played) == 1
+
+
+def test_the_line_with_score_and_loss_fits_a_terminal() -> None:
+    metrics = {"rescues_per_episode": 13.75, "losses": {"critic_loss": 0.0123}}
+    console = Console(file=(out := io.StringIO()), force_terminal=True, width=80, color_system=None)
+    seconds = iter([0.0, 10.0])
+    known = replace(progress(10.0, 400), metrics=metrics, env_steps=400_000)
+    with Training(console, lambda: next(seconds), lambda: ScriptedRescues(0.0, 14.0)) as show:
+        show(known)
+    assert "13.75 rescues/episode, score 0.98 | 40,000 env-steps/s | loss 0.0123" in out.getvalue()
+
+
+def test_scripts_are_played_as_long_as_training_episodes() -> None:
+    config = load_run_config(overrides={"train.episode_steps": 50, "train.threads": 1})
+    longer = scripted_rescues(config)
+    shorter = scripted_rescues(RunConfig())
+    assert longer.random < 0.1 < 1.5 * shorter.hungarian < longer.hungarian
+
+
+def test_no_score_where_hungarian_is_no_better_than_random() -> None:
+    assert ScriptedRescues(0.0, 0.0).score(1.0) is None
+
+
+def test_quiet_training_plays_no_scripts() -> None:
+    def scripts() -> ScriptedRescues:
+        raise AssertionError("nobody reads the score")
+
+    seconds = iter([0.0, 10.0])
+    with Training(Console(quiet=True), lambda: next(seconds), scripts) as show:
+        show(progress(10.0, 400))
 
 
 def test_imitation_is_a_stage_of_its_own() -> None:

@@ -10,6 +10,7 @@ import pytest
 from innerattn.cli.main import main
 from innerattn.cli.runs import named_policy, named_run
 from innerattn.errors import RunError
+from innerattn.zoo import run_path
 
 
 @pytest.fixture
@@ -104,3 +105,12 @@ def test_commands_take_names(
         assert main([command, "mine"]) == 1
         err = capsys.readouterr().err
         assert err == "innerattn: error: mine: 2 runs in runs begin so: mine-s0, mine-s1\n"
+
+
+def test_teams_of_the_package_are_not_gone_on_with(capsys: pytest.CaptureFixture[str]) -> None:
+    before = sorted(run_path("zoo:mixed").rglob("*"))
+    assert main(["train", "--resume", "zoo:mixed"]) == 1
+    assert capsys.readouterr().err.splitlines() == [
+        "innerattn: error: zoo:mixed: a team of the package is done, nothing to go on from"
+    ]
+    assert sorted(run_path("zoo:mixed").rglob("*")) == before

@@ -3,6 +3,7 @@
 import json
 import random
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -42,13 +43,25 @@ def left_well(run: Path, sent: signal.Signals, code: int, err: str) -> None:
 
 
 def interrupt_at(seconds: float, sent: signal.Signals, run: Path, options: list[str]) -> float:
-    """Send a signal to a training some seconds after its start; how long it goes on then [s]."""
+    """Send a signal to a training some seconds after its start; how long it goes on then [s].
+
+    A training that is done before is begun anew and stopped sooner.
+    """
     with begin(run, options) as process:
         time.sleep(seconds)
+        if process.poll() is not None:
+            assert process.returncode == 0, process.communicate()[1]
+            shutil.rmtree(run)
+            return interrupt_at(0.8 * seconds, sent, run, options)
         start = time.perf_counter()
         process.send_signal(sent)
         _, err = process.communicate(timeout=120)
         took = time.perf_counter() - start
+    if process.returncode == -sent:  # the command was done, and Python was ending itself
+        assert (run / "replay.html").exists()
+        assert json.loads((run / "run.json").read_text())["state"] == "done"
+        assert "Traceback" not in err
+        return took
     left_well(run, sent, process.returncode, err)
     return took
 

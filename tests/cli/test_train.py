@@ -182,7 +182,12 @@ def test_help_shows_the_chosen_defaults(capsys: pytest.CaptureFixture[str]) -> N
         (["--device", "gpu"], 1, "train.device = 'gpu': not usable here, must be 'cpu'"),
         (["--run-dir", "."], 1, ".: exists already"),
         (["--td.batch-size", "9", "--td.replay-capacity", "8"], 2, "td.replay_capacity = 8: must"),
-        (["--scenario.actions", "continuous"], 1, "scenario.actions = 'continuous'"),
+        (
+            ["--scenario.actions", "continuous"],
+            2,
+            "scenario.actions = 'continuous': train.method = 'td-inner' learns 'discrete' actions "
+            "only; methods for continuous ones are ppo-inner, ppo-uniform",
+        ),
     ],
 )
 def test_what_cannot_be_run_is_one_line(
@@ -380,12 +385,19 @@ def test_interruption_keeps_the_weights(
     assert main(["train", "--resume", str(path), "--seed", "4"]) == 2
     assert "the run has its own configuration; leave out --seed" in capsys.readouterr().err
 
+    # As a kill leaves it: run.json is further than the newest checkpoint.
+    told = json.loads((path / "run.json").read_text())
+    told |= {"state": "running", "sealed": False, "env_steps": 12}
+    (path / "run.json").write_text(json.dumps(told))
+    (path / "manifest.json").unlink()
     assert main(["train", "--resume", str(path)]) == 0
-    assert f"Going on with {path} from env-step 8" in capsys.readouterr().out
+    assert f"Going on with {path} from env-step 8\n" in capsys.readouterr().out
     assert json.loads((path / "run.json").read_text())["state"] == "done"
     assert (path / "evaluation" / "summary.json").exists()
     assert main(["train", "--resume", str(path)]) == 1
-    assert f"{path}: is done" in capsys.readouterr().err
+    said = capsys.readouterr()
+    assert f"{path}: is done" in said.err
+    assert said.out == ""
 
 
 def test_a_run_that_was_stopped_in_its_evaluation_is_measured(

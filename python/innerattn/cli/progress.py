@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from types import TracebackType
 from typing import TYPE_CHECKING, ClassVar, Self
 
@@ -13,6 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 if TYPE_CHECKING:
     from innerattn.evaluate.robustness import Stage
+    from innerattn.evaluate.training_score import ScriptedRescues
     from innerattn.experiments.processes import Job
     from innerattn.train import Progress as TrainProgress
 
@@ -94,24 +96,47 @@ class Training(Work):
 
     title = "training"
 
+    def __init__(
+        self,
+        console: Console | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        scripts: Callable[[], ScriptedRescues] | None = None,
+    ) -> None:
+        """As `Work`; ``scripts`` is called once, when the first score is to be shown."""
+        super().__init__(console, clock)
+        self._scripts = cache(scripts) if scripts is not None else None
+        self._known: float | None = None
+
     def __call__(self, progress: TrainProgress) -> None:
         """Show how far this stage of training is."""
         if progress.stage != self.title:
             self.title = progress.stage
             self._start = self._clock() - progress.seconds
+            self._known = None
         seconds = max(progress.seconds, 1e-9)
         rescues = progress.metrics["rescues_per_episode"] if progress.metrics else None
+        if rescues is not None:  # none where no episode ended in the last interval
+            self._known = rescues
         parts = [
-            "no episode yet" if rescues is None else f"{rescues:.2f} rescues/episode",
+            "no episode yet" if self._known is None else self._rescues(self._known),
             f"{progress.env_steps / seconds:,.0f} env-steps/s",
-            _agreement(progress)
-            if progress.stage == "imitating"
-            else f"{progress.updates / seconds:,.1f} updates/s",
+            _agreement(progress) if progress.stage == "imitating" else _loss(progress, seconds),
         ]
-        losses = progress.metrics.get("losses", {}) if progress.metrics else {}
-        if "critic_loss" in losses:
-            parts.append(f"loss {losses['critic_loss']:.3g}")
         self.show(progress.env_steps, progress.total_env_steps, " | ".join(parts))
+
+    def _rescues(self, rescues: float) -> str:
+        score = None
+        if self._scripts is not None and not self._console.quiet:
+            score = self._scripts().score(rescues)
+        told = f"{rescues:.2f} rescues/episode"
+        return told if score is None else f"{told}, score {score:.2f}"
+
+
+def _loss(progress: TrainProgress, seconds: float) -> str:
+    losses = progress.metrics.get("losses", {}) if progress.metrics else {}
+    if "critic_loss" in losses:
+        return f"loss {losses['critic_loss']:.3g}"
+    return f"{progress.updates / seconds:,.1f} updates/s"
 
 
 def _agreement(progress: TrainProgress) -> str:

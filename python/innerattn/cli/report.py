@@ -11,6 +11,8 @@ import tyro
 from innerattn.cli.options import Command, UsageError, check_target
 from innerattn.cli.runs import named_run
 from innerattn.config.files import write_whole
+from innerattn.errors import RunError
+from innerattn.zoo import in_zoo
 
 
 @dataclass(kw_only=True)
@@ -40,6 +42,9 @@ class Report(Command):
             raise UsageError(f"-o {self.output}: must end in .html")
         check_target(self.output)
         folders = [named_run(run) for run in self.runs]
+        for run, folder in zip(self.runs, folders, strict=True):
+            if in_zoo(folder):
+                raise RunError(f"{run}: a team of the package has no metrics for a report")
         from innerattn.report.runs.page import read_robustness, read_runs, runs_page
 
         document = None if self.robustness is None else read_robustness(self.robustness)

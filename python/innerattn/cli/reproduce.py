@@ -159,7 +159,8 @@ class Reproduce(LongCommand):
             methods = _chosen("methods", self.methods, (*target.methods, *target.further))
         situations = target.situations
         if self.situations != "all":
-            situations = _chosen("situations", self.situations, SITUATIONS)
+            known = tuple(dict.fromkeys((*target.situations, *SITUATIONS)))
+            situations = _chosen("situations", self.situations, known)
         if not 1 <= self.seeds <= _MOST_SEEDS:
             raise UsageError(f"--seeds = {self.seeds}: must be 1 to {_MOST_SEEDS:,}")
         return target.plan(methods, situations, range(self.seeds), self.budget, out)

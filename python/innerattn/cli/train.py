@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, make_dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
@@ -23,7 +24,7 @@ from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
 from innerattn.config.registry import methods
 from innerattn.config.sections import WarmStart
 from innerattn.cores import usable_cores
-from innerattn.errors import ConfigError
+from innerattn.errors import ConfigError, RunError
 from innerattn.experiments.side_by_side import (
     Run,
     refuse_what_cannot_run,
@@ -38,6 +39,7 @@ from innerattn.report.tables.evaluation import (
     seeds_line,
 )
 from innerattn.signals import leave, requests_handled_by
+from innerattn.zoo import in_zoo
 
 if TYPE_CHECKING:
     Preset: TypeAlias = str
@@ -181,15 +183,19 @@ class _Train(_Sources):
         )
 
     def _resume(self, console: Console, run_dir: Path) -> int:
+        if in_zoo(run_dir):
+            raise RunError(f"{self.resume}: a team of the package is done, nothing to go on from")
         with requests_handled_by(leave):
             from innerattn.records.run_folder import read_config, read_info
-            from innerattn.train import resume
+            from innerattn.train import newest_checkpoint, resume
 
         config, info = read_config(run_dir), read_info(run_dir)
         measured = (run_dir / "evaluation" / "summary.json").exists()
         if info.state == "done" and not measured:
             return self._finish(console, config, run_dir, lambda _: None)
-        console.print(f"Going on with {run_dir} from env-step {info.env_steps:,}", soft_wrap=True)
+        newest = newest_checkpoint(run_dir)
+        if info.state != "done" and newest is not None:
+            console.print(f"Going on with {run_dir} from env-step {newest:,}", soft_wrap=True)
         return self._finish(
             console, config, run_dir, lambda report: resume(run_dir, progress=report)
         )
@@ -203,10 +209,12 @@ class _Train(_Sources):
     ) -> int:
         """Learn what is left, measure, and print."""
         from innerattn.evaluate import evaluate_run
+        from innerattn.evaluate.training_score import scripted_rescues
 
+        scripts = partial(scripted_rescues, config)
         with RunLoggers(self.log, Opened(run_dir, config), failed=say_not_logged) as loggers:
             try:
-                with Training(self.progress_console()) as progress:
+                with Training(self.progress_console(), scripts=scripts) as progress:
                     learn(_both(progress, loggers))
             except KeyboardInterrupt:
                 _say_what_is_kept([run_dir])

@@ -211,3 +211,9 @@ def test_a_team_of_one_is_refused(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", config_of_team(1))
     with pytest.raises(RunError, match="one robot"):
         bounds_of_run(run)
+
+
+def test_continuous_actions_are_refused(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", run_config("ppo-inner", **{"scenario.actions": "continuous"}))
+    with pytest.raises(RunError, match=r"scenario\.actions = 'continuous'"):
+        bounds_of_run(run)

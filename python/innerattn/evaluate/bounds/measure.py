@@ -137,13 +137,18 @@ def bounds_of_run(
         progress: called after each level.
 
     Raises:
-        RunError: there is no readable run at ``run``, its team is one robot, or its critic is of an
-            extension.
+        RunError: there is no readable run at ``run``, its team is one robot, its actions are
+            continuous, or its critic is of an extension.
         ConfigError: its configuration is not valid.
     """
     config, learner = load_policy(run)
     if config.scenario.num_robots < 2:
         raise RunError(f"{run}: its team is one robot; attention needs a teammate")
+    if config.scenario.actions == "continuous":
+        raise RunError(
+            f"{run}: scenario.actions = 'continuous': bounds count changes of the likeliest of "
+            "'discrete' actions"
+        )
     inner = learner.learner if isinstance(learner, FramedLearner) else learner
     if (
         config.network.attention not in _CHANGES
