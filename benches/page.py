@@ -35,6 +35,11 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def machine(*packages: str) -> str:
     """One line: processor, cores, Python and the versions of packages, and the date."""
+    return f"{system(*packages)}, {date.today()}"
+
+
+def system(*packages: str) -> str:
+    """One line: processor, cores, Python and the versions of packages."""
     processor = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -45,7 +50,7 @@ def machine(*packages: str) -> str:
     cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count()
     versions = ", ".join(f"{name} {version(name)}" for name in packages)
     python = platform.python_version()
-    return f"{processor}, {cores} cores, Python {python}, {versions}, {date.today()}"
+    return f"{processor}, {cores} cores, Python {python}, {versions}"
 
 
 def publish(part: str, text: str) -> None:

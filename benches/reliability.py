@@ -1,7 +1,8 @@
 """The scoreboard of reliability: runs the tests behind each row in full, and writes the table.
 
-`python benches/reliability.py` fills its place in `docs/reliability.md`; `make test` runs a short
-form of the same tests. `--rows "exact resume" "disk full"` runs some rows and prints them.
+`python benches/reliability.py` runs every row; `--rows "exact resume" "disk full"` some. Each
+result is kept in `docs/records/reliability.json` as soon as it is there, and the table of
+`docs/reliability.md` is made from that file. `make test` runs a short form of the same tests.
 """
 
 from __future__ import annotations
@@ -12,98 +13,119 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
 from pathlib import Path
-from statistics import median
 
-from page import machine
+from reliability_kept import FILE, PAGE, ROOT, Kept, Result, commit, keep, now, read
 from reliability_rows import ROWS, Row
 
 from innerattn.report.marks import fill
 from innerattn.report.table import columns, markdown, plain_table
 
-ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "reliability.md"
 FUZZ_SECONDS = "60"
-
-
-@dataclass(frozen=True)
-class Result:
-    """What a row's tests found: how many passed and failed, and what they measured, by name."""
-
-    passed: int
-    failed: int
-    seconds: float
-    measured: Mapping[str, list[float]] = field(default_factory=dict)
 
 
 def run_row(row: Row) -> Result:
     """Run all tests of a row, the slow ones too."""
-    start, passed, failed = time.perf_counter(), 0, 0
-    measured: dict[str, list[float]] = {}
     env = {**os.environ, "INNERATTN_SLOW": "1", "INNERATTN_FUZZ_SECONDS": FUZZ_SECONDS}
+    passed = failed = 0
+    measured: dict[str, list[float]] = {}
     if row.python:
-        with tempfile.TemporaryDirectory() as folder:
-            report = Path(folder) / "report.xml"
-            command = [sys.executable, "-m", "pytest", "-q", "-m", "slow or not slow"]
-            command += ["-o", "junit_family=xunit1"]  # the later form knows no properties of tests
-            subprocess.run([*command, f"--junit-xml={report}", *row.python], cwd=ROOT, env=env)
-            suite = ET.parse(report).getroot().find("testsuite")
-        assert suite is not None, "pytest wrote no report"
-        for one in suite.iter("property"):
-            measured.setdefault(one.attrib["name"], []).append(float(one.attrib["value"]))
-        count = {
-            key: int(suite.get(key, "0")) for key in ("tests", "failures", "errors", "skipped")
-        }
-        bad = count["failures"] + count["errors"] + count["skipped"]  # a skipped test is no proof
-        passed, failed = passed + count["tests"] - bad, failed + bad
+        passed, failed = _run_python(row.python, env, measured)
     if row.rust:
-        command = ["cargo", "test", "--quiet", "--locked", "--test", "worlds", "--", *row.rust]
-        done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True)
-        found = re.search(r"(\d+) passed; (\d+) failed", done.stdout)
-        ran = (int(found[1]), int(found[2])) if found else (0, 1)
+        ran = _run_rust(row.rust, env)
         passed, failed = passed + ran[0], failed + ran[1]
-    return Result(passed, failed, time.perf_counter() - start, measured)
+    return Result(passed, failed, measured)
 
 
-def line_of(row: Row, result: Result | None) -> list[str]:
-    """A line of the table; without a result it says that the row was not run in full."""
-    what = row.what + (f" Not tested: {row.missing}." if row.missing else "")
-    if result is None:
+def _run_python(
+    tests: Sequence[str], env: Mapping[str, str], measured: dict[str, list[float]]
+) -> tuple[int, int]:
+    """How many passed and failed; what they record goes into ``measured``."""
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.xml"
+        command = [sys.executable, "-m", "pytest", "-q", "-m", "slow or not slow"]
+        command += ["-o", "junit_family=xunit1"]  # the later form knows no properties of tests
+        subprocess.run([*command, f"--junit-xml={report}", *tests], cwd=ROOT, env=env)
+        suite = ET.parse(report).getroot().find("testsuite") if report.exists() else None
+    if suite is None:  # the process of the tests died
+        return 0, 1
+    for one in suite.iter("property"):
+        with suppress(ValueError):  # libraries add texts of their own
+            value = float(one.attrib["value"])
+            measured.setdefault(one.attrib["name"], []).append(value)
+    count = {key: int(suite.get(key, "0")) for key in ("tests", "failures", "errors", "skipped")}
+    bad = count["failures"] + count["errors"] + count["skipped"]  # a skipped test is no proof
+    return count["tests"] - bad, bad
+
+
+def _run_rust(tests: Sequence[str], env: Mapping[str, str]) -> tuple[int, int]:
+    """How many passed and failed; no test at all is a failure."""
+    command = ["cargo", "test", "--quiet", "--locked", "-p", "innerattn-env", "--test", "worlds"]
+    command += ["--", *tests]
+    done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True)
+    if done.returncode:
+        print(done.stdout, done.stderr, sep="\n", file=sys.stderr)
+    found = re.search(r"(\d+) passed; (\d+) failed", done.stdout)
+    if not found or not int(found[1]) + int(found[2]):
+        return 0, 1
+    return int(found[1]), int(found[2])
+
+
+def line_of(row: Row, every: Mapping[str, Kept]) -> list[str]:
+    """A line of the table, of what was kept; a result of other tests does not count."""
+    needed = {row.name: row.tests} if row.tests else {}
+    if row.long:
+        needed[row.long] = (row.long,)
+    there = {name: tests for name, tests in needed.items() if name in every}
+    kept = [every[name] for name, tests in there.items() if every[name].tests == tests]
+    missing = [row.missing] if row.missing else []
+    if row.long and row.long not in there:
+        missing.append(f"`{row.long}`")
+    notes = [note for one in kept for note in one.result.notes]
+    what = " ".join([row.what, *notes, *(f"Not tested: {one}." for one in missing)])
+    if not needed:
+        return [row.name, what, "not tested", "", ""]
+    if not kept or (row.tests and kept[0].tests != row.tests):
         return [row.name, what, "not run in full", "", ""]
-    for name, values in sorted(result.measured.items()):
-        what += f" Median of {len(values)} {name}: {median(values):.2f}, longest {max(values):.2f}."
-    holds = "yes" if result.passed and not result.failed and not row.missing else "**no**"
-    tests = f"{result.passed}" + (f", {result.failed} failed" if result.failed else "")
-    return [row.name, what, holds, tests, f"{result.seconds:,.0f} s"]
+    passed = sum(one.result.passed for one in kept)
+    failed = sum(one.result.failed for one in kept)
+    holds = "**no**" if failed or not passed else "in part" if missing else "yes"
+    tests = f"{passed}" + (f", {failed} failed" if failed else "")
+    when = "; ".join(dict.fromkeys(f"{one.date}, {one.commit}" for one in kept))
+    return [row.name, what, holds, tests, when]
+
+
+def publish(file: Path, page: Path) -> None:
+    """Make the table of the page from what was kept."""
+    every = read(file)
+    lines = [line_of(row, every) for row in ROWS]
+    heads = columns(["row", "what holds", "holds?"], ["tests", "found"])
+    text = markdown(plain_table(heads, lines))
+    machines = sorted({one.machine for one in every.values()})
+    fill(page, "scoreboard", "\n\n".join([*(f"{one}." for one in machines), text]))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the rows, print each, and fill the page where all ran."""
+    """Run the rows; keep each result and renew the page as soon as it is there."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rows", nargs="+", choices=[row.name for row in ROWS], default=None)
-    parser.add_argument("--list", action="store_true", help="fill the page and run nothing")
+    parser.add_argument("--list", action="store_true", help="renew the page and run nothing")
     options = parser.parse_args(arguments)
-    if options.list:
-        _publish([line_of(row, None) for row in ROWS])
-        return 0
-    chosen, lines = options.rows, []
+    holds = True
     for row in ROWS:
-        if chosen is None or row.name in chosen:
-            lines.append(line_of(row, run_row(row)))
-            print(" | ".join(lines[-1]), flush=True)
-    if chosen is None:
-        _publish(lines)
-    return int(any("no" in line[2] for line in lines))
-
-
-def _publish(lines: list[list[str]]) -> None:
-    heads = columns(["row", "what holds", "holds?"], ["tests", "time"])
-    about = f"{machine('numpy', 'torch')}.\n\n" if any(line[3] for line in lines) else ""
-    fill(PAGE, "scoreboard", about + markdown(plain_table(heads, lines)))
+        if options.list or not row.tests or row.name not in (options.rows or [row.name]):
+            continue
+        before = commit()
+        keep(FILE, row.name, now(run_row(row), row.tests, before))
+        publish(FILE, PAGE)
+        line = line_of(row, read(FILE))
+        print(" | ".join(line), flush=True)
+        holds = holds and line[2] != "**no**"
+    publish(FILE, PAGE)
+    return int(not holds)
 
 
 if __name__ == "__main__":

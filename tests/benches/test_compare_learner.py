@@ -103,7 +103,7 @@ def test_without_the_public_code_the_page_says_so() -> None:
 
 def test_the_page_says_how_to_get_the_public_code() -> None:
     page = Path(compare_learner.__file__).parents[1] / "docs" / "performance.md"
-    assert f"```\n{maac_checkout.GET_IT}\n```" in page.read_text("utf-8")
+    assert f"```sh\n{maac_checkout.GET_IT}\n```" in page.read_text("utf-8")
 
 
 def test_the_pinned_commit_is_taken_and_named(pinned: Path) -> None:

@@ -2,13 +2,13 @@
 
 import sys
 import threading
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from soak import soak_worlds, soaked, state
+from reliability_kept import read
+from soak import Soaked, Watched, main, result_of, soak_worlds, state
 
 from innerattn.envs import BatchEnv
 
@@ -16,17 +16,24 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 
 def test_memory_threads_and_files_that_stay_are_told(tmp_path: Path) -> None:
-    warm = state()
-    less = replace(warm, resident_bytes=warm.resident_bytes // 2)
-    go_on = threading.Event()
+    watched, go_on = Watched(), threading.Event()
     waiting = threading.Thread(target=go_on.wait)
+    for share in (0.0, 0.1, 0.5):
+        watched.look(share)
     with (tmp_path / "file").open("w"):
         waiting.start()
-        found = soaked("x", 1, time.perf_counter(), less, ("a problem",))
+        held = np.ones(state().resident_bytes, np.uint8)
+        watched.look(0.95)
     go_on.set()
     waiting.join()
+    found = watched.soaked("x", 1, ["a problem"])
+    assert held.all()
     problem, memory, threads, files = found.problems
     assert problem == "a problem"
+    (first, *_), told = result_of([found]).notes, result_of([replace(found, problems=())])
+    assert first == f"X: 1 env-steps, memory {found.growth:+.2%}."
+    assert (told.passed, told.failed, len(told.notes)) == (1, 0, 1)
+    assert (result_of([found, found]).failed, len(result_of([found]).notes)) == (2, 5)
     assert memory.startswith("memory grew by ")
     assert threads == "1 threads more than after the warm-up"
     assert files == "1 open files more than after the warm-up"
@@ -40,8 +47,33 @@ def test_worlds_leave_nothing_behind(engine: str) -> None:
     assert not [one for one in found.problems if not one.startswith("memory")]
 
 
+def test_what_is_borrowed_and_given_back_is_no_growth(tmp_path: Path) -> None:
+    watched = Watched()
+    watched.look(0.1)
+    with (tmp_path / "file").open("w"):
+        watched.look(0.9)
+    watched._looked -= 1.0  # a second ago
+    watched.look(1.0)
+    assert "1 open files more than after the warm-up" not in watched.soaked("x", 1).problems
+
+
 def test_what_is_wrong_in_a_world_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     positions = BatchEnv.positions
     monkeypatch.setattr(BatchEnv, "positions", lambda env: positions(env) + np.float32(3.0))
     found = soak_worlds("discs", 100 * 1024)
     assert "step 0: a robot is outside the arena" in found.problems
+
+
+def test_only_work_in_full_is_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    file = tmp_path / "kept.json"
+    some = Soaked("x", 1, 1.0, state(), state(), 0.0, ())
+    monkeypatch.setattr("soak.FILE", file)
+    monkeypatch.setattr("soak.publish", lambda *_: None)
+    monkeypatch.setattr("soak.soak_worlds", lambda *_: some)
+    monkeypatch.setattr("soak.soak_training", lambda *_: some)
+    monkeypatch.setattr("sys.argv", ["soak.py", "--minutes", "59"])
+    assert main() == 0
+    assert not file.exists()
+    monkeypatch.setattr("sys.argv", ["soak.py"])
+    assert main() == 0
+    assert read(file)["make soak"].result.passed == 3
