@@ -13,7 +13,7 @@ export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train robot test test-pool test-asan test-slow examples reliability soak lint format bench lock docs schemas dist smoke setup clean
+.PHONY: train robot test test-pool test-asan test-slow examples reliability soak lint format bench lock docs site schemas dist smoke setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -30,11 +30,18 @@ test: setup lint ## every check but the long one
 test-pool: ## the pool of threads under every order of events that the memory model allows
 	RUSTFLAGS='--cfg loom' cargo test --quiet --locked --target-dir target/loom -p innerattn-pool
 
-test-asan: ## the pool and the parsing of snapshots under the address sanitizer; needs x86-64 Linux, builds all worlds anew
-	RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Zsanitizer=address cargo test --quiet --locked --target-dir target/asan \
-	--target x86_64-unknown-linux-gnu -p innerattn-pool
-	RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Zsanitizer=address cargo test --quiet --locked --target-dir target/asan \
-	--target x86_64-unknown-linux-gnu -p innerattn-env --test worlds -- snapshot fuzz
+ASAN := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address --cfg asan'
+ASAN_TARGET := --target-dir target/asan --target x86_64-unknown-linux-gnu
+ASAN_PYTHON := PYTHONPATH=target/asan/python LD_PRELOAD=$$(gcc -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0
+
+test-asan: setup ## the pool, snapshots, fuzzed inputs and arrays lent to Python under the address sanitizer; needs x86-64 Linux and gcc, builds all worlds anew
+	$(ASAN) cargo test --quiet --locked $(ASAN_TARGET) -p innerattn-pool
+	$(ASAN) cargo test --quiet --locked $(ASAN_TARGET) -p innerattn-env --test worlds -- snapshot fuzz
+	$(ASAN) cargo build --quiet --locked $(ASAN_TARGET) -p innerattn-py --features pyo3/extension-module
+	rm -rf target/asan/python && mkdir -p target/asan/python && cp -r python/innerattn target/asan/python
+	cp target/asan/x86_64-unknown-linux-gnu/debug/lib_core.so target/asan/python/innerattn/_core.abi3.so
+	$(ASAN_PYTHON) python tests/support/past_the_end.py 2>&1 | grep -q heap-buffer-overflow # it must notice this
+	$(ASAN_PYTHON) python -m pytest -q tests/envs/test_array_zoo.py tests/envs/test_copies.py tests/envs/test_batch_snapshots.py
 
 test-slow: setup test-pool ## the long checks: ten million env-steps of contacts, compilers at their slowest
 	INNERATTN_SLOW=1 cargo test --quiet --test worlds containment
@@ -102,6 +109,10 @@ lock: $(VENV)/.installed ## renew constraints.txt: the newest versions that pypr
 docs: setup ## draw the pictures of the documentation
 	python docs/pictures.py
 
+site: setup ## the documentation as a site, in build/site; it needs no network to read
+	sphinx-build --quiet --fail-on-warning --keep-going -c docs -d build/doctrees . build/site
+	@echo "build/site/index.html"
+
 schemas: setup ## write the JSON Schemas of the scenario's file and of the run's file
 	python -m innerattn.config.schema
 
@@ -119,4 +130,4 @@ smoke: dist ## try wheel and source archive in fresh environments of all PYTHONS
 	tests/smoke.sh $(PYTHON) dist/*.tar.gz
 
 clean: ## remove everything that was built
-	rm -rf $(VENV) target dist python/innerattn/_core*.so examples/libraries/.venvs
+	rm -rf $(VENV) build target dist python/innerattn/_core*.so examples/libraries/.venvs

@@ -1,6 +1,7 @@
-"""Draws the moving picture of the README; `make docs`, or `python docs/pictures.py RUN` for a run.
+"""Draws the pictures of the first page and of docs/concepts.md: `make docs`.
 
-A run with attention is drawn with arrows. Without arguments the script `hungarian` drives the team.
+`python docs/pictures.py RUN` draws the first page's moving picture for a run, with attention as
+arrows. Without arguments the script `hungarian` drives the team, and all pictures are drawn.
 """
 
 from __future__ import annotations
@@ -8,10 +9,138 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from innerattn.cli.main import main
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-PICTURE = Path(__file__).parent / "images" / "rescue.gif"
+from innerattn.cli.main import main
+from innerattn.config import Robot, Scenario, Task
+from innerattn.envs import BatchEnv
+from innerattn.envs.render import paint_figure
+
+IMAGES = Path(__file__).parent / "images"
+RIGHT, LEFT = 1, 2  # actions
 SCRIPT = ("hungarian", "--seed", "99")
+INK, GREY, BLUE, ORANGE = "#1f2933", "#7b8794", "#2b6cb0", "#c05621"
+
+
+def figure_of(width: float, height: float) -> tuple[Figure, Axes]:
+    """A figure with one plain plot [inches]."""
+    figure = Figure(figsize=(width, height), layout="constrained", dpi=110)
+    axes = figure.add_subplot()
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def world() -> Figure:
+    """A world of the preset `double` after one step, as a window would show it."""
+    figure = Figure(figsize=(8.0, 6.0), dpi=80)
+    with BatchEnv("double", 1, seed=6) as env:
+        env.reset()
+        state = (env.positions(), env.velocities(), env.victims(), env.obstacles())
+        paint_figure(figure, env.scenario, *(part[0] for part in state))
+    return figure
+
+
+def contacts() -> Figure:
+    """Two robots drive head-on into each other: the distance of their centres over time."""
+    figure, axes = figure_of(6.0, 2.6)
+    for engine, colour in (("rapier", BLUE), ("discs", ORANGE)):
+        times, distances = head_on(engine)
+        axes.plot(times, distances, "o-", ms=3, lw=1, color=colour, label=f'engine = "{engine}"')
+    axes.axhline(0.1, color=GREY, lw=1, ls=":")
+    axes.text(0.0, 0.115, "twice the radius", color=GREY, fontsize=8)
+    axes.set(xlabel="time [s]", ylabel="distance of centres [m]", ylim=(0.0, 0.85))
+    axes.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def head_on(engine: str) -> tuple[list[float], list[float]]:
+    """Times [s] and distances [m] of two equal robots that push towards each other."""
+    pair = tuple(
+        Robot(name=name, kind="a", abilities=("a",), max_speed_mps=1.0, mass_kg=1.0)
+        for name in ("left", "right")
+    )
+    scenario = Scenario(
+        situation="single", robots=pair, tasks=(Task(name="t", needs=("a",)),), engine=engine
+    )
+    times, distances = [0.0], [0.8]
+    with BatchEnv(scenario, 1, seed=0) as env:
+        env.reset()
+        env.set_motion([[[-0.4, 0.0], [0.4, 0.0]]], [[[0.0, 0.0], [0.0, 0.0]]])
+        towards = [[RIGHT, LEFT]]
+        for step in range(1, 13):
+            env.step(np.array(towards))
+            here = env.positions()[0]
+            times.append(step * scenario.dt_s)
+            distances.append(float(np.hypot(*(here[1] - here[0]))))
+    return times, distances
+
+
+def critic() -> Figure:
+    """What goes into the attention critic, and what comes out."""
+    figure, axes = figure_of(7.2, 3.2)
+    axes.axis("off")
+    axes.set(xlim=(0, 10), ylim=(0, 4.4))
+    for y, teammate, weight in (
+        (3.6, "teammate 1", 0.7),
+        (2.3, "teammate 2", 0.2),
+        (1.0, "teammate 3", 0.1),
+    ):
+        box(axes, 0.1, y, 2.2, f"{teammate}:\nobservation, action", GREY)
+        axes.annotate(
+            "",
+            (5.2, 2.6),
+            (2.35, y),
+            arrowprops={"arrowstyle": "-|>", "lw": 6 * weight + 0.6, "color": BLUE},
+        )
+        axes.text(2.6, y + (0.22 if y > 2 else -0.35), f"weight {weight}", color=BLUE, fontsize=8)
+    box(axes, 5.25, 2.6, 1.7, "weighted sum\nof values", BLUE)
+    box(axes, 5.25, 0.6, 1.7, "the robot's own\nobservation", GREY)
+    box(axes, 8.0, 2.6, 1.9, "Q of each of its\nown actions", ORANGE)
+    for start, end in (((6.98, 2.6), (7.98, 2.6)), ((6.98, 0.7), (8.2, 2.15))):
+        axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": INK})
+    axes.annotate(
+        "query",
+        (5.6, 2.15),
+        (5.6, 1.1),
+        arrowprops={"arrowstyle": "-|>", "color": BLUE},
+        color=BLUE,
+        fontsize=8,
+    )
+    return figure
+
+
+def box(axes: Axes, x: float, y: float, width: float, text: str, colour: str) -> None:
+    """A framed text whose left side is in the middle of its height at (x, y)."""
+    shape = {"boxstyle": "round,pad=0.35", "fc": "white", "ec": colour}
+    axes.text(x + width / 2, y, text, ha="center", va="center", fontsize=8.5, color=INK, bbox=shape)
+
+
+def score() -> Figure:
+    """The scale of scores."""
+    figure, axes = figure_of(6.4, 1.5)
+    axes.spines[["left", "bottom"]].set_visible(False)
+    axes.set(xlim=(-0.08, 1.15), ylim=(-0.9, 1.0), yticks=[], xticks=[])
+    axes.plot([0, 1.1], [0, 0], color=GREY, lw=1.2)
+    for at, name, up in ((0.0, "random\n0", True), (1.0, "hungarian\n1", True)):
+        axes.plot(at, 0, "|", ms=14, color=INK)
+        axes.text(at, 0.25 if up else -0.3, name, ha="center", va="bottom", fontsize=9, color=INK)
+    axes.annotate(
+        "a team:  (its rescues − random's) / (hungarian's − random's)",
+        (0.93, 0.0),
+        (0.45, -0.75),
+        ha="center",
+        fontsize=9,
+        color=BLUE,
+        arrowprops={"arrowstyle": "-|>", "color": BLUE},
+    )
+    return figure
+
 
 if __name__ == "__main__":
-    sys.exit(main(["replay", *(sys.argv[1:] or SCRIPT), "-o", str(PICTURE)]))
+    code = main(["replay", *(sys.argv[1:] or SCRIPT), "-o", str(IMAGES / "rescue.gif")])
+    if not sys.argv[1:]:
+        for draw in (world, contacts, critic, score):
+            draw().savefig(IMAGES / f"concept_{draw.__name__}.png")
+    sys.exit(code)

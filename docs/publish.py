@@ -22,6 +22,7 @@ from innerattn.errors import InnerattnError, RunError
 from innerattn.experiments.archive import FILE, read_archive, write_archive
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import read_run
+from innerattn.report.attention import page as attention
 from innerattn.report.learning.page import ATTENTION, SCORES
 from innerattn.report.marks import fill, marked
 from innerattn.report.robustness import page as robustness
@@ -39,12 +40,18 @@ TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
     (target, budget): (DOCS / "learning.md", ({part: (SCORES, ATTENTION)},))
     for target, budget, part in (
         ("learning", "fast", "learning_fast"),
+        ("learning", "strong", "learning_strong"),
         ("learning", "quick", "learning_quick"),
         ("learning", "short", "learning_short"),
         ("learning-entities", "short", "learning_short_entities"),
+        ("learning-continuous", "fast", "learning_fast_continuous"),
         ("learning-warm-start", "quick", "warm_start_quick"),
     )
 } | {
+    ("attention", "fast"): (
+        DOCS / "attention.md",
+        ({"attention_fast": (attention.COMPARISONS, attention.SCORES)},),
+    ),
     ("robustness", "short"): (
         DOCS / "robustness.md",
         (
@@ -58,7 +65,7 @@ TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
             },
             {"recovery_double": (f"{robustness.RECOVERY}: double",)},
         ),
-    )
+    ),
 }
 """By target and budget the page, and groups of its parts.
 

@@ -1,0 +1,99 @@
+"""Settings of Sphinx for the site: `make site` builds it into `build/site`.
+
+Sphinx reads the Markdown pages where they lie: those at the root of the project and those in
+`docs/`. The tables of `docs/README.md` are the navigation: a page that is in none of them is an
+error. Pages need no network when they are read.
+"""
+
+import re
+import sys
+from importlib import import_module
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+from pygments.lexers.special import TextLexer
+from sphinx.application import Sphinx
+
+DOCS = Path(__file__).parent
+ROOT = DOCS.parent
+sys.path.insert(0, str(DOCS))
+
+project = "innerattn"
+author = "the innerattn developers"
+project_copyright = "the innerattn developers, MIT licence"
+version = release = version_of("innerattn")
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "reference_directives",
+]
+root_doc = "README"
+include_patterns = ["*.md", "docs/*.md", "docs/**/*.md"]
+exclude_patterns = [".venv", "target", "build", "runs", "studies", "**/__pycache__"]
+show_warning_types = True
+
+myst_heading_anchors = 4
+highlight_language = "none"
+
+default_role = "literal"
+smartquotes = False
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+
+html_theme = "furo"
+html_title = f"innerattn {version}"
+html_show_search_summary = False  # it fetches pages, which browsers refuse for files
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {"navigation_with_keys": True, "source_view_link": ""}
+html_static_path = ["site.css"]
+html_css_files = ["site.css"]
+
+
+def navigation(text: str) -> str:
+    """Hidden lists of pages, one for each headed table of `docs/README.md`."""
+    lists = ["```{toctree}\n:hidden:\n\n/docs/README\n```"]
+    for heading, part in re.findall(r"(?ms)^\*\*(.+?)\*\*(.*?)(?=^\*\*|\Z)", text):
+        pages = [
+            (DOCS / link).resolve().relative_to(ROOT).with_suffix("").as_posix()
+            for link in re.findall(r"(?m)\]\(([^)#]+\.md)\)", part)
+        ]
+        lines = [":hidden:", f":caption: {heading}", "", *(f"/{page}" for page in pages)]
+        lists.append("\n".join(["```{toctree}", *lines, "```"]))
+    return "\n\n".join(lists)
+
+
+def add_navigation(_: Sphinx, name: str, source: list[str]) -> None:
+    """Put the navigation at the end of the first page."""
+    if name.startswith("docs/tables/"):  # parts of pages that link to them
+        source[0] = "---\norphan: true\n---\n" + source[0]
+    if name == root_doc:
+        source[0] += "\n\n" + navigation((DOCS / "README.md").read_text("utf-8"))
+
+
+def write_start(app: Sphinx, failure: Exception | None) -> None:
+    """The page that a browser opens first leads to the first page."""
+    if failure is None and app.builder.format == "html":
+        to = f"{root_doc}.html"
+        text = '<!doctype html><meta charset="utf-8"><title>innerattn</title>\n'
+        text += f'<meta http-equiv="refresh" content="0; url={to}"><a href="{to}">innerattn</a>\n'
+        (Path(app.outdir) / "index.html").write_text(text, "utf-8")
+
+
+def load_lazy_names(_: Sphinx, __: str, source: list[str]) -> None:
+    """Names that are imported when they are asked for are there before autodoc looks."""
+    for module in map(import_module, re.findall(r"automodule:: (\S+)", source[0])):
+        for one in getattr(module, "__all__", ()):
+            setattr(module, one, getattr(module, one))
+
+
+def setup(app: Sphinx) -> None:
+    """Connect the functions above."""
+    app.connect("source-read", load_lazy_names)
+    app.add_lexer("mermaid", TextLexer)
+    app.connect("source-read", add_navigation)
+    app.connect("build-finished", write_start)

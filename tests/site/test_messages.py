@@ -1,0 +1,166 @@
+"""Every message that the page explains is one that the program gives, word for word."""
+
+import re
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from made_export import made_export
+
+from innerattn.cli.main import main
+from innerattn.errors import InnerattnError, UnsealedRunWarning
+from innerattn.policies import Exported
+
+PAGE = (Path(__file__).parents[2] / "docs" / "faq.md").read_text("utf-8")
+QUOTED = re.findall(r"(?m)^\*\*`(.+?)`\*\* —", PAGE)
+
+
+def scenario(text: str) -> list[str]:
+    Path("mine.toml").write_text(text)
+    return ["info", "--scenario", "mine.toml"]
+
+
+def two_runs() -> list[str]:
+    for name in ("mixed-a", "mixed-b"):
+        folder = Path("runs") / name
+        folder.mkdir(parents=True)
+        (folder / "run.json").write_text("{}")
+    return ["evaluate", "mixed"]
+
+
+TEAM = """
+[[robots]]
+name = "a"
+kind = "a"
+abilities = ["water"]
+max_speed_mps = 1.0
+mass_kg = 1.0
+"""
+ALTERED = "is not the file that manifest.json names; it was altered"
+CALLS: dict[str, Callable[[], list[str]]] = {
+    "--sede: unknown option, did you mean --seed?": lambda: ["train", "--sede", "1"],
+    "trian: unknown command, did you mean train?": lambda: ["trian"],
+    "td.gamma = 2.0: must be less than or equal to 1": lambda: ["train", "--td.gamma", "2"],
+    "train.device = 'gpu': not usable here": lambda: ["train", "--device", "gpu"],
+    "exists already; choose another run folder or remove it": lambda: [
+        *("train", "--run-dir", "."),
+    ],
+    "scenario.situaton: unknown key, did you mean situation?": lambda: scenario(
+        'situaton = "double"\n'
+    ),
+    "task 'x' needs 'water', which no robot of the team can do": lambda: scenario(
+        '[[tasks]]\nname = "x"\nneeds = ["water"]\n'
+    ),
+    "scenario.tasks[0].needs = water + water: the team has no distinct able robot for each need": (
+        lambda: scenario(TEAM + '[[tasks]]\nname = "x"\nneeds = ["water", "water"]\n')
+    ),
+    "cannot read mine.toml: No such file or directory": lambda: [
+        *("evaluate", "hungarian", "--scenario", "mine.toml"),
+    ],
+    "train.method = 'td-inner' learns 'discrete' actions only": lambda: [
+        *("train", "--method", "td-inner", "--scenario.actions", "continuous"),
+    ],
+    "neither a run's folder nor one of random, greedy, hungarian": lambda: ["evaluate", "none"],
+    "latest: no run is in runs yet": lambda: ["evaluate", "latest"],
+    "2 runs in runs begin so": two_runs,
+    "a team of the package is done, nothing to go on from": lambda: [
+        *("train", "--resume", "zoo:mixed"),
+    ],
+    "a team of the package has no metrics for a report": lambda: ["report", "zoo:mixed"],
+    "-o FOLDER must say where to write": lambda: ["export", "zoo:mixed"],
+}
+
+
+@pytest.mark.parametrize("message", CALLS)
+def test_commands(
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert message in QUOTED
+    with suppress(SystemExit):  # wrong words
+        assert main(CALLS[message]()) in (1, 2)
+    err = capsys.readouterr().err
+    assert message in err
+    assert len(err.splitlines()) == 1
+
+
+def test_a_changed_file_of_a_run(run_dir: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    shutil.copytree(run_dir, run)
+    weights = next(run.rglob("weights.safetensors"))
+    weights.write_bytes(weights.read_bytes()[:-1] + b"\x01")
+    with pytest.raises(InnerattnError) as caught:
+        load(run)
+    assert one_of_the_page(str(caught.value)) == ALTERED
+
+
+def test_a_run_without_a_manifest(run_dir: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    shutil.copytree(run_dir, run)
+    (run / "manifest.json").unlink()
+    info = run / "run.json"
+    info.write_text(info.read_text().replace('"sealed": true', '"sealed": false'))
+    with pytest.warns(UnsealedRunWarning) as warned:
+        load(run)
+    assert one_of_the_page(str(warned[0].message)) == "has no manifest.json"
+
+
+@pytest.mark.filterwarnings("ignore::innerattn.errors.UnsealedRunWarning")
+def test_readings_and_files_of_robots(tmp_path: Path) -> None:
+    for seed, name in enumerate("ab"):
+        made_export(tmp_path / name, "td-inner", **{"train.seed": seed})
+    one, other = tmp_path / "a" / "export", tmp_path / "b" / "export"
+    body = {"position": (0.0, 0.0), "velocity": (0.0, 0.0)}
+    bad = {"position": (float("nan"), 0.0), "velocity": (0.0, 0.0)}
+    team = Exported(one, backend="numpy")
+    names = team.robot_names[1:]
+    readings = {"own": body, "teammates": dict.fromkeys(names, body), "victims": []}
+    readings["teammates"] = {**readings["teammates"], "food_1": bad}  # type: ignore[dict-item]
+    with pytest.raises(InnerattnError) as caught:
+        team.decide("food_0", readings)
+    assert one_of_the_page(str(caught.value)).startswith("teammates.food_1.position")
+    shutil.copy(other / "weights.safetensors", one / "weights.safetensors")
+    with pytest.raises(InnerattnError) as caught:
+        Exported(one, backend="numpy")
+    assert one_of_the_page(str(caught.value)) == "is of another team"
+
+
+def test_a_training_too_short_to_learn(
+    tmp_path: Path, tiny: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = ["--td.warmup-env-steps", "1000000", "--run-dir", str(tmp_path / "few")]
+    assert main(["train", *tiny, *few]) == 0
+    assert "too few for one update; nothing was learnt from rewards" in QUOTED
+    assert "too few for one update; nothing was learnt from rewards" in capsys.readouterr().err
+
+
+def test_every_message_of_the_page_was_tried() -> None:
+    elsewhere = {
+        ALTERED,
+        "has no manifest.json",
+        "teammates.food_1.position",
+        "is of another team",
+        "too few for one update; nothing was learnt from rewards",
+        "training diverged",  # tests/train/test_divergence.py
+    }
+    assert set(QUOTED) == set(CALLS) | elsewhere
+    assert len(QUOTED) == len(set(QUOTED))
+
+
+def load(run: Path) -> None:
+    """What a run's policy is loaded with."""
+    from innerattn.train import load_policy
+
+    load_policy(run)
+
+
+def one_of_the_page(message: str) -> str:
+    """The message of the page that is part of this one."""
+    found = [one for one in QUOTED if one in message]
+    assert len(found) == 1, message
+    return found[0]
