@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 sys.path.insert(0, str(Path(__file__).parent / "support"))
 
@@ -18,6 +19,10 @@ from innerattn.experiments.crossed.arms import plan_crossed
 from innerattn.experiments.plan import plan
 from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.experiments.side_by_side import Run
+
+# A slow machine fails no property.
+settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session")

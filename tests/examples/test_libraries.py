@@ -5,10 +5,12 @@
 
 import ast
 import json
+import os
 import re
 import subprocess
 import sys
 from argparse import Namespace
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -144,6 +146,7 @@ def test_the_table_of_baselines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(baselines, "PAGE", tmp_path / "docs.md")
     monkeypatch.setattr(baselines, "KNOWN", tmp_path / "runs" / "known.jsonl")
+    monkeypatch.setattr(baselines, "script", lambda *_: 0.875)
     assert baselines.known() == {}
     rows = {
         ("torchrl-mappo", "mixed", seed, 100): {"score": score, "train_seconds": 10.0 + seed}
@@ -152,8 +155,38 @@ def test_the_table_of_baselines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     baselines.remember(rows)
     assert baselines.known() == rows
     for _ in range(2):  # the second time the page is there
-        baselines.publish(rows, ["torchrl-mappo"], 100)
+        baselines.publish(rows, ["torchrl-mappo"], 100, 2)
     text = (tmp_path / "docs.md").read_text("utf-8")
     line = "| `torchrl-mappo` | not run | not run | 0.50 (0.25 to 0.75) | 10 s |"
     assert text.count(line) == 1
     assert "seeds 0, 1; 100 env-steps each" in text
+    assert "`greedy` scores 0.88 in `single`" in text
+    assert "2 trainings at a time" in text
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores cannot be chosen here")
+def test_trainings_side_by_side_have_cores_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    import baselines
+
+    before = os.sched_getaffinity(0)
+    seen = []
+
+    def trains(*_: object) -> dict[str, object]:
+        seen.append(os.sched_getaffinity(0))
+        return {}
+
+    monkeypatch.setattr(baselines, "run", trains)
+    places = baselines.divided(len(before))
+    with ThreadPoolExecutor(1) as pool:
+        for seed in range(len(before)):
+            key = ("torchrl-mappo", "mixed", seed, 100)
+            pool.submit(baselines.trained, key, places).result()
+    assert sorted(map(sorted, seen)) == [[core] for core in sorted(before)]
+    assert os.sched_getaffinity(0) == before
+
+
+def test_greedy_lies_between_random_and_hungarian() -> None:
+    import baselines
+
+    assert baselines.script("random", "double") == 0.0
+    assert 0.2 < baselines.script("greedy", "double") < 1.0

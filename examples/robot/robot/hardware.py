@@ -122,7 +122,8 @@ def drive(settings: Drive, link: LinkSettings) -> Outcome:
             commands = _commands(port, tick, len(names), begins + _DEADLINE_SHARE * period)
             if any(process.poll() is not None for process in processes):
                 raise RuntimeError("a robot's process has ended")
-            actions = np.zeros((1, len(names)), np.int64)
+            shape = (1, len(names), 2) if env.continuous else (1, len(names))
+            actions = np.zeros(shape, np.float32 if env.continuous else np.int64)
             for name, command in commands.items():
                 actions[0, names.index(name)] = command["action"]
                 outcome.heard += command["heard"]

@@ -149,7 +149,7 @@ class Member:
             {
                 "kind": "command",
                 "tick": sensed["tick"],
-                "action": decision.action,
+                "action": (decision.force.tolist() if decision.action is None else decision.action),
                 "heard": len(fresh),
             }
         )
