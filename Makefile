@@ -54,7 +54,7 @@ reliability: setup ## every row of docs/reliability.md in full; fills its table
 	cargo test --quiet --locked --no-run --test worlds
 	python benches/reliability.py
 
-soak: setup ## 10^8 env-steps and an hour of training: memory, threads and open files must not grow
+soak: setup ## 10^8 env-steps with each engine and an hour of training: memory, threads and open files must not grow
 	python benches/soak.py
 
 lint: setup ## formatting, lints, types, stub, import floors

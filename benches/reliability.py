@@ -77,13 +77,11 @@ def _run_rust(tests: Sequence[str], env: Mapping[str, str]) -> tuple[int, int]:
 def line_of(row: Row, every: Mapping[str, Kept]) -> list[str]:
     """A line of the table, of what was kept; a result of other tests does not count."""
     needed = {row.name: row.tests} if row.tests else {}
-    if row.long:
-        needed[row.long] = (row.long,)
+    needed |= {name: (name,) for name in row.long}
     there = {name: tests for name, tests in needed.items() if name in every}
     kept = [every[name] for name, tests in there.items() if every[name].tests == tests]
     missing = [row.missing] if row.missing else []
-    if row.long and row.long not in there:
-        missing.append(f"`{row.long}`")
+    missing += [f"`{name}`" for name in row.long if name not in there]
     notes = [note for one in kept for note in one.result.notes]
     what = " ".join([row.what, *notes, *(f"Not tested: {one}." for one in missing)])
     if not needed:

@@ -14,7 +14,7 @@ class Row:
         what: what holds, for a reader.
         python: tests as pytest names them.
         rust: names of tests of the program `worlds`, or parts of them.
-        long: a command that runs apart and keeps a result of its own, under its own name.
+        long: parts of a command that run apart; each keeps a result of its own, under its name.
         missing: what is not tested yet; the row then holds in part.
     """
 
@@ -22,7 +22,7 @@ class Row:
     what: str
     python: tuple[str, ...] = ()
     rust: tuple[str, ...] = ()
-    long: str = ""
+    long: tuple[str, ...] = ()
     missing: str = ""
 
     @property
@@ -34,6 +34,9 @@ class Row:
 _BATCH, _DAMAGE = "tests/envs/test_batch_", "tests/records/test_damage.py::test_"
 _NEIGHBOURS = f"{_BATCH}env.py::test_threads_and_neighbours_change_no_byte"
 _FUZZ_SNAPSHOTS = "tests/envs/test_batch_snapshots.py::test_forged_snapshots_are_refused_or_go_on"
+
+SOAK = "benches/soak.py --parts"
+"""The command of the soak; a name follows."""
 
 _WAYS_OUT = "tests/train/test_ways_out.py::test_"
 
@@ -151,9 +154,10 @@ ROWS: tuple[Row, ...] = (
     ),
     Row(
         "soak",
-        "Memory, threads and open files do not grow in 10⁸ env-steps and an hour of training.",
+        "Memory, threads and open files do not grow in 10⁸ env-steps with each engine and in an "
+        "hour of training.",
         ("tests/benches/test_soak.py",),
-        long="make soak",
+        long=tuple(f"{SOAK} {part}" for part in ("discs", "rapier", "training")),
     ),
     Row(
         "thread count",

@@ -37,7 +37,7 @@ def test_the_page_shows_what_was_kept(tmp_path: Path) -> None:
 
 
 def test_every_kept_result_belongs_to_a_row() -> None:
-    assert set(read(FILE)) <= {name for row in ROWS for name in (row.name, row.long)}
+    assert set(read(FILE)) <= {name for row in ROWS for name in (row.name, *row.long)}
 
 
 GOOD = Result(2, 0)
@@ -45,7 +45,7 @@ GOOD = Result(2, 0)
 
 def shown(row: Row, **results: Result) -> list[str]:
     """The last four cells of its line; results are those of the row's own tests."""
-    tests = {"x": row.tests, "long": (row.long,)}
+    tests = {"x": row.tests, **{name: (name,) for name in row.long}}
     every = {
         name: Kept(result, tests[name], "2026-01-02", "abc", "m")
         for name, result in results.items()
@@ -97,12 +97,13 @@ def test_a_row_whose_tests_have_changed_was_not_run() -> None:
 
 
 def test_a_long_form_is_kept_apart() -> None:
-    row = Row("x", ".", ("a",), long="long")
+    row = Row("x", ".", ("a",), long=("long", "other"))
     told = Result(1, 0, notes=("It held.",))
-    assert shown(row, x=GOOD)[:3] == [". Not tested: `long`.", "in part", "2"]
-    assert shown(row, x=GOOD, long=told)[:3] == [". It held.", "yes", "3"]
-    assert shown(row, x=GOOD, long=Result(0, 1))[1] == "**no**"
-    assert shown(row, long=told)[1] == "not run in full"
+    assert shown(row, x=GOOD)[:3] == [". Not tested: `long`. Not tested: `other`.", "in part", "2"]
+    assert shown(row, x=GOOD, long=told)[:3] == [". It held. Not tested: `other`.", "in part", "3"]
+    assert shown(row, x=GOOD, long=told, other=GOOD)[:3] == [". It held.", "yes", "5"]
+    assert shown(row, x=GOOD, long=told, other=Result(0, 1))[1] == "**no**"
+    assert shown(row, long=told, other=told)[1] == "not run in full"
 
 
 def test_what_a_test_measures_is_kept(tmp_path: Path) -> None:

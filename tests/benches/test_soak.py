@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reliability_kept import read
+from reliability_rows import ROWS
 from soak import Soaked, Watched, main, result_of, soak_worlds, state
 
 from innerattn.envs import BatchEnv
@@ -39,10 +40,10 @@ def test_memory_threads_and_files_that_stay_are_told(tmp_path: Path) -> None:
         found = process.submit(_watched_leak, tmp_path / "file").result()
     problem, memory, threads, files = found.problems
     assert problem == "a problem"
-    (first, *_), told = result_of([found]).notes, result_of([replace(found, problems=())])
-    assert first == f"X: 1 env-steps, memory {found.growth:+.2%}."
+    kept, told = result_of(found), result_of(replace(found, problems=()))
+    assert kept.notes[0] == f"X: 1 env-steps, memory {found.growth:+.2%}."
     assert (told.passed, told.failed, len(told.notes)) == (1, 0, 1)
-    assert (result_of([found, found]).failed, len(result_of([found]).notes)) == (2, 5)
+    assert (kept.passed, kept.failed, len(kept.notes)) == (0, 1, 5)
     assert memory.startswith("memory grew by ")
     assert threads == "1 threads more than after the warm-up"
     assert files == "1 open files more than after the warm-up"
@@ -73,16 +74,29 @@ def test_what_is_wrong_in_a_world_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     assert "step 0: a robot is outside the arena" in found.problems
 
 
-def test_only_work_in_full_is_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_only_work_in_full_is_kept_part_by_part(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     file = tmp_path / "kept.json"
     some = Soaked("x", 1, 1.0, state(), state(), 0.0, ())
+
+    def fails(minutes: float) -> Soaked:
+        assert minutes == 60.0
+        return replace(some, problems=("it grew",))
+
     monkeypatch.setattr("soak.FILE", file)
     monkeypatch.setattr("soak.publish", lambda *_: None)
     monkeypatch.setattr("soak.soak_worlds", lambda *_: some)
-    monkeypatch.setattr("soak.soak_training", lambda *_: some)
+    monkeypatch.setattr("soak.soak_training", lambda _: some)
     monkeypatch.setattr("sys.argv", ["soak.py", "--minutes", "59"])
     assert main() == 0
     assert not file.exists()
-    monkeypatch.setattr("sys.argv", ["soak.py"])
+    names = [f"benches/soak.py --parts {part}" for part in ("discs", "rapier", "training")]
+    monkeypatch.setattr("sys.argv", ["soak.py", "--parts", "discs", "rapier"])
     assert main() == 0
-    assert read(file)["make soak"].result.passed == 3
+    assert list(read(file)) == names[:2]
+    monkeypatch.setattr("soak.soak_training", fails)
+    monkeypatch.setattr("sys.argv", ["soak.py", "--parts", "training"])
+    assert main() == 1
+    assert [read(file)[name].result.failed for name in names] == [0, 0, 1]
+    assert {name for row in ROWS for name in row.long} == set(names)
