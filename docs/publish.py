@@ -3,7 +3,7 @@
 `python docs/publish.py STUDY` fills the marked parts of a page. Of the paper's figures and of the
 crossed design this is the whole report: figures go to `docs/images`, the tables that it links to a
 folder of the page in `docs/tables`, and its runs to an archive in `docs/records`. Of learning and
-robustness it is the tables. It makes no number and no figure.
+robustness it is the tables, and where `KEPT` says so the runs. It makes no number and no figure.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from typing import Any
 from innerattn.errors import InnerattnError, RunError
 from innerattn.experiments.archive import FILE, read_archive, write_archive
 from innerattn.experiments.plan import Case
-from innerattn.experiments.run import read_run
+from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.report.attention import page as attention
+from innerattn.report.learning import ablations
 from innerattn.report.learning.page import ATTENTION, SCORES
 from innerattn.report.marks import fill, marked
 from innerattn.report.robustness import page as robustness
@@ -34,6 +35,12 @@ PLACES = {
     ("crossed", "short"): (DOCS / "crossed.md", ""),
 }
 """Where a report goes by its target and budget, and how the names of its figures begin."""
+KEPT = {
+    ("attention", "fast"): "fast",
+    ("learning-ablations", "fast"): "fast",
+    ("learning", "strong"): "strong",
+}
+"""Names of archives that hold runs of several targets; runs are added to what is there."""
 Parts = Mapping[str, tuple[str, ...]]
 """Headings of a report by the part of a page that the text below them makes."""
 TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
@@ -48,6 +55,10 @@ TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
         ("learning-warm-start", "quick", "warm_start_quick"),
     )
 } | {
+    ("learning-ablations", "fast"): (
+        DOCS / "learning.md",
+        ({"ablations_fast": (ablations.DIFFERENCES,)},),
+    ),
     ("attention", "fast"): (
         DOCS / "attention.md",
         ({"attention_fast": (attention.COMPARISONS, attention.SCORES)},),
@@ -92,6 +103,8 @@ def main() -> None:
     try:
         if made in TABLES:
             publish_tables(study / name, *TABLES[made])
+            if made in KEPT:
+                _add(account["runs"], study, DOCS / "records" / f"{KEPT[made]}.parquet")
         else:
             page, figures = PLACES[made]
             _archive(account["runs"], study, DOCS / "records" / f"{page.stem}.parquet")
@@ -167,6 +180,18 @@ def _listed() -> str:
 
 def _archive(runs: list[dict[str, Any]], study: Path, path: Path) -> None:
     """Write the runs that a report is made of into one file."""
+    write_archive(_finished(runs, study), path)
+
+
+def _add(runs: list[dict[str, Any]], study: Path, path: Path) -> None:
+    """Write the runs that a report is made of into a file that keeps the others it has."""
+    known = {run.folder.name: run for run in read_archive(path)} if path.exists() else {}
+    found = known | {run.folder.name: run for run in _finished(runs, study)}
+    write_archive((found[name] for name in sorted(found)), path)
+
+
+def _finished(runs: list[dict[str, Any]], study: Path) -> list[FinishedRun]:
+    """The finished runs of an account, from their folders or from the study's archive."""
     archive = study / FILE
     archived = read_archive(archive) if os.path.lexists(archive) else []
     by_name = {run.folder.name: run for run in archived}
@@ -180,7 +205,7 @@ def _archive(runs: list[dict[str, Any]], study: Path, path: Path) -> None:
             finished.append(read_run(case, folder, steps=False))
         else:
             finished.append(by_name[folder.name])
-    write_archive(finished, path)
+    return finished
 
 
 if __name__ == "__main__":

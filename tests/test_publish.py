@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from innerattn.errors import RunError
+from innerattn.experiments.archive import read_archive
 from innerattn.experiments.run import FinishedRun
 from innerattn.report.learning.write import write_learning
 from innerattn.report.marks import marked
@@ -68,6 +69,31 @@ def test_tables_and_figure_of_a_study_go_to_their_places(
         assert marked(page, part)[1] == marked(DOCS / "learning.md", part)[1]
     figure = pages / "images" / "learning_short.png"
     assert figure.read_bytes() == (study / "learning.png").read_bytes()
+
+
+def test_an_archive_of_several_targets_keeps_the_runs_of_others(
+    runs: list[FinishedRun], tmp_path: Path
+) -> None:
+    study, path = runs[0].folder.parent, tmp_path / "records" / "fast.parquet"
+    rows = [
+        {
+            "state": "finished",
+            "folder": run.folder.name,
+            "situation": run.situation,
+            "method": run.method,
+            "seed": run.seed,
+            "variant": "",
+        }
+        for run in runs
+    ]
+    rows.append({**rows[0], "state": "failed"})
+    first, second, both = rows[:3], rows[2:], tmp_path / "both.parquet"
+    publish._add(first, study, path)
+    assert [run.folder.name for run in read_archive(path)] == sorted(r["folder"] for r in first)
+    publish._add(second, study, path)
+    publish._add(rows, study, both)
+    assert path.read_bytes() == both.read_bytes()
+    assert len(read_archive(path)) == len(runs)
 
 
 def test_a_report_without_its_tables_changes_nothing(pages: Path, tmp_path: Path) -> None:

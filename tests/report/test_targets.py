@@ -43,10 +43,12 @@ def test_what_each_target_needs() -> None:
         ("ppo-inner", "ppo-uniform", "mappo", "ppo-frozen", "ppo-oracle"),
         ("mixed", "mixed-8", "mixed-16"),
     )
+    assert needs["learning-ablations"] == (("ppo-inner",), ("mixed",))
     assert needs["robustness"] == (METHODS, ("mixed",))
     assert {name for name, target in TARGETS.items() if target.steps} == {"fig4", "fig5", "all"}
     assert {name for name, one in TARGETS.items() if not one.archived} == {"fig4", "fig5"}
-    assert {name for name, one in TARGETS.items() if not one.draws} == {"table2", "robustness"}
+    plain = {name for name, one in TARGETS.items() if not one.draws}
+    assert plain == {"table2", "learning-ablations", "robustness"}
 
 
 @pytest.mark.parametrize("name", TARGETS)

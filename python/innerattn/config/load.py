@@ -45,7 +45,8 @@ def load_run_config(
         method: value of `train.method`.
         budget: name of a built-in budget.
         config_file: TOML file with any of `RunConfig`'s sections and keys.
-        overrides: values by dotted key, e.g. ``{"td.gamma": 0.99}``.
+        overrides: values by dotted key, e.g. ``{"td.gamma": 0.99}``, or
+            ``{"train.schedule.gamma": {"first": 0.9, "last": 0.99}}`` in a section's own section.
         scenario_file: TOML file as of `Scenario.from_toml`.
 
     Raises:
@@ -77,10 +78,7 @@ def load_run_config(
             _merge(table, budget_table(known.algorithm.warm_budgets, budget))
     _merge(table, given)
     for key, value in single.items():
-        section, dot, name = key.partition(".")
-        if not dot or not isinstance(table.setdefault(section, {}), dict):
-            raise ConfigError(f"{key}: unknown key; keys are written SECTION.KEY")
-        table[section][name] = value
+        _put(table, key, value)
     if config_file is None:
         return _validated(table)
     try:
@@ -122,6 +120,19 @@ def _validated(table: dict[str, Any], source: str = "") -> RunConfig:
         return RunConfig.model_validate(table)
     except ValidationError as error:
         raise config_error(error, source=source, model=RunConfig) from error
+
+
+def _put(table: dict[str, Any], key: str, value: object) -> None:
+    """Put a value at a dotted key; a section may have sections, but no deeper ones."""
+    *sections, name = key.split(".", 2)
+    place: Any = table
+    for section in sections:
+        place = place.setdefault(section, {})
+        if not isinstance(place, dict):
+            break
+    if not sections or not isinstance(place, dict):
+        raise ConfigError(f"{key}: unknown key; keys are written SECTION.KEY")
+    place[name] = value
 
 
 def _merge(table: dict[str, Any], other: Mapping[str, Any]) -> None:

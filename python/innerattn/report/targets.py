@@ -16,6 +16,7 @@ from innerattn.experiments.attention.arms import METHODS as ATTENTION_METHODS
 from innerattn.experiments.attention.arms import SITUATIONS as ATTENTION_SITUATIONS
 from innerattn.experiments.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
 from innerattn.experiments.crossed.arms import plan_crossed
+from innerattn.experiments.learning.ablations import plan_ablations
 from innerattn.experiments.learning.variants import CONTINUOUS, ENTITIES, WARM_START
 from innerattn.experiments.learning.variants import SITUATIONS as LEARNING_SITUATIONS
 from innerattn.experiments.plan import METHODS, SITUATIONS, PlannedRun, plan
@@ -149,6 +150,12 @@ def _learning(name: str) -> Callable[[], Report]:
     return load
 
 
+def _ablations() -> Report:
+    from innerattn.report.learning.ablations import FILES, write_ablations
+
+    return Report(FILES, write_ablations)
+
+
 def _attention() -> Report:
     from innerattn.report.attention.write import FILES, write_attention
 
@@ -243,6 +250,16 @@ TARGETS: dict[str, Target] = {
             plan=WARM_START.plan,
             report=_learning("learning_warm_start"),
             situations=LEARNING_SITUATIONS,
+        ),
+        Target(
+            name="learning-ablations",
+            shows="what each choice of the recipe of PPO is worth",
+            plan=plan_ablations,
+            report=_ablations,
+            methods=("ppo-inner",),
+            further=("ppo-uniform", "mappo"),
+            situations=("mixed",),
+            draws=False,
         ),
         Target(
             name="attention",
