@@ -7,6 +7,7 @@ writes its table into `docs/performance.md`. The clock stands still while a team
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -31,8 +32,10 @@ from innerattn.train.loop import training_worlds
 from innerattn.train.matmul_backend import best_matmul_backend
 from innerattn.train.schedule import Schedule
 
+sys.path.append(str(Path(__file__).parents[1] / "examples"))
 sys.path.append(str(Path(__file__).parents[1] / "examples" / "libraries"))
 
+from run_all import environment
 from single_file_mappo import train as train_plain
 
 SCORES = (0.5, 0.7, 0.8, 0.9)
@@ -126,6 +129,17 @@ def measure(
     return reached, newest, done / seconds
 
 
+def benchmarl_pace() -> float:
+    """Env-steps/s of BenchMARL's MAPPO in worlds of VMAS.
+
+    Raises:
+        subprocess.CalledProcessError: BenchMARL cannot be installed here, or VMAS is missing.
+    """
+    program = Path(__file__).with_name("benchmarl_pace.py")
+    command = [str(environment("benchmarl_teams")), str(program)]
+    return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
 def main() -> None:
     """Train, measure and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -161,6 +175,9 @@ def main() -> None:
         cells = [f"{reached[goal]:.0f} s" if goal in reached else "–" for goal in SCORES]
         rows.append([name, *cells, f"{newest:.2f}", f"{speed:,.0f}"])
         print(f"{name}: {reached}, ends at {newest:.2f}, {speed:,.0f} env-steps/s", flush=True)
+    pace = benchmarl_pace()
+    print(f"BenchMARL: {pace:,.0f} env-steps/s", flush=True)
+    rows.append(["BenchMARL's MAPPO in VMAS", *["–"] * (len(SCORES) + 1), f"{pace:,.0f}"])
     head = ["trained", *(f"to {goal}" for goal in SCORES), "last score", "env-steps/s"]
     note = (
         f"{machine('torch')}. One seed ({given.seed}), {EPISODES} episodes of 25 steps a look, "
