@@ -10,7 +10,9 @@ import sys
 from importlib import import_module
 from importlib.metadata import version as version_of
 from pathlib import Path
+from posixpath import dirname, join, normpath
 
+from docutils import nodes
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 
@@ -67,12 +69,18 @@ def navigation(text: str) -> str:
     return "\n\n".join(lists)
 
 
-def add_navigation(_: Sphinx, name: str, source: list[str]) -> None:
+def add_navigation(app: Sphinx, name: str, source: list[str]) -> None:
     """Put the navigation at the end of the first page."""
     if name.startswith("docs/tables/"):  # parts of pages that link to them
         source[0] = "---\norphan: true\n---\n" + source[0]
     if name == root_doc:
         source[0] += "\n\n" + navigation((DOCS / "README.md").read_text("utf-8"))
+        app.env.note_dependency(str(DOCS / "README.md"))
+
+
+def pages_of_the_program(*_: object) -> list[str]:
+    """Pages that change with the program, which are made anew each time."""
+    return ["docs/reference/commands", "docs/reference/keys"]
 
 
 def write_start(app: Sphinx, failure: Exception | None) -> None:
@@ -91,8 +99,19 @@ def load_lazy_names(_: Sphinx, __: str, source: list[str]) -> None:
             setattr(module, one, getattr(module, one))
 
 
+def name_pages_by_title(app: Sphinx, tree: nodes.document, name: str) -> None:
+    """A link that shows the name of a page's file shows the page's title instead."""
+    for link in tree.findall(nodes.reference):
+        to = link.get("refuri", "").partition("#")[0]
+        if link.get("internal") and re.fullmatch(r"[\w./-]+\.md", link.astext()):
+            page = normpath(join(dirname(name), to.removesuffix(".html")))
+            link.children = [nodes.Text(app.env.titles[page].astext())]
+
+
 def setup(app: Sphinx) -> None:
     """Connect the functions above."""
+    app.connect("doctree-resolved", name_pages_by_title)
+    app.connect("env-get-outdated", pages_of_the_program)
     app.connect("source-read", load_lazy_names)
     app.add_lexer("mermaid", TextLexer)
     app.connect("source-read", add_navigation)

@@ -45,9 +45,9 @@ def world() -> Figure:
 def contacts() -> Figure:
     """Two robots drive head-on into each other: the distance of their centres over time."""
     figure, axes = figure_of(6.0, 2.6)
-    for engine, colour in (("rapier", BLUE), ("discs", ORANGE)):
-        times, distances = head_on(engine)
-        axes.plot(times, distances, "o-", ms=3, lw=1, color=colour, label=f'engine = "{engine}"')
+    for engine, colour, line, width in (("rapier", BLUE, "-", 3.5), ("discs", ORANGE, "o--", 1.2)):
+        times, distances = head_on(engine)  # nearly the same: the thin line is over the wide one
+        axes.plot(times, distances, line, ms=3, lw=width, color=colour, label=f'"{engine}"')
     axes.axhline(0.1, color=GREY, lw=1, ls=":")
     axes.text(0.0, 0.115, "twice the radius", color=GREY, fontsize=8)
     axes.set(xlabel="time [s]", ylabel="distance of centres [m]", ylim=(0.0, 0.85))

@@ -1,7 +1,7 @@
 """Directives of the reference pages, whose content follows from the program itself.
 
 `{keys} module:Model` is a table of the keys of a model of configuration. `{command} NAME` is what
-`innerattn NAME --help` prints.
+`innerattn NAME --help` prints, `{command} NAME --help-all` what that does.
 """
 
 import json
@@ -95,7 +95,9 @@ class Command(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """The text."""
-        command = [sys.executable, "-m", "innerattn", *self.arguments[0].split(), "--help"]
+        words = self.arguments[0].split()
+        words += [] if "--help-all" in words else ["--help"]
+        command = [sys.executable, "-m", "innerattn", *words]
         environment = {"PATH": "/usr/bin:/bin", "COLUMNS": "80", "NO_COLOR": "1"}
         text = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
         return [nodes.literal_block("", text.stdout, language="none")]

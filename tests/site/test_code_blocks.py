@@ -102,6 +102,7 @@ def place(tmp_path: Path, run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
 def test_python_blocks(place: Path) -> None:
     """Blocks of a page run one after the other, as a reader would run them."""
     _, export = made_export(place, "td-inner")
+    shutil.copytree(export, "my-team")
     for page in of_language("python"):
         with BatchEnv("mixed", 2, seed=0) as env:
             env.reset()
