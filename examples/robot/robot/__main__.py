@@ -9,6 +9,7 @@ from pathlib import Path
 
 from innerattn.config.files import write_whole
 from innerattn.errors import InnerattnError
+from innerattn.policies import Exported
 from robot.hardware import Drive, Outcome, drive, drive_directly
 from robot.link import LinkSettings
 
@@ -31,7 +32,7 @@ def main() -> int:
     try:
         if arguments.command == "run":
             link = LinkSettings(arguments.latency_ms / 1000, arguments.loss, skew_s)
-            _show(drive(settings, link))
+            _run(settings, link)
         else:
             _table(settings, skew_s, arguments.output)
     except KeyboardInterrupt:
@@ -42,8 +43,15 @@ def main() -> int:
     return 0
 
 
-def _show(outcome: Outcome) -> None:
-    print(f"{outcome.rescues} rescues in {outcome.episodes} episodes")
+def _run(settings: Drive, link: LinkSettings) -> None:
+    """Drive once, and say beside it what the team does without processes and links."""
+    team = Exported(settings.export, backend="numpy")
+    period_ms = 1000 * team.contract.control_period_s / settings.scale
+    names = ", ".join(team.robot_names)
+    print(f"{names}: a process each, an action every {period_ms:g} ms", flush=True)
+    outcome, direct = drive(settings, link), drive_directly(settings)
+    print(f"rescues in {outcome.episodes} episodes: {outcome.rescues}")
+    print(f"rescues of the same team in one process: {direct.rescues}")
     print(f"teammates heard: {outcome.heard_share:.0%}")
     print(f"commands: {outcome.commands} in time, {outcome.late} late")
     print(f"control periods that began late: {outcome.overruns}")
