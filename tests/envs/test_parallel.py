@@ -88,6 +88,18 @@ def test_seed_decides_the_episodes() -> None:
     assert again["food_0"].tolist() == first(3)
 
 
+def test_wrappers_find_a_generator_that_the_seed_decides() -> None:
+    env = parallel_env(seed=1)
+    assert env.np_random.integers(2**40) == np.random.default_rng(1).integers(2**40)
+    env.reset(seed=5)
+    before = env.reset()[0]["food_0"]
+    drawn = env.np_random.integers(2**40)
+    assert drawn == np.random.default_rng(5).integers(2**40)
+    env.reset(seed=5)
+    env.np_random.random(3)  # the world draws from streams of its own
+    np.testing.assert_array_equal(before, env.reset()[0]["food_0"])
+
+
 def test_observations_stay_as_they_were() -> None:
     env = parallel_env(seed=0)
     obs, _ = env.reset()

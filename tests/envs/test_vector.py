@@ -130,6 +130,9 @@ def test_each_world_may_have_its_own_seed() -> None:
         env.reset(seed=[1, 2])
     with pytest.raises(ValueError, match=r"seed\[2\] = -1: must be in 0"):
         env.reset(seed=[1, 2, -1])
+    for wrong in (1.5, "many"):
+        with pytest.raises(TypeError, match=f"seed = {wrong!r}: must be an integer, None, or a"):
+            env.reset(seed=wrong)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

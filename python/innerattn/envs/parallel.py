@@ -73,10 +73,11 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         self.render_mode = render_mode
         self.max_cycles = scenario.episode_steps
         self._screen = Screen(render_mode, self.metadata["render_modes"])
+        first_seed = seed_or_random(seed)
         self._env = BatchEnv(
             scenario,
             1,
-            seed_or_random(seed),
+            first_seed,
             num_threads=1,
             autoreset="disabled",
             copy=False,
@@ -84,6 +85,8 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         self.possible_agents = list(self._env.robot_names)
         self.agents: list[str] = []
         self._started = False
+        self.np_random = np.random.default_rng(first_seed)
+        """For wrappers that draw at random, such as SuperSuit's; the world does not use it."""
         self.observation_spaces = robot_observation_spaces(scenario)
         self.action_spaces = robot_action_spaces(scenario)
         self.state_space = state_space(scenario)
@@ -106,6 +109,8 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         ``options`` is accepted as the interface asks, and not used.
         """
         obs = self._env.reset(seed)
+        if seed is not None:
+            self.np_random = np.random.default_rng(seed)
         self._started = True
         self.agents = self.possible_agents.copy()
         self._screen.follow(self._env)

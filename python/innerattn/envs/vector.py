@@ -16,6 +16,7 @@ from innerattn.envs.batch import MOST_SEED, Autoreset, BatchEnv, Step, whole_num
 from innerattn.envs.spaces import state_space
 from innerattn.envs.team import Form, TeamForm, team_rewards
 from innerattn.envs.view import STEPS_PER_SECOND, Screen, chosen_scenario, seed_or_random
+from innerattn.errors import ConfigError
 
 _AUTORESET: dict[AutoresetMode, Autoreset] = {
     AutoresetMode.SAME_STEP: "same_step",
@@ -48,7 +49,7 @@ class RescueVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         overrides: fields of `Scenario` to change.
 
     Raises:
-        ConfigError: unknown preset, field, form or render mode, or an invalid value.
+        ConfigError: unknown preset, field, form, autoreset or render mode, or an invalid value.
         TypeError, ValueError: another value of another type, or out of range.
     """
 
@@ -76,7 +77,7 @@ class RescueVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         if not isinstance(copy, bool):
             raise TypeError(f"copy = {copy!r}: must be True or False")
         scenario = chosen_scenario(scenario, max_episode_steps, "max_episode_steps", overrides)
-        self._mode = AutoresetMode(autoreset_mode)
+        self._mode = _known_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
         self.scenario = scenario
         self.render_mode = render_mode
@@ -118,7 +119,7 @@ class RescueVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
             TypeError, ValueError: a seed or mask that is not allowed; nothing has changed then.
         """
         mask = self._reset_mask((options or {}).get("reset_mask"))
-        seeds = None if seed is None or isinstance(seed, (int, np.integer)) else list(seed)
+        seeds = None if seed is None or isinstance(seed, (int, np.integer)) else _listed(seed)
         if seeds is not None and len(seeds) != self.num_envs:
             raise ValueError(f"seed has {len(seeds)} values: must be {self.num_envs}, one an env")
         for index, one in enumerate(seeds or ()):
@@ -213,6 +214,23 @@ class RescueVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
             "_final_info": ended.copy(),
             **_masked(found, ~ended, self._copy),
         }
+
+
+def _known_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    """Gymnasium's mode by itself or by its value."""
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        known = " or ".join(repr(one.value) for one in AutoresetMode)
+        raise ConfigError(f"autoreset_mode = {mode!r}: must be {known}") from None
+
+
+def _listed(seeds: Any) -> list[int | None]:
+    """Seeds of each world as a list."""
+    if isinstance(seeds, str) or not hasattr(seeds, "__iter__"):
+        wanted = "must be an integer, None, or a list with one of them for each env"
+        raise TypeError(f"seed = {seeds!r}: {wanted}")
+    return list(seeds)
 
 
 def _masked(found: dict[str, NDArray[Any]], mask: Flags, copy: bool) -> Infos:
