@@ -34,6 +34,9 @@ class Example(NamedTuple):
 
 
 EXAMPLES = {
+    "ppo-inner": Example("innerattn_methods", 25_000, ("--method", "ppo-inner")),
+    "mappo": Example("innerattn_methods", 25_000, ("--method", "mappo")),
+    "td-inner": Example("innerattn_methods", 25_000, ("--method", "td-inner")),
     "single-file-mappo": Example("single_file_mappo", 100_000),
     "sb3-gymnasium": Example("sb3_ppo", 50_000, ("--view", "gymnasium")),
     "sb3-pettingzoo": Example("sb3_ppo", 25_000, ("--view", "pettingzoo")),
@@ -87,8 +90,13 @@ def run(name: str, env_steps: int | None = None, *more: str) -> dict[str, Any]:
 
 
 def _run(*command: str) -> str:
-    """Run a command in `examples/libraries`; its errors go through, its output comes back."""
+    """Run a command in `examples/libraries`; its errors go through, its output comes back.
+
+    The networks are so small that a second thread of PyTorch costs more than it saves; where other
+    programs use the machine, too, it costs many times as much.
+    """
     kept = {key: value for key, value in os.environ.items() if key != "PIP_CONSTRAINT"}
+    kept = {"OMP_NUM_THREADS": "1"} | kept
     done = subprocess.run(
         command, cwd=LIBRARIES, env=kept, check=True, stdout=subprocess.PIPE, text=True
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Callable
 
 import torch
@@ -12,7 +11,7 @@ from benchmarl.environments.common import Task, TaskClass
 from benchmarl.experiment import Experiment, ExperimentConfig
 from benchmarl.models.mlp import MlpConfig
 from numpy.typing import NDArray
-from scoring import options, report
+from scoring import Stopwatch, options, report
 from tensordict import TensorDict
 from torchrl.data import Composite
 from torchrl.envs import EnvBase
@@ -134,9 +133,9 @@ def main() -> None:
             seed=given.seed,
             config=configured(given.algorithm, given.env_steps, folder),
         )
-        began = time.perf_counter()
+        watch = Stopwatch()
         experiment.run()
-        seconds = time.perf_counter() - began
+        spent = watch.stop()
 
     kinds = experiment.group_map
     names = [robot.name for robot in Scenario.preset(given.situation).robots]
@@ -155,7 +154,7 @@ def main() -> None:
         }
         return torch.stack([chosen[name] for name in names], dim=1).numpy()
 
-    report("benchmarl", given.algorithm.upper(), given, experiment.total_frames, seconds, actor)
+    report("benchmarl", given.algorithm.upper(), given, experiment.total_frames, spent, actor)
 
 
 if __name__ == "__main__":

@@ -8,13 +8,12 @@ its first victim, whatever the numbers are.
 from __future__ import annotations
 
 import tempfile
-import time
 from pathlib import Path
 
 import optuna
 import torch
 from numpy.typing import NDArray
-from scoring import Actor, options, report, rescues
+from scoring import Actor, Stopwatch, options, report, rescues
 
 from innerattn.config import Scenario, load_run_config
 from innerattn.train import load_policy, train
@@ -54,17 +53,17 @@ def main() -> None:
 
     sampler = optuna.samplers.TPESampler(seed=given.seed)
     study = optuna.create_study(direction="maximize", sampler=sampler)
-    began = time.perf_counter()
+    watch = Stopwatch()
     with tempfile.TemporaryDirectory() as runs:
         study.optimize(objective, n_trials=given.trials)
-    seconds = time.perf_counter() - began
+    spent = watch.stop()
     print(f"best: {study.best_params}")
     report(
         "optuna",
         "search over ppo-inner",
         given,
         given.env_steps,
-        seconds,
+        spent,
         teams[study.best_trial.number],
     )
 

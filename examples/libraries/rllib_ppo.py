@@ -6,7 +6,6 @@ Ray listens on this machine alone, and is shut down at the end, whatever happens
 from __future__ import annotations
 
 import os
-import time
 
 os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # no cluster: Ray takes the loopback address
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.env.wrappers.pettingzoo_env import ParallelPettingZooEnv
 from ray.tune.registry import register_env
-from scoring import options, report
+from scoring import Stopwatch, options, report
 
 from innerattn.config import Scenario
 from innerattn.envs import parallel_env
@@ -52,11 +51,11 @@ def main() -> None:
     ray.init(_node_ip_address="127.0.0.1", include_dashboard=False, num_cpus=1, log_to_driver=False)
     try:
         algorithm = configured(given.situation, given.seed, robots).build_algo()
-        began, done = time.perf_counter(), 0
+        watch, done = Stopwatch(), 0
         while done < given.env_steps:
             result = algorithm.train()
             done = int(result["env_runners"]["num_env_steps_sampled_lifetime"])
-        seconds = time.perf_counter() - began
+        spent = watch.stop()
         modules = [algorithm.get_module(robot) for robot in robots]
 
         def actor(obs: NDArray) -> NDArray:
@@ -68,7 +67,7 @@ def main() -> None:
             chosen = [one["action_dist_inputs"].argmax(dim=1) for one in logits]
             return torch.stack(chosen, dim=1).numpy()
 
-        report("rllib", "PPO, one for each robot", given, done, seconds, actor)
+        report("rllib", "PPO, one for each robot", given, done, spent, actor)
         algorithm.stop()
     finally:
         ray.shutdown()

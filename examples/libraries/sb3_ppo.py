@@ -6,7 +6,6 @@ PPO sees a row for each robot. A row is what the robot observes, then who it is 
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import gymnasium
@@ -14,7 +13,7 @@ import numpy as np
 import supersuit
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
-from scoring import options, report
+from scoring import Stopwatch, options, report
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import VecEnv
@@ -138,9 +137,9 @@ def main() -> None:
     set_random_seed(given.seed)
     env = worlds(given.view, given.situation, given.seed)
     model = PPO("MlpPolicy", env, device="cpu", **PPO_NUMBERS)
-    began = time.perf_counter()
+    watch = Stopwatch()
     model.learn(given.env_steps * robots)
-    seconds = time.perf_counter() - began
+    spent = watch.stop()
     env.close()
 
     def actor(obs: NDArray[np.float32]) -> NDArray[np.int64]:
@@ -148,7 +147,7 @@ def main() -> None:
         return chosen.reshape(len(obs), robots)
 
     algorithm = f"PPO, {given.view} view"
-    report("stable-baselines3", algorithm, given, model.num_timesteps // robots, seconds, actor)
+    report("stable-baselines3", algorithm, given, model.num_timesteps // robots, spent, actor)
 
 
 if __name__ == "__main__":

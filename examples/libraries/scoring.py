@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,27 @@ from innerattn.policies import PolicyInput, WorldState, scripted_policy
 EPISODES, SEED, EPISODE_STEPS = 500, 98_765, 25
 Actor = Callable[[NDArray[np.float32]], Any]
 """Observations (E, R, D) float32 become actions (E, R) integers."""
+
+
+class Spent(NamedTuple):
+    """What a training took."""
+
+    seconds: float
+    """By the clock on the wall [s]."""
+    cpu_seconds: float
+    """Of all threads of this process [s]; it varies less where others use the machine, too."""
+
+
+class Stopwatch:
+    """Measures a training from when it is made."""
+
+    def __init__(self) -> None:
+        self._began = Spent(time.perf_counter(), time.process_time())
+
+    def stop(self) -> Spent:
+        """What was spent until now."""
+        now = (time.perf_counter(), time.process_time())
+        return Spent(*(end - begin for begin, end in zip(self._began, now, strict=True)))
 
 
 def options(
@@ -56,7 +78,7 @@ def scripted(scenario: Scenario, name: str) -> float:
 
 
 def report(
-    library: str, algorithm: str, given: argparse.Namespace, env_steps: int, seconds: float,
+    library: str, algorithm: str, given: argparse.Namespace, env_steps: int, spent: Spent,
     actor: Actor,
 ) -> dict[str, Any]:  # fmt: skip
     """Score a team and print the result as one line of JSON.
@@ -66,7 +88,7 @@ def report(
         algorithm: by which algorithm.
         given: the options of the program.
         env_steps: how long it trained [control steps of all worlds].
-        seconds: how long that took [s].
+        spent: what that took.
         actor: the team, greedy.
 
     Returns:
@@ -81,7 +103,8 @@ def report(
         "situation": given.situation,
         "seed": given.seed,
         "env_steps": env_steps,
-        "train_seconds": round(seconds, 1),
+        "train_seconds": round(spent.seconds, 1),
+        "train_cpu_seconds": round(spent.cpu_seconds, 1),
         "rescues_per_episode": round(found, 3),
         "score": round((found - low) / (high - low), 3),
     }

@@ -7,7 +7,6 @@ Cooperative Multi-Agent Games".
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import closing
 from typing import NamedTuple
@@ -15,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scoring import options, report
+from scoring import Stopwatch, options, report
 from torch import Tensor, nn
 from torch.distributions import Categorical
 
@@ -156,18 +155,18 @@ def update(team: Team, adam: torch.optim.Adam, rollout: Rollout) -> None:
 def main() -> None:
     """Train for a number of env-steps and score the team."""
     given = options(__doc__, 500_000)
-    began = time.perf_counter()
+    watch = Stopwatch()
     training = train(Scenario.preset(given.situation), given.seed)
     done, team = next(training)
     while done < given.env_steps:
         done, team = next(training)
-    seconds = time.perf_counter() - began
+    spent = watch.stop()
 
     def actor(obs: NDArray[np.float32]) -> NDArray[np.int64]:
         actions: NDArray[np.int64] = team.act(torch.from_numpy(obs), greedy=True).numpy()
         return actions
 
-    report("innerattn", "single-file MAPPO", given, done, seconds, actor)
+    report("innerattn", "single-file MAPPO", given, done, spent, actor)
 
 
 if __name__ == "__main__":

@@ -6,11 +6,9 @@ worlds.
 
 from __future__ import annotations
 
-import time
-
 import torch
 from numpy.typing import NDArray
-from scoring import options, report
+from scoring import Stopwatch, options, report
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModule, TensorDictSequential
 from torch import Tensor, nn
@@ -106,14 +104,14 @@ def main() -> None:
     losses = {kind: make_loss(env, kind, actor) for kind, actor in actors.items()}
     adams = {kind: torch.optim.Adam(loss.parameters(), lr=RATE) for kind, loss in losses.items()}
     team = TensorDictSequential(*actors.values())
-    began, done = time.perf_counter(), 0
+    watch, done = Stopwatch(), 0
     while done < given.env_steps:
         with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
             rollout = env.rollout(env.scenario.episode_steps, team, break_when_any_done=False)
         for kind, loss in losses.items():
             update(rollout, kind, loss, adams[kind])
         done += rollout.numel()
-    seconds = time.perf_counter() - began
+    spent = watch.stop()
 
     names = [robot.name for robot in Scenario.preset(given.situation).robots]
 
@@ -126,7 +124,7 @@ def main() -> None:
             chosen |= dict(zip(robots, best.unbind(dim=1), strict=True))
         return torch.stack([chosen[name] for name in names], dim=1).numpy()
 
-    report("torchrl", "MAPPO", given, done, seconds, actor)
+    report("torchrl", "MAPPO", given, done, spent, actor)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import tempfile
-import time
 from argparse import Namespace
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import numpy as np
 import torch
 import xuance
 from numpy.typing import NDArray
-from scoring import options, report
+from scoring import Stopwatch, options, report
 from xuance.environment import REGISTRY_MULTI_AGENT_ENV, RawMultiAgentEnv, make_envs
 from xuance.torch.agents import MAPPO_Agents
 
@@ -97,10 +96,10 @@ def main() -> None:
         config = configured(given.situation, given.seed)
         envs = make_envs(config)
         team = MAPPO_Agents(config, envs)
-        began = time.perf_counter()
+        watch = Stopwatch()
         rounds = -(-given.env_steps // (WORLDS * STEPS))
         team.train(rounds * STEPS)
-        seconds = time.perf_counter() - began
+        spent = watch.stop()
         team.finish()
         envs.close()
         os.chdir(here)
@@ -112,7 +111,7 @@ def main() -> None:
             acted = team.get_actions(seen, test_mode=True, deterministic=True)["actions"]
         return np.array([[int(world[name]) for name in names] for world in acted])
 
-    report("xuance", "MAPPO", given, rounds * STEPS * WORLDS, seconds, actor)
+    report("xuance", "MAPPO", given, rounds * STEPS * WORLDS, spent, actor)
 
 
 if __name__ == "__main__":

@@ -89,10 +89,12 @@ def test_random_actions_score_zero_and_standing_still_less(
     def randomly(obs: NDArray[np.float32]) -> NDArray[np.int64]:
         return source.integers(5, size=obs.shape[:2])
 
-    found = scoring.report("a", "b", given, 5, 1.0, randomly)
+    found = scoring.report("a", "b", given, 5, scoring.Spent(1.25, 2.0), randomly)
     assert found == json.loads(capsys.readouterr().out)
     assert abs(found["score"]) < 0.05
-    still = scoring.report("a", "b", given, 5, 1.0, lambda obs: np.zeros(obs.shape[:2], int))
+    assert (found["train_seconds"], found["train_cpu_seconds"]) == (1.2, 2.0)
+    spent = scoring.Stopwatch().stop()
+    still = scoring.report("a", "b", given, 5, spent, lambda obs: np.zeros(obs.shape[:2], int))
     assert still["rescues_per_episode"] < found["rescues_per_episode"]
 
 
@@ -144,28 +146,45 @@ def test_the_single_file_bootstraps_at_the_end_of_an_episode() -> None:
 def test_the_table_of_baselines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import baselines
 
-    monkeypatch.setattr(baselines, "PAGE", tmp_path / "docs.md")
+    page = tmp_path / "docs.md"
+    page.write_text("<!-- baselines: begin -->\n<!-- baselines: end -->\n", "utf-8")
+    monkeypatch.setattr(baselines, "PAGE", page)
     monkeypatch.setattr(baselines, "KNOWN", tmp_path / "runs" / "known.jsonl")
     monkeypatch.setattr(baselines, "script", lambda *_: 0.875)
     assert baselines.known() == {}
-    rows = {
-        ("torchrl-mappo", "mixed", seed, 100): {"score": score, "train_seconds": 10.0 + seed}
-        for seed, score in enumerate((0.25, 0.75))
-    }
+
+    def row(score: float, seed: int) -> dict[str, float]:
+        return {"score": score, "train_seconds": 10.0 + seed, "train_cpu_seconds": 5.0}
+
+    rows = {("torchrl-mappo", "mixed", seed, 100): row(seed / 4, seed) for seed in range(3)}
+    rows |= {("rllib-ppo", "single", seed, 100): row(0.5, seed) for seed in range(2)}
+    rows |= {("rllib-ppo", "mixed", 0, 7): row(1.0, 0)}  # another length: not in this table
     baselines.remember(rows)
     assert baselines.known() == rows
-    for _ in range(2):  # the second time the page is there
-        baselines.publish(rows, ["torchrl-mappo"], 100, 2)
-    text = (tmp_path / "docs.md").read_text("utf-8")
-    line = "| `torchrl-mappo` | not run | not run | 0.50 (0.25 to 0.75) | 10 s |"
-    assert text.count(line) == 1
-    assert "seeds 0, 1; 100 env-steps each" in text
-    assert "`greedy` scores 0.88 in `single`" in text
-    assert "2 trainings at a time" in text
+    for _ in range(2):  # the second time the part is filled
+        baselines.publish(rows, 100, 2)
+    lines = page.read_text("utf-8").splitlines()
+    first = "| `rllib-ppo` | 0.50 (0.50 to 0.50, 2 of 3 seeds) | not run | not run | 5 | 10 |"
+    second = "| `torchrl-mappo` | not run | not run | 0.25 (0.00 to 0.50) | 5 | 11 |"
+    assert lines[4:6] == [first, second]
+    assert lines[-5] == "| the script `greedy` | 0.88 | 0.88 | 0.88 |  |  |"
+    assert sum("not run | not run | not run | not run" in line for line in lines) == 9
+    assert "seeds 0, 1, 2. 100 env-steps each" in lines[-3]
+    assert "2 trainings at a time" in lines[-3]
+
+
+def test_what_the_page_compares_was_trained_equally_long() -> None:
+    import baselines
+
+    rows = {key: row for key, row in baselines.known().items() if key[3] == baselines.ENV_STEPS}
+    assert rows
+    for (name, situation, seed, env_steps), row in rows.items():
+        told = (row["situation"], row["seed"], row["env_steps"])
+        assert told == (situation, seed, env_steps), name
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores cannot be chosen here")
-def test_trainings_side_by_side_have_cores_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_trainings_side_by_side_have_a_core_each(monkeypatch: pytest.MonkeyPatch) -> None:
     import baselines
 
     before = os.sched_getaffinity(0)
@@ -176,11 +195,11 @@ def test_trainings_side_by_side_have_cores_of_their_own(monkeypatch: pytest.Monk
         return {}
 
     monkeypatch.setattr(baselines, "run", trains)
-    places = baselines.divided(len(before))
+    cores = baselines.chosen_cores(len(before))
     with ThreadPoolExecutor(1) as pool:
         for seed in range(len(before)):
             key = ("torchrl-mappo", "mixed", seed, 100)
-            pool.submit(baselines.trained, key, places).result()
+            pool.submit(baselines.trained, key, cores).result()
     assert sorted(map(sorted, seen)) == [[core] for core in sorted(before)]
     assert os.sched_getaffinity(0) == before
 
