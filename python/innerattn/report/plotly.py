@@ -16,7 +16,8 @@ def plotly_script() -> str:
     try:
         from plotly.offline import get_plotlyjs
     except ImportError as error:
-        raise MissingLibraryError("plots of a page need plotly: pip install plotly") from error
+        needed = "plots of a page need plotly: pip install 'innerattn[report]'"
+        raise MissingLibraryError(needed) from error
     return str(get_plotlyjs())
 
 

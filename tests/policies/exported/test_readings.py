@@ -272,10 +272,11 @@ def test_stale_readings_are_refused_by_name(plain_export: Path) -> None:
     timed = {**readings, "own": {**BODY, "time": 1.0}, "now": 1.4, "victims_time": 1.2}
     team.decide("food_0", timed)
     late = {**timed, "victims_time": 0.0}
-    for now, field, found in ((1.6, "own.time", timed), (0.4, "own.time", timed)):
+    for now, when in ((1.6, "0.600 s before now"), (0.4, "0.600 s after now")):
         with pytest.raises(StaleReadingError) as caught:
-            team.decide("food_0", {**found, "now": now})
-        assert caught.value.field == field
+            team.decide("food_0", {**timed, "now": now})
+        assert str(caught.value) == f"own.time: is {when}: must be at most 0.5 s away"
+        assert caught.value.field == "own.time"
     with pytest.raises(StaleReadingError) as caught:
         team.decide("food_0", late)
     assert caught.value.field == "victims_time"

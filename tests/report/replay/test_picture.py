@@ -69,8 +69,8 @@ def test_what_was_not_recorded(options: dict[str, object], message: str) -> None
 @pytest.mark.parametrize(
     ("library", "suffix", "message"),
     [
-        ("imageio_ffmpeg", ".mp4", "a video needs imageio-ffmpeg: pip install imageio-ffmpeg"),
-        ("matplotlib.figure", ".gif", "needs matplotlib: pip install matplotlib"),
+        ("imageio_ffmpeg", ".mp4", "needs imageio-ffmpeg: pip install 'innerattn\\[report\\]'"),
+        ("matplotlib.figure", ".gif", "needs matplotlib: pip install 'innerattn\\[report\\]'"),
     ],
 )
 def test_a_missing_library_is_named(

@@ -166,7 +166,7 @@ def test_what_is_missing_is_named(
     with pytest.raises(RunError, match="not a document of innerattn robustness"):
         read_robustness(tmp_path / "nothing.json")
     monkeypatch.setitem(sys.modules, "plotly.offline", None)
-    with pytest.raises(MissingLibraryError, match="need plotly: pip install plotly"):
+    with pytest.raises(MissingLibraryError, match=r"plotly: pip install .innerattn\[report\]"):
         runs_page(mixed[:1])
 
 

@@ -186,9 +186,8 @@ class RowBuilder:
             raise ReadingError(place, "is missing; it must be there where `now` is")
         age = now - _number(readings[key], place, np.inf)
         if abs(age) > self.max_age_s:
-            raise StaleReadingError(
-                place, f"is {age:.3f} s before now: must be at most {self.max_age_s:g} s away"
-            )
+            when = f"{abs(age):.3f} s {'before' if age > 0 else 'after'} now"
+            raise StaleReadingError(place, f"is {when}: must be at most {self.max_age_s:g} s away")
 
     def _write_victims(
         self, victims: Any, own: NDArray[np.float32], row: NDArray[np.float32]

@@ -71,7 +71,7 @@ def moving_picture(
 
 
 def _missing(what: str, library: str) -> MissingLibraryError:
-    return MissingLibraryError(f"{what} needs {library}: pip install {library}")
+    return MissingLibraryError(f"{what} needs {library}: pip install 'innerattn[report]'")
 
 
 def _chosen_episode(records: Sequence[Record], number: int | None) -> int:
