@@ -1,6 +1,7 @@
 """`innerattn train`: a run that is stopped keeps what it has, and can go on."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -104,6 +105,35 @@ def test_interruption_keeps_the_weights(
     said = capsys.readouterr()
     assert f"{path}: is done" in said.err
     assert said.out == ""
+
+
+def test_one_that_saved_nothing_begins_anew(
+    tmp_path: Path, tiny: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run"
+    assert main(["train", "--run-dir", str(path), *tiny]) == 0
+    shutil.rmtree(path / "checkpoints")
+    (path / "checkpoints").mkdir()
+    shutil.rmtree(path / "evaluation")
+    (path / "manifest.json").unlink()
+    info = path / "run.json"
+    told = json.loads(info.read_text())
+    before, told["weights_sha256"] = told["weights_sha256"], None
+    info.write_text(json.dumps(told | {"state": "running", "sealed": False}))
+    capsys.readouterr()
+    assert main(["train", "--resume", str(path)]) == 0
+    said = f"{path} was stopped before its first checkpoint; it begins anew\n"
+    assert said in capsys.readouterr().out
+    assert json.loads(info.read_text())["weights_sha256"] == before
+    shutil.rmtree(path / "checkpoints")  # it had some: nothing is thrown away
+    had = {"state": "running", "sealed": False, "weights_sha256": before}
+    info.write_text(json.dumps(told | had))
+    (path / "manifest.json").unlink()
+    metrics = (path / "metrics.jsonl").read_bytes()
+    assert main(["train", "--resume", str(path)]) == 1
+    said = f"{path}: holds no checkpoint that training could go on from"
+    assert said in capsys.readouterr().err
+    assert (path / "metrics.jsonl").read_bytes() == metrics
 
 
 def test_a_run_that_was_stopped_in_its_evaluation_is_measured(

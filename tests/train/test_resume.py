@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,6 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from innerattn.config import RunConfig
+from innerattn.errors import RunError
 from innerattn.records.run_folder import newest_weights, read_info
 from innerattn.train import NothingToResumeError, Progress, resume, train
 from innerattn.train.weights import digest_of
@@ -202,6 +204,34 @@ def test_wherever_it_is_cut(
     if read_info(run).state != "done":
         resume(run)
     assert left_by(run) == whole(case)
+
+
+@pytest.mark.parametrize("case", ["td-inner", "mappo warm start", "ppo-inner potential"])
+def test_one_that_was_killed_before_its_first_checkpoint_begins_anew(
+    small_config: Configure, tmp_path: Path, case: str
+) -> None:
+    run, killed, planted = tmp_path / "run", tmp_path / "killed", tmp_path / "planted"
+    logs = {"train.log_every_env_steps": 60}
+
+    def copy(now: Progress) -> None:
+        if now.env_steps == 240 and not killed.exists():  # of the first stage
+            shutil.copytree(run, killed)  # what a kill leaves
+
+    train(small_config(**{**SMALL, **CASES[case], **logs}), run, progress=copy)
+    assert (killed / "metrics.jsonl").exists()
+    (killed / "checkpoints" / ".48.0123456789abcdef").mkdir()
+    planted.mkdir()
+    (killed / "checkpoints" / "rows").mkdir(exist_ok=True)
+    (killed / "checkpoints" / "link").symlink_to(planted)
+    said = r"and is in training or was killed; go on with: innerattn train --resume"
+    with pytest.raises(RunError, match=said):
+        train(small_config(), killed)
+    resume(killed)
+    assert left_by(killed) == left_by(run)
+    assert (read_info(killed).state, read_info(killed).resumed) == ("done", 1)
+    found = [{path.relative_to(one).as_posix() for path in one.rglob("*")} for one in (run, killed)]
+    assert found[0] == found[1]
+    assert planted.exists()
 
 
 @pytest.mark.parametrize("case", ["td-inner", "ppo-inner", "mappo warm start"])

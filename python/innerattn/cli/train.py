@@ -188,14 +188,18 @@ class _Train(_Sources):
         with requests_handled_by(leave):
             from innerattn.records.run_folder import read_config, read_info
             from innerattn.train import newest_checkpoint, resume
+            from innerattn.train.saved import nothing_was_saved
 
         config, info = read_config(run_dir), read_info(run_dir)
         measured = (run_dir / "evaluation" / "summary.json").exists()
         if info.state == "done" and not measured:
             return self._finish(console, config, run_dir, lambda _: None)
         newest = newest_checkpoint(run_dir)
-        if info.state != "done" and newest is not None:
+        if newest is not None and info.state != "done":
             console.print(f"Going on with {run_dir} from env-step {newest:,}", soft_wrap=True)
+        elif nothing_was_saved(run_dir, info):
+            what = "was stopped before its first checkpoint; it begins anew"
+            console.print(f"{run_dir} {what}", soft_wrap=True)
         return self._finish(
             console, config, run_dir, lambda report: resume(run_dir, progress=report)
         )

@@ -28,7 +28,13 @@ from innerattn.records.run_folder import (
     read_info,
 )
 from innerattn.train.orphans import being_made, name_while_made, sweep_orphans
-from innerattn.train.saved import Checkpoints, Content, refuse_not_finite, whole_checkpoints
+from innerattn.train.saved import (
+    Checkpoints,
+    Content,
+    nothing_was_saved,
+    refuse_not_finite,
+    whole_checkpoints,
+)
 from innerattn.train.weights import write_weights
 
 _PACKAGES = ("innerattn", "torch", "numpy")
@@ -59,21 +65,7 @@ class RunFolder:
             RunError: something is at ``path`` already, or the folder cannot be made.
         """
         refuse_existing(path)
-        info = RunInfo(
-            schema_version=SCHEMA_VERSION,
-            versions=versions(),
-            seed=config.train.seed,
-            commit=_commit(),
-            threads=threads,
-            compiled=compiled,
-            matmul_backend=matmul_backend,
-            device=config.train.device,
-            state="running",
-            env_steps=0,
-            updates=0,
-            seconds=0.0,
-            warm_start=config.train.warm_start,
-        )
+        info = _first_info(config, threads, compiled, matmul_backend)
         partial = name_while_made(path)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -85,6 +77,22 @@ class RunFolder:
                 os.rename(partial, path)
         except OSError as error:
             raise RunError(f"{path}: cannot make the run folder ({error.strerror})") from error
+        return cls(path, info)
+
+    @classmethod
+    def begin_anew(
+        cls, path: Path, config: RunConfig, before: RunInfo, compiled: bool, matmul_backend: str
+    ) -> RunFolder:
+        """Empty the folder of a run that saved nothing before it was stopped.
+
+        Raises:
+            OSError: something cannot be removed or written.
+        """
+        Checkpoints(path, config.digest(), config.train.keep_checkpoints).clear()
+        (path / "metrics.jsonl").unlink(missing_ok=True)
+        info = _first_info(config, before.threads, compiled, matmul_backend)
+        info = replace(info, resumed=before.resumed + 1)
+        _write_info(path, info)
         return cls(path, info)
 
     def save_weights(self, tensors: Mapping[str, Tensor], env_steps: int) -> None:
@@ -150,7 +158,8 @@ def _what_to_do(path: Path) -> str:
     with suppress(RunError), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnsealedRunWarning)
         info = read_info(path)
-        if info.state != "done" and whole_checkpoints(path / "checkpoints"):
+        saved = whole_checkpoints(path / "checkpoints")
+        if info.state != "done" and (saved or nothing_was_saved(path, info)):
             ended = f"interrupted after {info.env_steps:,} env-steps"
             ended = ended if info.state == "interrupted" else "and is in training or was killed"
             return f", {ended}; go on with: innerattn train --resume {path}"
@@ -159,6 +168,25 @@ def _what_to_do(path: Path) -> str:
 
 def _write_info(folder: Path, info: RunInfo) -> None:
     write_whole(folder / "run.json", info_text(info))
+
+
+def _first_info(config: RunConfig, threads: int, compiled: bool, matmul_backend: str) -> RunInfo:
+    """What ``run.json`` says of a run that begins."""
+    return RunInfo(
+        schema_version=SCHEMA_VERSION,
+        versions=versions(),
+        seed=config.train.seed,
+        commit=_commit(),
+        threads=threads,
+        compiled=compiled,
+        matmul_backend=matmul_backend,
+        device=config.train.device,
+        state="running",
+        env_steps=0,
+        updates=0,
+        seconds=0.0,
+        warm_start=config.train.warm_start,
+    )
 
 
 def versions() -> dict[str, str]:

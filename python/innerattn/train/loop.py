@@ -13,6 +13,8 @@ from pathlib import Path
 
 from innerattn.config import RunConfig, Scenario
 from innerattn.envs import BatchEnv
+from innerattn.records.run_files import RunFiles
+from innerattn.records.run_folder import config_of
 from innerattn.train.build import keep_heap_small, thread_count, torch_threads
 from innerattn.train.checkpoint import RunFolder, refuse_existing, versions
 from innerattn.train.checkpoint_info import Stage
@@ -21,7 +23,7 @@ from innerattn.train.interruption import Interruptions, remembered_interruptions
 from innerattn.train.matmul_backend import best_matmul_backend
 from innerattn.train.parts import Parts
 from innerattn.train.progress import Progress
-from innerattn.train.resume import NothingToResumeError, Saved, read_saved
+from innerattn.train.resume import NothingSavedError, NothingToResumeError, Saved, read_saved
 from innerattn.train.run_lock import only_training_in
 from innerattn.train.saved import Checkpoints
 from innerattn.train.stages import Stages
@@ -68,6 +70,8 @@ def train(
 def resume(run_dir: str | Path, *, progress: Callable[[Progress], None] | None = None) -> Path:
     """Go on with a training that was stopped, from its newest checkpoint, as if it had not been.
 
+    One that was stopped before its first checkpoint begins anew in its folder.
+
     Args:
         run_dir: the run folder.
         progress: called after every control step of all worlds.
@@ -84,7 +88,11 @@ def resume(run_dir: str | Path, *, progress: Callable[[Progress], None] | None =
     """
     path = Path(run_dir)
     with only_training_in(path):
-        saved = read_saved(path)
+        try:
+            saved = read_saved(path)
+        except NothingSavedError:
+            _begin_anew(path, progress)
+            return path
         info, stage = saved.run_info, saved.info.counters.stage
         with _prepared(saved.config, info.threads, stage) as (parts, compiled, backend, stops):
             if parts.resumable is None:
@@ -100,6 +108,16 @@ def resume(run_dir: str | Path, *, progress: Callable[[Progress], None] | None =
             Stages(parts, folder, stops, progress, saved.info).run()
             stops.check()
     return path
+
+
+def _begin_anew(path: Path, progress: Callable[[Progress], None] | None) -> None:
+    """Train in a folder whose training was stopped before it saved anything."""
+    files = RunFiles(path)
+    config = config_of(files)
+    with _prepared(config, files.info.threads, "imitating") as (parts, compiled, backend, stops):
+        folder = RunFolder.begin_anew(path, config, files.info, compiled, backend)
+        Stages(parts, folder, stops, progress).run()
+        stops.check()
 
 
 def training_worlds(config: RunConfig) -> Scenario:

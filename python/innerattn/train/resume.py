@@ -16,12 +16,16 @@ from innerattn.train.metrics import MetricsFile
 from innerattn.train.parts import Parts
 from innerattn.train.row_files import FORMAT as ROWS_FORMAT
 from innerattn.train.row_files import file_name, read_rows
-from innerattn.train.saved import INFO, STATE_FORMAT, whole_checkpoints
+from innerattn.train.saved import INFO, STATE_FORMAT, nothing_was_saved, whole_checkpoints
 from innerattn.train.weights import FORMAT, MOST_BYTES, tensors_in
 
 
 class NothingToResumeError(RunError):
     """A run has no checkpoint that its training could go on from."""
+
+
+class NothingSavedError(NothingToResumeError):
+    """A training was stopped before its first checkpoint; it can begin anew in its folder."""
 
 
 class DamagedCheckpointError(RunError):
@@ -86,7 +90,8 @@ def read_saved(run: Path) -> Saved:
     """The newest checkpoint of a run.
 
     Raises:
-        NothingToResumeError: the run is done, or has no checkpoint that it could go on from.
+        NothingToResumeError: the run is done, or has no checkpoint that it could go on from;
+            `NothingSavedError` if it was stopped before its first one.
         DamagedCheckpointError: a file of the checkpoint is damaged.
         RunError: there is no run, or a file of it is damaged.
         ConfigError: its configuration is not valid.
@@ -98,6 +103,8 @@ def read_saved(run: Path) -> Saved:
     folder = run / "checkpoints"
     number = newest_checkpoint(run)
     if number is None:
+        if nothing_was_saved(run, files.info):
+            raise NothingSavedError(f"{run}: was stopped before its first checkpoint")
         raise NothingToResumeError(f"{run}: holds no checkpoint that training could go on from")
     name = f"checkpoints/{number}"
     try:

@@ -18,6 +18,7 @@ from torch import Tensor
 
 from innerattn.config.files import sync_folder, write_whole
 from innerattn.errors import RunError
+from innerattn.records.run_folder import RunInfo
 from innerattn.train.checkpoint_info import (
     SCHEMA_VERSION,
     Best,
@@ -148,6 +149,16 @@ class Checkpoints:
         self.name_latest(newest)
         self._drop(whole_checkpoints(self.folder))
 
+    def clear(self) -> None:
+        """Remove what a process left behind that was killed before its first checkpoint.
+
+        Raises:
+            OSError: something cannot be removed.
+        """
+        _remove(_entries(self.folder))
+        run = self.folder.parent
+        _remove(entry for entry in _entries(run) if _PARTIAL.fullmatch(entry.name))
+
     def keep_last_weights_only(self, number: int, best: Best | None) -> None:
         """Remove all that a run needs to go on, once it is done.
 
@@ -188,6 +199,12 @@ def whole_checkpoints(folder: Path) -> list[int]:
     """Numbers of the checkpoints in a folder ``checkpoints`` that a run can go on from, sorted."""
     numbers = (entry for entry in _entries(folder) if entry.name.isdigit())
     return sorted(int(entry.name) for entry in numbers if (entry / INFO).is_file())
+
+
+def nothing_was_saved(run: Path, info: RunInfo) -> bool:
+    """Whether a training was stopped before it saved anything: it can begin anew in its folder."""
+    latest = run / "checkpoints" / "latest"
+    return info.state != "done" and info.weights_sha256 is None and not os.path.lexists(latest)
 
 
 def refuse_not_finite(tensors: Mapping[str, Tensor], env_steps: int) -> None:
