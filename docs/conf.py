@@ -15,6 +15,7 @@ from posixpath import dirname, join, normpath
 from docutils import nodes
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
+from sphinx.util.osutil import relative_uri
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
@@ -108,9 +109,19 @@ def name_pages_by_title(app: Sphinx, tree: nodes.document, name: str) -> None:
             link.children = [nodes.Text(app.env.titles[page].astext())]
 
 
+def open_images(app: Sphinx, tree: nodes.document, name: str) -> None:
+    """A click on a picture shows it in its own size."""
+    for image in list(tree.findall(nodes.image)):
+        if image["uri"] in app.env.images:
+            folder = relative_uri(app.builder.get_target_uri(name), "_images")
+            file = f"{folder}/{app.env.images[image['uri']][1]}"
+            image.replace_self(nodes.reference("", "", image.deepcopy(), refuri=file))
+
+
 def setup(app: Sphinx) -> None:
     """Connect the functions above."""
     app.connect("doctree-resolved", name_pages_by_title)
+    app.connect("doctree-resolved", open_images)
     app.connect("env-get-outdated", pages_of_the_program)
     app.connect("source-read", load_lazy_names)
     app.add_lexer("mermaid", TextLexer)

@@ -55,6 +55,12 @@ def test_plain_lines_every_ten_seconds() -> None:
     ]
 
 
+def test_the_rest_is_not_told_from_the_slow_start() -> None:
+    steps = [progress(20.0, 50), progress(40.0, 100)]
+    lines = shown(terminal=False, steps=steps).splitlines()
+    assert [line.split(" | ")[1] for line in lines] == ["-:-- left", "6:00 left"]
+
+
 def test_a_last_batch_may_pass_the_end() -> None:
     (line,) = shown(terminal=False, steps=[progress(100.0, 1010, None)]).splitlines()
     assert line.startswith("training 100% | 0:00 left | no episode yet")

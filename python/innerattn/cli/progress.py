@@ -27,6 +27,8 @@ class Work:
     """Shows one piece of work; a context manager, so that the bar is put away."""
 
     title = "working"
+    tells_from: ClassVar[float] = 0.0
+    """Share of the work from which on its pace says how long the rest takes."""
 
     def __init__(
         self, console: Console | None = None, clock: Callable[[], float] = time.monotonic
@@ -67,8 +69,8 @@ class Work:
 
         The rest is taken to go at the pace so far.
         """
-        now = self._clock()
-        left_s = (now - self._start) * (total / done - 1.0) if done > 0.0 else None
+        now, known = self._clock(), done > self.tells_from * total
+        left_s = (now - self._start) * (total / done - 1.0) if known else None
         self._put(now, done / total, note, left_s)
 
     def _put(self, now: float, share: float, note: str, left_s: float | None) -> None:
@@ -95,6 +97,7 @@ class Training(Work):
     """Shows training; call it with each `innerattn.train.Progress`."""
 
     title = "training"
+    tells_from = _TELLING  # the first updates may be compiled
 
     def __init__(
         self,
