@@ -35,6 +35,8 @@ _BATCH, _DAMAGE = "tests/envs/test_batch_", "tests/records/test_damage.py::test_
 _NEIGHBOURS = f"{_BATCH}env.py::test_threads_and_neighbours_change_no_byte"
 _FUZZ_SNAPSHOTS = "tests/envs/test_batch_snapshots.py::test_forged_snapshots_are_refused_or_go_on"
 
+ELSEWHERE = "benches/digests_elsewhere.py"
+"""The command that runs the committed digests on other processors."""
 SOAK = "benches/soak.py --parts"
 """The command of the soak; a name follows."""
 
@@ -182,8 +184,7 @@ ROWS: tuple[Row, ...] = (
         "Ten scenarios do what `tests/cross/digests.json` says, optimised and with assertions.",
         ("tests/cross/test_digests.py",),
         ("digests::",),
-        missing="other processors than the one above, and `enhanced-determinism` of rapier, which "
-        "is off",
+        long=(ELSEWHERE,),
     ),
     Row(
         "tunnelling, escape",

@@ -189,7 +189,7 @@ pub fn sum_of_angles(one: f32, other: f32) -> f32 {
 /// The standard deviation of two independent errors, no larger than one fault's may be.
 #[must_use]
 pub fn independent_errors(one: f32, other: f32) -> f32 {
-    one.hypot(other).min(MOST_ERROR as f32)
+    libm::hypotf(one, other).min(MOST_ERROR as f32)
 }
 
 /// The share of steps in which at least one of two independent faults strikes.

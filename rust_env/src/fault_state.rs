@@ -160,7 +160,7 @@ impl FaultState {
         let turned = if drive.turn == 0.0 {
             command
         } else {
-            let (sin, cos) = drive.turn.sin_cos();
+            let (sin, cos) = libm::sincosf(drive.turn);
             Vec2::new(cos * command.x - sin * command.y, sin * command.x + cos * command.y)
         };
         (turned * drive.force, drive.speed)
@@ -242,7 +242,7 @@ impl FaultState {
                 let mut stream =
                     Stream::new(now.seed, now.stream, now.episode, Purpose::FaultOnsets).resume(self.words);
                 // The time to the first of events at this rate is exponential; a step holds its floor.
-                let steps = -(1.0 - stream.unit()).ln() / rate;
+                let steps = -libm::logf(1.0 - stream.unit()) / rate;
                 self.words = stream.words();
                 earliest.saturating_add(steps as u32)
             }
@@ -326,8 +326,11 @@ fn freezing(levels: &Levels) -> bool {
 }
 
 /// Two independent standard normal numbers (Box & Muller 1958); always two words.
+///
+/// As everywhere in the worlds, logarithm and sine are those of `libm`: those of the system differ in
+/// the last bits from one system to another.
 fn normal(stream: &mut Stream) -> Vec2 {
-    let radius = (-2.0 * (1.0 - stream.unit()).ln()).sqrt();
-    let (sin, cos) = (std::f32::consts::TAU * stream.unit()).sin_cos();
+    let radius = (-2.0 * libm::logf(1.0 - stream.unit())).sqrt();
+    let (sin, cos) = libm::sincosf(std::f32::consts::TAU * stream.unit());
     Vec2::new(radius * cos, radius * sin)
 }
