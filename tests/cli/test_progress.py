@@ -61,6 +61,14 @@ def test_the_rest_is_not_told_from_the_slow_start() -> None:
     assert [line.split(" | ")[1] for line in lines] == ["-:-- left", "6:00 left"]
 
 
+def test_a_run_that_goes_on_keeps_its_pace() -> None:
+    out = io.StringIO()
+    seconds = iter([1000.0, 1015.0])
+    with Training(Console(file=out, width=80), clock=lambda: next(seconds)) as show:
+        show(progress(60.0, 400))  # 45 s of them before this process
+    assert out.getvalue().startswith("training  40% | 1:30 left | ")
+
+
 def test_a_last_batch_may_pass_the_end() -> None:
     (line,) = shown(terminal=False, steps=[progress(100.0, 1010, None)]).splitlines()
     assert line.startswith("training 100% | 0:00 left | no episode yet")

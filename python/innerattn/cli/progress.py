@@ -64,13 +64,14 @@ class Work:
         if self._bar is not None:
             self._bar.stop()
 
-    def show(self, done: float, total: float, note: str) -> None:
+    def show(self, done: float, total: float, note: str, worked_s: float = 0.0) -> None:
         """Show that ``done`` of ``total`` units are done, and a note.
 
-        The rest is taken to go at the pace so far.
+        The rest is taken to go at the pace so far. What goes on was begun before this process:
+        ``worked_s`` seconds of work were done at least.
         """
         now, known = self._clock(), done > self.tells_from * total
-        left_s = (now - self._start) * (total / done - 1.0) if known else None
+        left_s = max(now - self._start, worked_s) * (total / done - 1.0) if known else None
         self._put(now, done / total, note, left_s)
 
     def _put(self, now: float, share: float, note: str, left_s: float | None) -> None:
@@ -125,7 +126,8 @@ class Training(Work):
             f"{progress.env_steps / seconds:,.0f} env-steps/s",
             _agreement(progress) if progress.stage == "imitating" else _loss(progress, seconds),
         ]
-        self.show(progress.env_steps, progress.total_env_steps, " | ".join(parts))
+        note = " | ".join(parts)
+        self.show(progress.env_steps, progress.total_env_steps, note, progress.seconds)
 
     def _rescues(self, rescues: float) -> str:
         score = None
