@@ -197,7 +197,10 @@ class TD(ActorCritic):
 
     def _new_replay(self, reward_parts: int) -> Replay:
         capacity = self._config.replay_capacity
-        return Replay(capacity, self._team, self._data_seed, self._device, reward_parts)
+        try:
+            return Replay(capacity, self._team, self._data_seed, self._device, reward_parts)
+        except MemoryError as error:
+            raise MemoryError(f"td.replay_capacity = {capacity}: {error}") from error
 
     def _update_networks(
         self,

@@ -40,7 +40,10 @@ class Imitation:
         self._env, self._learner, self._collector = env, learner, collector
         capacity = min(self._config.memory_env_steps, self._config.env_steps + env.num_envs)
         shape = (capacity, env.num_robots, env.obs_width)
-        self._memory = _Memory(shape, config.train.seed)
+        try:
+            self._memory = _Memory(shape, config.train.seed)
+        except MemoryError as error:
+            raise MemoryError(f"imitation.memory_env_steps = {capacity}: {error}") from error
         self._pending_env_steps = 0
 
     @property

@@ -18,6 +18,7 @@ from innerattn.train.build import build_learner, team_of
 from innerattn.train.checkpoint_info import Stage
 from innerattn.train.collect import Collector
 from innerattn.train.imitate import Imitation
+from innerattn.train.memory import refuse_what_does_not_fit
 from innerattn.train.metrics import Interval
 from innerattn.train.potential import unfitted_potential
 from innerattn.train.schedule import Schedule
@@ -52,6 +53,7 @@ class Parts:
         self.collector = Collector(env, self.learner, device, self.schedule, stagger)
         warm = stage == "imitating" and config.train.warm_start != "none"
         self.imitation = Imitation(config, env, self.learner, self.collector) if warm else None
+        refuse_what_does_not_fit(self.rings(stage), config)
         actions = team_of(config, env).actions
         self.attention = AttentionLog(env.robot_names, env.scenario.episode_steps, actions)
         self.interval = Interval()
