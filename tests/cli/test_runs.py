@@ -73,6 +73,15 @@ def test_scripts_win_over_runs(runs: Path) -> None:
         named_policy("gredy", ("random", "greedy"))
 
 
+@pytest.mark.parametrize(
+    ("wrong", "meant"), [("lates", "latest"), ("a-1x", "a-1"), ("zoo:mixd", "zoo:mixed")]
+)
+def test_a_misspelt_run_is_asked_for(runs: Path, wrong: str, meant: str) -> None:
+    assert (runs / "a-1").is_dir()
+    with pytest.raises(RunError, match=f", did you mean {meant}\\?$"):
+        named_policy(wrong, ("random", "greedy"))
+
+
 def test_without_runs_there_is_no_latest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(RunError, match="latest: no run is in runs yet"):
@@ -90,6 +99,8 @@ def test_commands_take_names(
     few = ["--episodes", "4", "--score-episodes", "6", "--long-episodes", "2"]
     assert main(["evaluate", "latest", *few, "--json", "-"]) == 0
     assert json.loads(capsys.readouterr().out)["policy"] == "mine-s0"
+    assert main(["evaluate", "latest", *few, "--quiet"]) == 0
+    assert capsys.readouterr().out.startswith(f"{Path('runs', 'mine-s0')}: ")
     assert main(["replay", "mine", "-o", "a.html"]) == 0
     assert main(["report", "latest", "-o", "b.html"]) == 0
     assert (tmp_path / "a.html").exists()

@@ -15,7 +15,9 @@ from innerattn.cli.runs import named_policy
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
 from innerattn.errors import ConfigError
+from innerattn.policies import SCRIPTED
 from innerattn.report.tables.evaluation import print_summary, result_line
+from innerattn.zoo import in_zoo
 
 if TYPE_CHECKING:
     from innerattn.evaluate import Evaluation
@@ -72,11 +74,12 @@ class Evaluate(LongCommand):
         )
         if self.json is not None:
             write_whole(self.json, f"{document}\n".encode())
-        self.say_result(f"{self.policy}: {result_line(evaluation.summary)}")
+        shown = self.policy if in_zoo(self.policy) else named_policy(self.policy, SCRIPTED)
+        self.say_result(f"{shown}: {result_line(evaluation.summary)}")
         return 0
 
     def _measure(self) -> Evaluation:
-        from innerattn.evaluate import SCRIPTED, evaluate_policy, evaluate_run, scripted_policy
+        from innerattn.evaluate import evaluate_policy, evaluate_run, scripted_policy
         from innerattn.records.run_folder import read_config
 
         policy = named_policy(self.policy, SCRIPTED)

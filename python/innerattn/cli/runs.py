@@ -8,7 +8,7 @@ from pathlib import Path
 
 from innerattn.config.near import did_you_mean
 from innerattn.errors import RunError
-from innerattn.zoo import PREFIX, run_path
+from innerattn.zoo import PREFIX, run_path, zoo_names
 
 RUNS = Path("runs")
 """Where `innerattn train` makes run folders, unless it is told another place."""
@@ -36,7 +36,7 @@ def named_run(name: str) -> Path:
     if not name or os.path.lexists(path):
         return path
     if name.startswith(PREFIX):
-        return run_path(name)
+        return _zoo_team(name)
     if name == LATEST:
         runs = _runs()
         if not runs:
@@ -65,9 +65,18 @@ def named_policy(name: str, scripts: Collection[str]) -> str:
     if not found.exists():
         raise RunError(
             f"{name}: neither a run's folder nor one of {', '.join(scripts)}"
-            f"{did_you_mean(name, scripts)}"
+            f"{did_you_mean(name, [*scripts, LATEST, *(run.name for run in _runs())])}"
         )
     return str(found)
+
+
+def _zoo_team(name: str) -> Path:
+    """The folder of `zoo:NAME`; if there is none, the message asks for the nearest name."""
+    try:
+        return run_path(name)
+    except RunError as error:
+        known = [f"{PREFIX}{one}" for one in zoo_names()]
+        raise RunError(f"{error}{did_you_mean(name, known)}") from None
 
 
 def _runs() -> list[Path]:

@@ -70,8 +70,8 @@ def _turning_columns(scenario: Scenario, names: Sequence[str]) -> VectorColumns:
     if asymmetry is not None:
         key, what = asymmetry
         raise ConfigError(
-            f"scenario.{key}: network.symmetry must be 'none' where {what}; "
-            "a turned world would be another one"
+            f"scenario.{key}: network.symmetry must be 'none' where {what}, because a turned world "
+            "would be another one; --network.symmetry none sets it, or take another budget"
         )
     return vector_columns(names)
 
