@@ -8,5 +8,7 @@ from innerattn.envs import BatchEnv
 with BatchEnv(Scenario(), 3, copy=False) as env:
     obs = env.reset()
     print(len(ctypes.string_at(obs.ctypes.data, obs.nbytes)), "bytes are there", flush=True)
-    ctypes.string_at(obs.ctypes.data + obs.nbytes, 1)
+    # A single byte would be read by Python itself, which nobody watches; more are copied by
+    # `memcpy`, which is watched.
+    ctypes.string_at(obs.ctypes.data, obs.nbytes + 1)
     print("nobody noticed the byte after them")
