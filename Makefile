@@ -82,6 +82,7 @@ bench: setup ## speed of worlds and learner on this machine, beside their peers;
 	python benches/view_cost.py
 	python benches/frame_time.py
 	python benches/checkpoint_cost.py
+	python benches/exported_call.py
 	python benches/time_to_score.py
 	python benches/compare_learner.py $(if $(MAAC),--maac "$(MAAC)")
 

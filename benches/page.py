@@ -53,14 +53,14 @@ def system(*packages: str) -> str:
     return f"{processor}, {cores} cores, Python {python}, {versions}"
 
 
-def publish(part: str, text: str) -> None:
-    """Print a text and put it into a part of the page on speed.
+def publish(part: str, text: str, page: Path = PERFORMANCE) -> None:
+    """Print a text and put it into a part of a page.
 
     Raises:
         SystemExit: the page has no such part.
     """
     print(text, flush=True)
     try:
-        fill(PERFORMANCE, part, text)
+        fill(page, part, text)
     except RunError as error:
         sys.exit(str(error))
