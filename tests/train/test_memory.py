@@ -57,4 +57,5 @@ def test_only_what_the_run_fills_counts_and_measuring_needs_none(
     monkeypatch.setattr("innerattn.train.memory.free_bytes", lambda: 20_000_000)
     run = train(config, tmp_path / "run")
     monkeypatch.setattr("innerattn.train.memory.free_bytes", lambda: 0)
+    monkeypatch.setattr("innerattn.learn.td.Replay", None)
     assert evaluate_run(run).summary.standard.episodes > 0

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
+from functools import cached_property
 
 import torch
 from torch import Tensor, nn
@@ -52,7 +53,6 @@ class TD(ActorCritic):
     Attributes:
         target_actor: Slow copy of the policies.
         target_critic: Slow copy of the critics.
-        replay: Past transitions.
     """
 
     _metric_names = _METRICS
@@ -67,7 +67,7 @@ class TD(ActorCritic):
         device: torch.device,
         dtype: torch.dtype = torch.float32,
     ) -> None:
-        """Build networks, optimisers and replay.
+        """Build networks and optimisers.
 
         Args:
             team: What is known of the team.
@@ -95,7 +95,6 @@ class TD(ActorCritic):
         self._gamma = td.gamma
         self._target_form = _TARGETS[td.entropy_target]
         self._policy_loss = _POLICY_LOSSES[td.policy_gradient]
-        self.replay = self._new_replay(1)
         self.target_actor = copy.deepcopy(self.actor).requires_grad_(False)
         self.target_critic = copy.deepcopy(self.critic).requires_grad_(False)
         self._networks: TDNetworks = TDNetworks(
@@ -105,6 +104,15 @@ class TD(ActorCritic):
             Network(self.target_critic),
         )
         self._pending_env_steps = 0
+
+    @cached_property
+    def replay(self) -> Replay:
+        """Past transitions; who only acts never asks for them, and needs no memory for them.
+
+        Raises:
+            MemoryError: There is not that much.
+        """
+        return self._new_replay(1)
 
     def follow(self, scheduled: Scheduled) -> None:
         """Take over discount, temperature and weights of rewards; see `ScheduledLearner.follow`."""
