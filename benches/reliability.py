@@ -17,6 +17,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from statistics import median
 
 from reliability_kept import FILE, PAGE, ROOT, Kept, Result, commit, keep, now, read
 from reliability_rows import ROWS, Row
@@ -82,7 +83,7 @@ def line_of(row: Row, every: Mapping[str, Kept]) -> list[str]:
     kept = [every[name] for name, tests in there.items() if every[name].tests == tests]
     missing = [row.missing] if row.missing else []
     missing += [f"`{name}`" for name in row.long if name not in there]
-    notes = [note for one in kept for note in one.result.notes]
+    notes = [note for one in kept for note in (*one.result.notes, *_spread(one.result.measured))]
     what = " ".join([row.what, *notes, *(f"Not tested: {one}." for one in missing)])
     if not needed:
         return [row.name, what, "not tested", "", ""]
@@ -94,6 +95,14 @@ def line_of(row: Row, every: Mapping[str, Kept]) -> list[str]:
     tests = f"{passed}" + (f", {failed} failed" if failed else "")
     when = "; ".join(dict.fromkeys(f"{one.date}, {one.commit}" for one in kept))
     return [row.name, what, holds, tests, when]
+
+
+def _spread(measured: Mapping[str, Sequence[float]]) -> list[str]:
+    """Median and largest of the numbers that tests recorded, a sentence for each name."""
+    return [
+        f"{name[0].upper()}{name[1:]}: median {median(found):.2f}, longest {max(found):.2f}."
+        for name, found in sorted(measured.items())
+    ]
 
 
 def publish(file: Path, page: Path) -> None:

@@ -189,7 +189,8 @@ ROWS: tuple[Row, ...] = (
     Row(
         "tunnelling, escape",
         "Ten million env-steps with each engine: no robot leaves the arena or passes another. "
-        "Masses beyond 16 : 1 are refused with `rapier`.",
+        "Overlaps stay below 5 % of a radius, and below 15 % where robots move as far in a substep "
+        "as `rapier` takes. Masses beyond 16 : 1 are refused with `rapier`.",
         ("tests/envs/test_unequal_masses.py",),
         ("containment::", "speed::"),
     ),

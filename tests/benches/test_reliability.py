@@ -117,6 +117,9 @@ def test_what_a_test_measures_is_kept(tmp_path: Path) -> None:
     found = run_row(Row("x", "", (str(tmp_path / "test_some.py"),)))
     assert (found.passed, found.failed) == (3, 0)
     assert found.measured == {"seconds to the end": [0.5, 0.25, 4.0]}
+    assert shown(Row("x", ".", ("a",)), x=found)[0] == (
+        ". Seconds to the end: median 0.50, longest 4.00."
+    )
     keep(tmp_path / "kept.json", "x", Kept(found, ("a",), "2026-01-02", "abc", "m"))
     assert read(tmp_path / "kept.json")["x"].result == found
 
