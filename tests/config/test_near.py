@@ -80,3 +80,8 @@ def test_a_need_of_nobody_is_named(need: str, meant: str) -> None:
 def test_too_few_robots_for_a_need_are_told_as_before() -> None:
     with pytest.raises(ConfigError, match="the team has no distinct able robot for each need"):
         Scenario().replace(tasks=[{"name": "flood", "needs": ["food"] * 3}])
+
+
+def test_a_file_in_place_of_a_preset_is_told_how_files_are_read() -> None:
+    with pytest.raises(ConfigError, match=r"single; Scenario\.from_toml reads a file$"):
+        Scenario.preset("mixed.toml")

@@ -142,6 +142,8 @@ def _line(event: Any, argv: Sequence[str], prog: str) -> str | None:
             known = [one for one in _words(metavar) or event.choices if one != "None"]
             near = nearest(event.value, known)
             end = f", did you mean {near}?" if near else ""
+            if option == "--preset" and event.value.endswith(".toml"):
+                end = "; --scenario reads a file"
             place = f"{option} {event.value}" if option else event.value
             return f"{place}: must be {_listed(known)}{end}"
         case "InstantiationFailure" if event.argument is not None:

@@ -37,9 +37,10 @@ def preset_table(folder: str, name: str) -> dict[str, Any]:
     known = preset_names(folder)
     if name not in known:
         what = folder.removesuffix("s")
+        is_file = what == "scenario" and name.endswith(".toml")
         raise ConfigError(
             f"unknown {what} preset {name!r}: known are {', '.join(known)}"
-            f"{did_you_mean(name, known, repr)}"
+            + ("; Scenario.from_toml reads a file" if is_file else did_you_mean(name, known, repr))
         )
     return tomllib.loads((PRESETS / folder / f"{name}.toml").read_text("utf-8"))
 
