@@ -65,7 +65,7 @@ def contestants(engine: str) -> dict[str, Step]:
         if find_spec("vmas"):
             from torchrl.envs.libs.vmas import VmasEnv
 
-            peer = VmasEnv("simple_spread", NUM_ENVS, max_steps=25, n_agents=4)
+            peer = VmasEnv("simple_spread", num_envs=NUM_ENVS, max_steps=25, n_agents=4)
             steps["VmasEnv (its simple spread)"] = of_torchrl(peer)
     return steps
 
