@@ -94,6 +94,21 @@ def test_in_training(sent: signal.Signals, tiny: list[str], tmp_path: Path) -> N
     assert f"go on with: innerattn train --resume {run}" in err
 
 
+def test_a_second_one_ends_at_once(tiny: list[str], tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    with begin(run, [*tiny, "--train.env-steps", "100000000"]) as process:
+        while not (run / "metrics.jsonl").exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.02)  # the first may have ended it by then
+        process.send_signal(signal.SIGINT)
+        err = process.communicate(timeout=120)[1]
+    assert process.returncode == 130
+    assert err.count("innerattn: interrupted") == 1
+    assert "Traceback" not in err
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(100))
 def test_at_any_time(

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 
 def without(libraries: tuple[str, ...], code: str) -> "subprocess.CompletedProcess[str]":
     """A program in a Python that lacks some libraries."""
-    code = f"import sys; sys.modules.update(dict.fromkeys({libraries!r})); {code}"
+    code = f"import sys; sys.modules.update(dict.fromkeys({libraries!r}))\n{code}"
     command = [sys.executable, "-c", code]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
@@ -42,6 +42,22 @@ def test_without_its_extra_the_command_says_what_to_install(library: str) -> Non
     done = command((library,), "train")
     wanted = f"innerattn: error: the command needs {library}: pip install 'innerattn[train]'\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", wanted)
+
+
+@pytest.mark.parametrize(("ended", "out"), [(130, "said\n"), (0, "said\nfreed\n")])
+def test_what_was_interrupted_does_not_wait_for_pythons_end(ended: int, out: str) -> None:
+    code = f"""
+import atexit, importlib, sys
+atexit.register(print, "freed")
+def run(_):
+    print("said")
+    return {ended}
+importlib.import_module("innerattn.cli.main").main = run
+from innerattn.cli.start import main
+sys.exit(main())
+"""
+    done = without((), code)
+    assert (done.returncode, done.stdout, done.stderr) == (ended, out, "")
 
 
 def test_a_library_that_is_missed_later_is_named_too(

@@ -9,14 +9,21 @@ import sys
 from collections.abc import Sequence
 
 from innerattn.errors import missing_library
-from innerattn.signals import handle_requests, interrupt, leave
+from innerattn.signals import (
+    end_at_once,
+    handle_requests,
+    interrupt,
+    is_of_interruption,
+    leave,
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command, or say in one line which of its libraries is not installed.
 
     Args:
-        argv: the arguments; none: those of the process.
+        argv: the arguments; none: those of the process, which then ends at once if a signal asked
+            for it.
 
     Returns:
         The exit code, as of `innerattn.cli.main.main`; 1 if a library is missing.
@@ -37,4 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"innerattn: error: {missing}", file=sys.stderr)
         return 1
     handle_requests(interrupt)
-    return run(arguments)
+    code = run(arguments)
+    if argv is None and is_of_interruption(code):
+        end_at_once(code)
+    return code
