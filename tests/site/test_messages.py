@@ -1,15 +1,18 @@
 """Every message that the page explains is one that the program gives, word for word."""
 
+import builtins
 import re
 import shutil
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from made_export import made_export
 
 from innerattn.cli.main import main
+from innerattn.cli.start import main as start
 from innerattn.errors import InnerattnError, UnsealedRunWarning
 from innerattn.policies import Exported
 
@@ -38,6 +41,10 @@ abilities = ["water"]
 max_speed_mps = 1.0
 mass_kg = 1.0
 """
+STALE = "own.time: is 0.500 s before now: must be at most 0.3 s away"
+UNKNOWN = "own.heading: is unknown; known are available, faults, position, time, velocity"
+SHORT = "row: has dtype float64 and shape (3,): must hold 44 numbers"
+TORCH = "needs torch: pip install 'innerattn[train]'"
 ALTERED = "is not the file that manifest.json names; it was altered"
 CALLS: dict[str, Callable[[], list[str]]] = {
     "--sede: unknown option, did you mean --seed?": lambda: ["train", "--sede", "1"],
@@ -121,13 +128,43 @@ def test_readings_and_files_of_robots(tmp_path: Path) -> None:
     names = team.robot_names[1:]
     readings = {"own": body, "teammates": dict.fromkeys(names, body), "victims": []}
     readings["teammates"] = {**readings["teammates"], "food_1": bad}  # type: ignore[dict-item]
-    with pytest.raises(InnerattnError) as caught:
-        team.decide("food_0", readings)
-    assert one_of_the_page(str(caught.value)).startswith("teammates.food_1.position")
+    assert refusal(team, readings).startswith("teammates.food_1.position")
+    timed = {**readings, "teammates": {}, "own": {**body, "time": 1.0}, "victims_time": 1.0}
+    assert refusal(team, {**timed, "now": 1.5}) == STALE
+    assert refusal(team, {**timed, "own": {**body, "heading": 0.0}}) == UNKNOWN
+    assert refusal(team, [0.0, 0.0, 0.0]) == SHORT
     shutil.copy(other / "weights.safetensors", one / "weights.safetensors")
     with pytest.raises(InnerattnError) as caught:
         Exported(one, backend="numpy")
     assert one_of_the_page(str(caught.value)) == "is of another team"
+
+
+def refusal(team: Exported, readings: object) -> str:
+    """The message of the page with which a team refuses readings."""
+    with pytest.raises(InnerattnError) as caught:
+        team.decide("food_0", readings)  # type: ignore[arg-type]
+    return one_of_the_page(str(caught.value))
+
+
+def test_a_library_that_is_not_installed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    missing = ModuleNotFoundError("No module named 'torch'", name="torch")
+    monkeypatch.setattr(builtins, "__import__", failing(missing, "innerattn.cli.main"))
+    assert start(["info"]) == 1
+    assert one_of_the_page(capsys.readouterr().err) == TORCH
+
+
+def failing(error: Exception, module: str) -> Callable[..., object]:
+    """An import that fails for one module."""
+    real = builtins.__import__
+
+    def imported(name: str, *rest: Any) -> object:
+        if name == module:
+            raise error
+        return real(name, *rest)
+
+    return imported
 
 
 def test_a_training_too_short_to_learn(
@@ -145,6 +182,7 @@ def test_every_message_of_the_page_was_tried() -> None:
         "has no manifest.json",
         "teammates.food_1.position",
         "is of another team",
+        *(STALE, UNKNOWN, SHORT, TORCH),
         "too few for one update; nothing was learnt from rewards",
         "training diverged",  # tests/train/test_divergence.py
     }
