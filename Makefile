@@ -124,6 +124,7 @@ dist: $(VENV)/.installed ## wheel for manylinux2014 and source archive, into dis
 	maturin sdist --out dist
 
 smoke: dist ## try wheel and source archive in fresh environments of all PYTHONS that are here
+	@! tar tzf dist/*.tar.gz | grep -E '__pycache__|\.venvs|\.so$$' # nothing that was made here
 	@for python in $(PYTHONS); do \
 	if ! command -v $$python >/dev/null; then echo "$$python: not here, left out"; continue; fi; \
 	tests/smoke.sh $$python dist/*.whl || exit 1; done
