@@ -166,11 +166,22 @@ def test_the_table_of_baselines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     lines = page.read_text("utf-8").splitlines()
     first = "| `rllib-ppo` | 0.50 (0.50 to 0.50, 2 of 3 seeds) | not run | not run | 5 |"
     second = "| `torchrl-mappo` | not run | not run | 0.25 (0.00 to 0.50) | 5 |"
-    assert lines[4:6] == [first, second]
+    assert lines[2] == "Over the three situations the script `greedy` scores 0.88."
+    assert lines[6:8] == [first, second]
     assert lines[-5] == "| the script `greedy` | 0.88 | 0.88 | 0.88 |  |"
     assert sum("not run | not run | not run" in line for line in lines) == 9
     assert "seeds 0, 1, 2. 100 env-steps each" in lines[-3]
     assert "2 trainings at a time" in lines[-3]
+    known = enumerate(("ppo-inner", "mappo", "td-inner", "xuance-mappo"))
+    rows = {
+        (name, situation, 0, 100): row(place / 4, 0)
+        for place, name in known
+        for situation in baselines.SITUATIONS
+    }
+    assert baselines.summary(rows, 100) == (
+        "Over the three situations the best are `xuance-mappo` with 0.75, `td-inner` with 0.50 and "
+        "`mappo` with 0.25; the script `greedy` scores 0.88."
+    )
 
 
 def test_what_the_page_compares_was_trained_equally_long() -> None:
