@@ -102,8 +102,9 @@ def cell(found: Sequence[float]) -> str:
     """Mean and range over seeds, and how many they are if some are missing."""
     if not found:
         return "not run"
-    missing = "" if len(found) == len(SEEDS) else f", {len(found)} of {len(SEEDS)} seeds"
-    return f"{mean(found):.2f} ({min(found):.2f} to {max(found):.2f}{missing})"
+    told = [f"{min(found):.2f} to {max(found):.2f}"] if len(found) > 1 else []
+    told += [] if len(found) == len(SEEDS) else [f"{len(found)} of {len(SEEDS)} seeds"]
+    return f"{mean(found):.2f} ({', '.join(told)})"
 
 
 def overall(rows: dict[Key, Row], name: str, env_steps: int) -> float:
@@ -130,10 +131,18 @@ def summary(rows: dict[Key, Row], env_steps: int) -> str:
 
 
 def table(rows: dict[Key, Row], env_steps: int) -> str:
-    """A row for each name, best first: mean score by situation, mean seconds of a core."""
+    """A row for each name: mean score by situation, mean seconds of a core.
+
+    The best come first, those before all others that are known in every situation.
+    """
+
+    def place(name: str) -> tuple[bool, float]:
+        missing = any(not scores(rows, name, one, env_steps) for one in SITUATIONS)
+        return missing, -overall(rows, name, env_steps)
+
     head = ["trained with", *(f"`{one}`" for one in SITUATIONS), "seconds"]
     lines = [head, ["---", *["---:"] * (len(head) - 1)]]
-    for name in sorted(NAMES, key=lambda name: overall(rows, name, env_steps), reverse=True):
+    for name in sorted(NAMES, key=place):
         cells = [cell(scores(rows, name, one, env_steps)) for one in SITUATIONS]
         ours = [row for key, row in rows.items() if key[0] == name and key[3] == env_steps]
         cells.append(f"{mean(row['train_cpu_seconds'] for row in ours):.0f}" if ours else "not run")
@@ -147,7 +156,7 @@ def publish(rows: dict[Key, Row], env_steps: int, at_once: int) -> None:
     """Write what was found into the page."""
     seeds = ", ".join(str(seed) for seed in sorted({key[2] for key in rows if key[3] == env_steps}))
     note = (
-        f"Score: mean and range over the seeds {seeds}. {env_steps:,} env-steps each, one core "
+        f"Score: mean and range over seeds ({seeds}). {env_steps:,} env-steps each, one core "
         f"each, {at_once} training{'s' if at_once > 1 else ''} at a time, {date.today()}."
     )
     parts = (summary(rows, env_steps), table(rows, env_steps), note)

@@ -170,7 +170,7 @@ def test_the_table_of_baselines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert lines[6:8] == [first, second]
     assert lines[-5] == "| the script `greedy` | 0.88 | 0.88 | 0.88 |  |"
     assert sum("not run | not run | not run" in line for line in lines) == 9
-    assert "seeds 0, 1, 2. 100 env-steps each" in lines[-3]
+    assert "seeds (0, 1, 2). 100 env-steps each" in lines[-3]
     assert "2 trainings at a time" in lines[-3]
     known = enumerate(("ppo-inner", "mappo", "td-inner", "xuance-mappo"))
     rows = {
