@@ -10,12 +10,16 @@ from typing import Any
 from innerattn.errors import missing_library
 
 
-def lazy_names(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
+def lazy_names(
+    package: str, homes: Mapping[str, str], extras: Mapping[str, str] | None = None
+) -> Callable[[str], Any]:
     """A module's `__getattr__` for names that live in its submodules.
 
     Args:
         package: full name of the package.
         homes: the submodule of each name.
+        extras: the extra that brings all that a submodule needs, where libraries that it needs
+            come with several.
 
     Raises:
         MissingLibraryError: (when a name is asked for) its module needs a library that is not
@@ -28,7 +32,8 @@ def lazy_names(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
         try:
             found = getattr(import_module(f"{package}.{homes[name]}"), name)
         except ModuleNotFoundError as error:
-            if missing := missing_library(f"{package}.{name}", error):
+            extra = (extras or {}).get(homes[name], "")
+            if missing := missing_library(f"{package}.{name}", error, extra):
                 raise missing from error
             raise
         setattr(sys.modules[package], name, found)

@@ -80,6 +80,7 @@ def test_a_library_that_is_missed_later_is_named_too(
         ("RescueEnv", "gymnasium", "gym"),
         ("RescueVectorEnv", "gymnasium", "gym"),
         ("RescueTorchRLEnv", "tensordict", "torchrl"),
+        ("RescueTorchRLEnv", "torch", "torchrl"),  # that extra brings both
     ],
 )
 def test_a_view_without_its_library_says_what_to_install(

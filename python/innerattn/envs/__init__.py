@@ -39,4 +39,5 @@ __getattr__ = lazy_names(
         "env": "aec",
         "parallel_env": "parallel",
     },
+    {"torchrl": "torchrl"},  # it brings torch, too
 )
