@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_run import made_run
 
-from innerattn.config import RunConfig
+from innerattn.config import SCENARIOS, RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.evaluate import load_trained, run_episodes
@@ -39,8 +39,8 @@ def packed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return packing.pack(run.folder, "single", "quick", tmp_path / "zoo")
 
 
-def test_there_is_a_team_of_each_situation() -> None:
-    assert {"single", "double", "mixed"} <= set(zoo_names())
+def test_there_is_a_team_of_each_preset() -> None:
+    assert set(zoo_names()) == set(SCENARIOS)
 
 
 def test_the_zoo_is_small() -> None:
