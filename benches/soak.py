@@ -128,7 +128,7 @@ def soak_worlds(engine: str, env_steps: int) -> Soaked:
     """Random steps, with faults of the caller, resets of some worlds and snapshots now and then."""
     scenario = Scenario.preset("mixed-faults").replace(engine=engine)
     rng = np.random.default_rng(0)
-    total = max(env_steps // NUM_ENVS, 100)
+    total = max(-(-env_steps // NUM_ENVS), 100)
     watched, problems = Watched(), []
     with BatchEnv(scenario, NUM_ENVS, 0, copy=False) as env:
         env.reset()
