@@ -26,7 +26,7 @@ from page import machine, publish, table
 from innerattn.policies.exported import Exported
 
 PAGE = Path(__file__).parents[1] / "docs" / "deployment.md"
-TEAMS = ("zoo:mixed", "zoo:mixed-8")
+TEAMS = ("zoo:mixed", "zoo:mixed-16")
 RUNS, ROUNDS, CALLS = 3, 400, 20
 HEAD = ["team", "robots", "backend", "given", "clock [µs]", "core [µs]"]
 
