@@ -67,7 +67,9 @@ def has_newer(run: Path, number: int) -> bool:
 
 
 def debris(run: Path) -> list[str]:
-    return [str(path) for path in run.rglob("*") if PARTIAL.fullmatch(path.name)]
+    """Names of partial files and folders; a training may remove what is being looked through."""
+    entries = (name for _, folders, files in os.walk(run) for name in (*folders, *files))
+    return [name for name in entries if PARTIAL.fullmatch(name)]
 
 
 def kill_again_and_again(config: RunConfig, tmp_path: Path, times: int) -> None:
