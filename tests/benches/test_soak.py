@@ -1,43 +1,50 @@
 """The soak finds what grows, and nothing where nothing does."""
 
+import json
+import subprocess
 import sys
-import threading
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 import pytest
 from reliability_kept import read
 from reliability_rows import ROWS
-from soak import Soaked, Watched, main, result_of, soak_worlds, state
+from soak import Soaked, State, Watched, main, result_of, soak_worlds, state
 
 from innerattn.envs import BatchEnv
 
+BENCHES = Path(__file__).parents[2] / "benches"
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 
-def _watched_leak(file: Path) -> Soaked:
-    """What is said of work that keeps memory, a thread and a file."""
-    watched, go_on = Watched(), threading.Event()
-    waiting = threading.Thread(target=go_on.wait)
-    for share in (0.0, 0.1, 0.5):
-        watched.look(share)
-    with file.open("w"):
-        waiting.start()
-        held = np.ones(state().resident_bytes, np.uint8)
-        watched.look(0.95)
-    go_on.set()
-    waiting.join()
-    assert held.all()
-    return watched.soaked("x", 1, ["a problem"])
+LEAK = """
+import json, sys, threading
+from dataclasses import asdict
+import numpy as np
+from soak import Watched, state
+watched, go_on = Watched(), threading.Event()
+waiting = threading.Thread(target=go_on.wait)
+for share in (0.0, 0.1, 0.5):
+    watched.look(share)
+with open(sys.argv[1], "w"):
+    waiting.start()
+    held = np.ones(state().resident_bytes, np.uint8)
+    watched.look(0.95)
+go_on.set()
+waiting.join()
+print(json.dumps(asdict(watched.soaked("x", 1, ["a problem"]))))
+"""
+"""Keeps memory, a thread and a file, and prints what is said of that."""
 
 
 def test_memory_threads_and_files_that_stay_are_told(tmp_path: Path) -> None:
     # In a process of its own: here, a thread or a file of an earlier test may end meanwhile.
-    with ProcessPoolExecutor(1, get_context("spawn")) as process:
-        found = process.submit(_watched_leak, tmp_path / "file").result()
+    command = [sys.executable, "-c", LEAK, str(tmp_path / "file")]
+    done = subprocess.run(command, cwd=BENCHES, check=True, capture_output=True, text=True)
+    told = json.loads(done.stdout)
+    warm, end = (State(**told.pop(when)) for when in ("warm", "end"))
+    found = Soaked(**{**told, "problems": tuple(told["problems"])}, warm=warm, end=end)
     problem, memory, threads, files = found.problems
     assert problem == "a problem"
     kept, told = result_of(found), result_of(replace(found, problems=()))

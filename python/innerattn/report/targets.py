@@ -16,7 +16,7 @@ from innerattn.experiments.attention.arms import METHODS as ATTENTION_METHODS
 from innerattn.experiments.attention.arms import SITUATIONS as ATTENTION_SITUATIONS
 from innerattn.experiments.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
 from innerattn.experiments.crossed.arms import plan_crossed
-from innerattn.experiments.learning.ablations import plan_ablations
+from innerattn.experiments.learning.recipe import plan_ablations
 from innerattn.experiments.learning.variants import CONTINUOUS, ENTITIES, WARM_START
 from innerattn.experiments.learning.variants import SITUATIONS as LEARNING_SITUATIONS
 from innerattn.experiments.plan import METHODS, SITUATIONS, PlannedRun, plan

@@ -9,12 +9,8 @@ import pytest
 from markdown_rows import rows_of
 from scipy import stats
 
-from innerattn.experiments.learning.ablations import (
-    ABLATIONS,
-    RECIPE,
-    plan_ablations,
-    read_ablations,
-)
+from innerattn.experiments.learning.ablations import read_ablations
+from innerattn.experiments.learning.recipe import ABLATIONS, RECIPE, plan_ablations
 from innerattn.experiments.run import FinishedRun
 from innerattn.report.learning.ablations import DIFFERENCES, FILES, write_ablations
 
