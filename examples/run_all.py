@@ -44,7 +44,7 @@ EXAMPLES = {
     "optuna": Example("optuna_search", 120_000, ("--trials", "2")),
     "benchmarl-mappo": Example("benchmarl_teams", 50_000, ("--algorithm", "mappo")),
     "benchmarl-masac": Example("benchmarl_teams", 24_000, ("--algorithm", "masac")),
-    "rllib-ppo": Example("rllib_ppo", 24_000),
+    "rllib-ppo": Example("rllib_ppo", 48_000),
     "xuance-mappo": Example("xuance_mappo", 50_000),
 }
 
