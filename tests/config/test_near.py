@@ -1,5 +1,7 @@
 """The word that was meant."""
 
+from pathlib import Path
+
 import pytest
 
 from innerattn.config import Scenario, load_run_config
@@ -59,6 +61,23 @@ def test_a_run_says_what_was_meant(key: str, told: str) -> None:
     with pytest.raises(ConfigError) as error:
         load_run_config(overrides={key: 1})
     assert str(error.value) == told
+
+
+@pytest.mark.parametrize(
+    ("key", "meant"),
+    [
+        ("situaton", ", did you mean scenario.situation?"),
+        ("gamma", ", did you mean td.gamma or ppo.gamma?"),
+        ("scenaro", ", did you mean scenario?"),
+        ("xyzzy", ""),
+    ],
+)
+def test_a_key_outside_sections_says_what_was_meant(key: str, meant: str, tmp_path: Path) -> None:
+    file = tmp_path / "run.toml"
+    file.write_text(f"{key} = 1\n")
+    with pytest.raises(ConfigError) as error:
+        load_run_config(config_file=file)
+    assert str(error.value) == f"{file}: {key}: unknown key{meant}"
 
 
 def test_unknown_presets_say_what_was_meant() -> None:

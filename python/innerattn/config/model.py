@@ -174,19 +174,31 @@ def _meant_key(model: type[BaseModel], location: Sequence[int | str]) -> str:
     *parents, last = location
     name = str(last)
     if len(parents) == 1:
-        others = [
-            f"{section}.{name}"
-            for section in model.model_fields
-            if any(name in one.model_fields for one in _models_of(model, section))
-            and section != parents[0]
-        ]
-        if others:
-            return f", did you mean {' or '.join(others)}?"
+        elsewhere = places_of_keys(model, without=str(parents[0]))
+        if name in elsewhere:
+            return f", did you mean {elsewhere[name]}?"
     here = [model]
     for part in parents:
         if isinstance(part, str):
             here = [inner for outer in here for inner in _models_of(outer, part)]
     return did_you_mean(name, [key for one in here for key in one.model_fields])
+
+
+def places_of_keys(model: type[BaseModel], without: str = "") -> dict[str, str]:
+    """Where the sections of a model have a key of a name: "td.gamma or ppo.gamma" by "gamma".
+
+    Args:
+        model: whose fields are sections.
+        without: name of a section to leave out.
+    """
+    places: dict[str, list[str]] = {}
+    for section in model.model_fields:
+        if section != without:
+            for key in dict.fromkeys(
+                key for one in _models_of(model, section) for key in one.model_fields
+            ):
+                places.setdefault(key, []).append(f"{section}.{key}")
+    return {key: " or ".join(found) for key, found in places.items()}
 
 
 def _models_of(model: type[BaseModel], key: str) -> list[type[BaseModel]]:

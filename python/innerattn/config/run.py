@@ -13,7 +13,7 @@ from typing import Any, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from innerattn.config.files import preset_names
-from innerattn.config.model import Model, config_error, values_for_digest
+from innerattn.config.model import Model, config_error, places_of_keys, values_for_digest
 from innerattn.config.near import did_you_mean
 from innerattn.config.ppo import PPO, PPOConfig
 from innerattn.config.registry import (
@@ -211,8 +211,10 @@ def _registered_section(name: str, given: object, run: type[RunConfig]) -> Algor
     """
     algorithm = algorithms().get(name)
     if algorithm is None:
-        known = (*run.model_fields, *algorithms())
-        raise ValueError(f"{name}: unknown key{did_you_mean(name, known)}")
+        known = {section: section for section in (*run.model_fields, *algorithms())}
+        if not isinstance(given, Mapping):  # no section, but perhaps a key of one
+            known |= places_of_keys(run)
+        raise ValueError(f"{name}: unknown key{did_you_mean(name, known, known.__getitem__)}")
     try:
         return algorithm.config.model_validate(given)
     except ValidationError as error:
