@@ -23,6 +23,7 @@ from innerattn.experiments.archive import FILE, read_archive, write_archive
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.report.attention import page as attention
+from innerattn.report.crossed import swapped
 from innerattn.report.learning import ablations
 from innerattn.report.learning.page import ATTENTION, SCORES
 from innerattn.report.marks import fill, marked
@@ -36,6 +37,7 @@ PLACES = {
 }
 """Where a report goes by its target and budget, and how the names of its figures begin."""
 KEPT = {
+    ("swapped", "short"): "swapped",
     ("attention", "fast"): "fast",
     ("learning-ablations", "fast"): "fast",
     ("learning", "strong"): "strong",
@@ -55,6 +57,7 @@ TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
         ("learning-warm-start", "quick", "warm_start_quick"),
     )
 } | {
+    ("swapped", "short"): (DOCS / "crossed.md", ({"swapped": (swapped.ANSWER, swapped.SHARES)},)),
     ("learning-ablations", "fast"): (
         DOCS / "learning.md",
         ({"ablations_fast": (ablations.DIFFERENCES,)},),

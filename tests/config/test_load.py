@@ -201,6 +201,19 @@ def test_tables_in_a_file_replace_lists(tmp_path: Path) -> None:
         ({"scenario.colour": 1}, r"^scenario\.colour: unknown key$"),
         ({"scenario.episode_steps": 0}, r"^scenario\.episode_steps = 0: must be"),
         ({"network.encoder": "rows"}, r"^network\.encoder = 'rows': must be 'flat' or 'entities'$"),
+        (
+            {"network.swapped_robots": ("food_0", "medical_0")},
+            "must be two robots of a kind, of food",
+        ),
+        ({"network.swapped_robots": ("food_1", "food_1")}, "must be two robots of a kind, of food"),
+        ({"network.swapped_robots": ("food_2", "food_2")}, "must be two robots of a kind, of food"),
+        (
+            {
+                "network.swapped_robots": ("food_0", "food_1"),
+                "network.parameter_sharing": "kind",
+            },
+            r"^network\.swapped_robots = \['food_0', 'food_1'\]: network",
+        ),
         ({"network.attention": "uniform"}, r"^network\.attention = 'uniform': train\.method"),
     ],
 )

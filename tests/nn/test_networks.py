@@ -3,7 +3,16 @@
 import pytest
 import torch
 
-from innerattn.nn import Actor, Critic, InnerAttention, PerRobotLinear, action_noise, sample_actions
+from innerattn.nn import (
+    Actor,
+    CentralCritic,
+    Critic,
+    InnerAttention,
+    PerRobotLinear,
+    action_noise,
+    sample_actions,
+    swap_robots,
+)
 
 R, B, D, A, W = 3, 6, 4, 5, 8
 
@@ -24,6 +33,31 @@ def test_linear_layers_of_robots_are_apart() -> None:
     torch.testing.assert_close(layer(x), expected)
     torch.testing.assert_close(layer.batch_last(x), expected.transpose(1, 2))
     torch.testing.assert_close(layer.side_by_side(x[..., :1], x[..., 1:]), expected)
+
+
+def test_swapped_robots_act_as_each_other() -> None:
+    actor, swapped = (Actor(R, D, A, W, generator()).double() for _ in range(2))
+    swap_robots(swapped, 2, 0)
+    x = torch.randn(R, B, D, generator=generator(1), dtype=torch.float64)
+    with torch.no_grad():
+        torch.testing.assert_close(swapped(x), actor(x[[2, 1, 0]])[[2, 1, 0]])
+    assert not torch.equal(swapped(x), actor(x))
+
+
+def test_a_swap_leaves_what_robots_share_as_it_is() -> None:
+    shared, swapped = make_critic(), make_critic()
+    swap_robots(swapped, 0, 1)
+    same = {
+        name
+        for name, weights in swapped.state_dict().items()
+        if torch.equal(weights, shared.state_dict()[name])
+    }
+    assert same == {name for name in shared.state_dict() if name.startswith("attention.")} != set()
+    central = CentralCritic(R, D, A, W, generator())
+    before = {name: weights.clone() for name, weights in central.state_dict().items()}
+    swap_robots(central, 0, 1)
+    for name, weights in central.state_dict().items():
+        assert torch.equal(weights, before[name])
 
 
 def test_initial_weights_fill_the_usual_range_and_leave_the_global_generator_alone() -> None:

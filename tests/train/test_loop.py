@@ -195,3 +195,20 @@ def test_networks_get_a_thread_for_each_512_rows(
     monkeypatch.setattr("innerattn.train.build.usable_cores", lambda: cores)
     config = load_run_config(method=method, overrides={key: rows})
     assert thread_count(config) == min(threads, cores)
+
+
+@pytest.mark.parametrize("method", ["td-uniform", "ppo-inner", "mappo"])
+def test_swapped_robots_begin_with_each_others_weights(method: str) -> None:
+    def initial(**network: object) -> dict[str, torch.Tensor]:
+        config = load_run_config(method=method, overrides=network)
+        with BatchEnv(config.scenario, 1) as env:
+            return build_learner(config, env).state()
+
+    drawn = initial()
+    swapped = initial(**{"network.swapped_robots": ("food_0", "food_1")})
+    moved = 0
+    for name, weights in drawn.items():
+        if name.endswith((".weight", ".bias")) and ".attention." not in name:
+            assert torch.equal(swapped[name], weights[[1, 0, 2, 3]]), name
+            moved += not torch.equal(swapped[name], weights)
+    assert moved >= 12

@@ -136,6 +136,7 @@ class RunConfig(Model):
         if self.scenario.actions == "continuous":
             self._check_continuous()
         refuse_late_faults(self.scenario, self.evaluate)
+        self._check_swap()
         self._check_potential()
         gamma, world = self.algorithm.gamma, self.scenario
         if world.shaping == "potential" and self.train.schedule.gamma is not None:
@@ -169,6 +170,18 @@ class RunConfig(Model):
                 f"methods for continuous ones are {', '.join(able)}"
             )
         self._check_needs(needs, what)
+
+    def _check_swap(self) -> None:
+        """Refuse to swap what is the same, or does not fit."""
+        names = self.network.swapped_robots
+        if names is None:
+            return
+        kinds = {robot.name: robot.kind for robot in self.scenario.robots}
+        key = f"network.swapped_robots = {list(names)}"
+        if names[0] == names[1] or len({kinds.get(name, name) for name in names}) > 1:
+            raise ValueError(f"{key}: must be two robots of a kind, of {', '.join(kinds)}")
+        if self.network.parameter_sharing != "none":
+            raise ValueError(f"{key}: network.parameter_sharing must be 'none'")
 
     def _check_potential(self) -> None:
         """Refuse keys of a potential that do not go together."""

@@ -49,6 +49,11 @@ class NetworkConfig(Model):
         description="none: every robot has its own actor, encoders and critic; kind: robots of a "
         "kind share them, except a critic without attention",
     )
+    swapped_robots: Annotated[tuple[str, str] | None, ADDED_LATER] = Field(
+        None,
+        description="names of two robots of a kind that swap their initial weights, to see what "
+        "the weights of a seed decide; needs robots with parameters of their own",
+    )
     shared_gradients: Annotated[Literal["sum", "mean"], ADDED_LATER] = Field(
         "sum",
         description="gradient of layers that robots of a kind share: the sum of the robots' "

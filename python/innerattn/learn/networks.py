@@ -22,6 +22,7 @@ from innerattn.nn import (
     TeammateAttention,
     VectorCritic,
     share_by_kind,
+    swap_robots,
 )
 
 DrawNetworks = Callable[[Team, NetworkConfig, torch.Generator], tuple[Actor, nn.Module]]
@@ -73,6 +74,9 @@ def draw_networks(
             share_by_kind(critic, kinds)
     if kinds is not None:
         share_by_kind(actor, kinds)
+    if team.swapped is not None:
+        for net in (actor, critic):
+            swap_robots(net, *team.swapped)
     return actor, critic
 
 

@@ -35,6 +35,7 @@ class Team(NamedTuple):
         partners: The columns of an observation that tell who can help whom; needed only where
             `network.attention` is "oracle".
         action_width: W, numbers of a continuous action; 0 where actions are discrete.
+        swapped: Two robots that swap their initial weights; None: none do.
     """
 
     num_robots: int
@@ -45,6 +46,7 @@ class Team(NamedTuple):
     entities: EntityColumns | None = None
     partners: PartnerColumns | None = None
     action_width: int = 0
+    swapped: tuple[int, int] | None = None
 
     @property
     def actions(self) -> Actions:

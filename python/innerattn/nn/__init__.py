@@ -16,7 +16,7 @@ from innerattn.nn.attention import (
 from innerattn.nn.critic import Critic, CriticOutput, VectorCritic
 from innerattn.nn.encoder import EntityColumns, EntityEncoder
 from innerattn.nn.joint_critic import CentralCritic, JointCritic
-from innerattn.nn.linear import PerRobotLinear
+from innerattn.nn.linear import PerRobotLinear, swap_robots
 from innerattn.nn.partner import OracleAttention, PartnerColumns
 from innerattn.nn.sharing import is_shared_by_kind, robots_of_each_kind, share_by_kind
 from innerattn.nn.symmetry import NUM_ELEMENTS, SquareSymmetry, VectorColumns
@@ -49,4 +49,5 @@ __all__ = [
     "robots_of_each_kind",
     "sample_actions",
     "share_by_kind",
+    "swap_robots",
 ]

@@ -23,6 +23,23 @@ def uniform_parameter(
     return nn.Parameter(torch.empty(shape).uniform_(-bound, bound, generator=generator))
 
 
+@torch.no_grad()
+def swap_robots(network: nn.Module, one: int, other: int) -> None:
+    """Let two robots swap the parameters of all layers that have weights by robot, in place.
+
+    Layers with another first dimension, such as those of a central critic, stay as they are.
+
+    Args:
+        network: Whose layers; robots share no parameters in it.
+        one: Number of a robot.
+        other: Number of another.
+    """
+    for layer in network.modules():
+        if isinstance(layer, PerRobotLinear) and len(layer.weight) > max(one, other):
+            for parameter in layer.parameters():
+                parameter[[one, other]] = parameter[[other, one]]
+
+
 class PerRobotLinear(nn.Module):
     """y_i = W_i x_i + b_i for every robot i.
 

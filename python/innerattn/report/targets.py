@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 from innerattn.experiments.attention.arms import METHODS as ATTENTION_METHODS
 from innerattn.experiments.attention.arms import SITUATIONS as ATTENTION_SITUATIONS
 from innerattn.experiments.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
-from innerattn.experiments.crossed.arms import plan_crossed
+from innerattn.experiments.crossed.arms import plan_crossed, plan_swapped
 from innerattn.experiments.learning.recipe import plan_ablations
 from innerattn.experiments.learning.variants import CONTINUOUS, ENTITIES, WARM_START
 from innerattn.experiments.learning.variants import SITUATIONS as LEARNING_SITUATIONS
@@ -141,6 +141,12 @@ def _crossed() -> Report:
     return Report(FILES, write_crossed)
 
 
+def _swapped() -> Report:
+    from innerattn.report.crossed.swapped import FILES, write_swapped
+
+    return Report(FILES, write_swapped)
+
+
 def _learning(name: str) -> Callable[[], Report]:
     def load() -> Report:
         from innerattn.report.learning.write import learning_files, write_learning
@@ -217,6 +223,16 @@ TARGETS: dict[str, Target] = {
             plan=plan_crossed,
             report=_crossed,
             methods=_TD,
+            situations=CROSSED_SITUATIONS,
+            study="crossed-",
+        ),
+        Target(
+            name="swapped",
+            shows="whether initial weights decide which robot does more",
+            plan=plan_swapped,
+            report=_swapped,
+            methods=("td-uniform",),
+            further=("td-inner",),
             situations=CROSSED_SITUATIONS,
             study="crossed-",
         ),

@@ -57,7 +57,16 @@ def team_of(config: RunConfig, env: BatchEnv) -> Team:
         entities=entity_columns(names) if config.network.encoder == "entities" else None,
         partners=partner_columns(names) if config.network.attention == "oracle" else None,
         action_width=2 if env.continuous else 0,
+        swapped=_swapped(config),
     )
+
+
+def _swapped(config: RunConfig) -> tuple[int, int] | None:
+    names = config.network.swapped_robots
+    if names is None:
+        return None
+    order = [robot.name for robot in config.scenario.robots]
+    return order.index(names[0]), order.index(names[1])
 
 
 def _turning_columns(scenario: Scenario, names: Sequence[str]) -> VectorColumns:

@@ -67,6 +67,12 @@ SHARED = Arm("team", PENALTIES[0], shared=True)
 ARMS = (*CROSSED, SHARED)
 """All arms."""
 
+WITH_SWAPS = {arm.method: arm for arm in (Arm("team", None), Arm("team", 0.0))}
+"""Arms whose runs have others beside them in which robots swap their initial weights, by method."""
+SWAPPED = "-swapped"
+"""Ends the variant of a run with swapped weights."""
+_SWAP = {"network.swapped_robots": ["food_0", "food_1"]}
+
 
 def plan_crossed(
     methods: Sequence[str],
@@ -88,6 +94,32 @@ def plan_crossed(
         for situation in situations
         for arm in ARMS
         if arm.method in methods
+    ]
+
+
+def plan_swapped(
+    methods: Sequence[str],
+    situations: Sequence[str],
+    seeds: Sequence[int],
+    budget: str,
+    out: Path,
+    overrides: Mapping[str, object] | None = None,
+) -> list[PlannedRun]:
+    """Pairs of runs, as `innerattn.experiments.plan.plan` lists runs.
+
+    Those with weights as they were drawn are runs of the crossed design; a study has them once.
+    """
+    return [
+        planned_run(
+            Case(situation, arm.method, seed, arm.variant + word),
+            budget,
+            out,
+            {**(overrides or {}), **arm.overrides(), **changes},
+        )
+        for seed in seeds
+        for situation in situations
+        for arm in (WITH_SWAPS[method] for method in methods)
+        for word, changes in (("", {}), (SWAPPED, _SWAP))
     ]
 
 
