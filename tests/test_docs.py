@@ -4,6 +4,8 @@ import re
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
+
 from innerattn.config import Scenario, TrainConfig, load_run_config
 from innerattn.config.schedule import Ramp
 
@@ -43,6 +45,7 @@ def test_the_examples_for_other_libraries_work() -> None:
     assert known["state"].shape == (24,)  # type: ignore[attr-defined]
     assert known["states"].shape == (64, 24)  # type: ignore[attr-defined]
     assert known["last"].shape == (64,)  # type: ignore[attr-defined]
+    np.testing.assert_allclose(known["robot_rewards"].sum(axis=1), known["rewards"])  # type: ignore[attr-defined]
 
 
 def test_what_is_said_of_a_runs_files_is_there(run_dir: Path) -> None:
