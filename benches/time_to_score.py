@@ -137,7 +137,8 @@ def benchmarl_pace() -> float:
     """
     program = Path(__file__).with_name("benchmarl_pace.py")
     command = [str(environment("benchmarl_teams")), str(program)]
-    return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    return float(said.split()[-1])  # TorchRL logs to the same stream
 
 
 def main() -> None:
@@ -169,14 +170,14 @@ def main() -> None:
         "ppo-inner, `short`": partial(ours, "ppo-inner", "short"),
         "single-file MAPPO": partial(train_plain, scenario, given.seed),
     }
+    pace = benchmarl_pace()  # first: where it fails, no training is lost
+    print(f"BenchMARL: {pace:,.0f} env-steps/s", flush=True)
     rows = []
     for name, begin in contestants.items():
         reached, newest, speed = measure(begin(), score, given.most_seconds, given.every)
         cells = [f"{reached[goal]:.0f} s" if goal in reached else "–" for goal in SCORES]
         rows.append([name, *cells, f"{newest:.2f}", f"{speed:,.0f}"])
         print(f"{name}: {reached}, ends at {newest:.2f}, {speed:,.0f} env-steps/s", flush=True)
-    pace = benchmarl_pace()
-    print(f"BenchMARL: {pace:,.0f} env-steps/s", flush=True)
     rows.append(["BenchMARL's MAPPO in VMAS", *["–"] * (len(SCORES) + 1), f"{pace:,.0f}"])
     head = ["trained", *(f"to {goal}" for goal in SCORES), "last score", "env-steps/s"]
     note = (
