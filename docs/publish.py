@@ -128,7 +128,7 @@ def publish_tables(report: Path, page: Path, groups: Sequence[Parts]) -> None:
         RunError: the page lacks a part, or the report the first section of one, other than all of
             a group; nothing is changed.
     """
-    found = _by_heading(report.read_text())
+    found = by_heading(report.read_text())
     there = [parts for parts in groups if any(first in found for first, *_ in parts.values())]
     for parts in there or groups:
         for part, headings in parts.items():
@@ -171,7 +171,7 @@ def links(text: str, page: Path, figures: str) -> str:
     return re.sub(r"\(([\w-]+\.(?:md|csv))\)", rf"(tables/{page.stem}/\1)", text)
 
 
-def _by_heading(report: str) -> dict[str, str]:
+def by_heading(report: str) -> dict[str, str]:
     """What stands below each heading of the second level."""
     parts = (part.partition("\n") for part in re.split("^## ", report, flags=re.MULTILINE)[1:])
     return {heading: text.strip() for heading, _, text in parts}

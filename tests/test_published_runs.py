@@ -20,7 +20,7 @@ PAGES = ("reproduction", "paper_protocol", "crossed")
 NEEDS_STEPS = ("## Fig. 4: ", "## Fig. 5: ")
 
 sys.path.insert(0, str(DOCS))
-from publish import PLACES, sections  # noqa: E402
+from publish import KEPT, PLACES, TABLES, by_heading, report_name, sections  # noqa: E402
 
 
 def page(name: str) -> str:
@@ -61,6 +61,25 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
     return len(made) == len(shown) and all(
         a in (b, "–", "**–**") for a, b in zip(made, shown, strict=True)
     )
+
+
+@pytest.mark.parametrize(
+    ("target", "budget", "options"),
+    [
+        ("swapped", "short", "--seeds 10 --situations single"),
+    ],
+)
+def test_tables_are_made_of_the_archive(
+    target: str, budget: str, options: str, tmp_path: Path
+) -> None:
+    shutil.copyfile(RECORDS / f"{KEPT[target, budget]}.parquet", tmp_path / FILE)
+    words = ["reproduce", target, "--budget", budget, *options.split(), "--report-only"]
+    assert main([*words, "--out", str(tmp_path)]) == 0
+    shown, (parts,) = TABLES[target, budget]
+    assert f"innerattn reproduce {target} --budget {budget} {options}" in shown.read_text("utf-8")
+    found = by_heading((tmp_path / report_name(target)).read_text("utf-8"))
+    for name, headings in parts.items():
+        assert part(shown.stem, name) == "\n\n".join(found[one] for one in headings)
 
 
 @pytest.mark.parametrize("name", PAGES)
