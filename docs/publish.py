@@ -41,6 +41,7 @@ KEPT = {
     ("attention", "fast"): "fast",
     ("learning-ablations", "fast"): "fast",
     ("learning", "strong"): "strong",
+    ("learning-warm-start", "strong"): "strong",
 }
 """Names of archives that hold runs of several targets; runs are added to what is there."""
 Parts = Mapping[str, tuple[str, ...]]
@@ -55,6 +56,7 @@ TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
         ("learning-entities", "short", "learning_short_entities"),
         ("learning-continuous", "fast", "learning_fast_continuous"),
         ("learning-warm-start", "quick", "warm_start_quick"),
+        ("learning-warm-start", "strong", "warm_start_strong"),
     )
 } | {
     ("swapped", "short"): (DOCS / "crossed.md", ({"swapped": (swapped.ANSWER, swapped.SHARES)},)),

@@ -67,6 +67,8 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
     ("target", "budget", "options"),
     [
         ("swapped", "short", "--seeds 10 --situations single"),
+        ("learning-ablations", "fast", "--seeds 3"),
+        ("attention", "fast", "--seeds 10 --situations mixed"),
     ],
 )
 def test_tables_are_made_of_the_archive(
