@@ -207,6 +207,7 @@ def test_tables_in_a_file_replace_lists(tmp_path: Path) -> None:
         ),
         ({"network.swapped_robots": ("food_1", "food_1")}, "must be two robots of a kind, of food"),
         ({"network.swapped_robots": ("food_2", "food_2")}, "must be two robots of a kind, of food"),
+        ({"network.swapped_robots": ("food_0", "food")}, "must be two robots of a kind, of food"),
         (
             {
                 "network.swapped_robots": ("food_0", "food_1"),

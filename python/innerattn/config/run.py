@@ -178,7 +178,7 @@ class RunConfig(Model):
             return
         kinds = {robot.name: robot.kind for robot in self.scenario.robots}
         key = f"network.swapped_robots = {list(names)}"
-        if names[0] == names[1] or len({kinds.get(name, name) for name in names}) > 1:
+        if len(set(names) & kinds.keys()) < 2 or kinds[names[0]] != kinds[names[1]]:
             raise ValueError(f"{key}: must be two robots of a kind, of {', '.join(kinds)}")
         if self.network.parameter_sharing != "none":
             raise ValueError(f"{key}: network.parameter_sharing must be 'none'")
