@@ -43,7 +43,7 @@ KEPT = {
     ("learning", "strong"): "strong",
     ("learning-warm-start", "strong"): "strong",
 }
-"""Names of archives that hold runs of several targets; runs are added to what is there."""
+"""Names of archives of runs, which several targets may share; runs are added to what is there."""
 Parts = Mapping[str, tuple[str, ...]]
 """Headings of a report by the part of a page that the text below them makes."""
 TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
