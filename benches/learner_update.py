@@ -11,6 +11,7 @@ import statistics
 import sys
 import time
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from innerattn.config import NetworkConfig, TDConfig, load_run_config
 from innerattn.learn import TD, Team, Transitions
+from innerattn.train.matmul_backend import chosen_matmul_backend, onednn
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "learn"))
 from reference import PlainTD
@@ -58,6 +60,18 @@ def median_ms(actions: Mapping[str, Callable[[], object]], repeats: int) -> dict
     return {name: statistics.median(taken) for name, taken in times.items()}
 
 
+def multiplied_by(
+    library: Callable[[], AbstractContextManager[object]], action: Callable[[], object]
+) -> Callable[[], object]:
+    """An action for which a library multiplies matrices."""
+
+    def act() -> object:
+        with library():
+            return action()
+
+    return act
+
+
 def products(batch: int) -> Callable[[], Tensor]:
     """The product that an update has most of: layers of width 128 of four robots."""
     weights, inputs = torch.randn(4, 128, 128), torch.randn(4, 128, batch)
@@ -90,7 +104,13 @@ def build(
 def measure(
     batch: int, network: NetworkConfig, td: TDConfig, checkout: Path | None, repeats: int
 ) -> dict[str, float]:
-    """Milliseconds by name: updates of one batch, draws of a batch, actions, matrix products."""
+    """Milliseconds by name: updates of one batch, draws of a batch, actions, matrix products.
+
+    Ours multiply as `innerattn train` does, the others by PyTorch's default. Where the two are
+    different libraries, the public code is measured with both.
+    """
+    with chosen_matmul_backend("auto") as chosen:
+        own = onednn if chosen.startswith("onednn") else nullcontext
     eager, compiled, public = build(network, td, checkout)
     plain = PlainTD(eager.state(), network, td)
     mean, std = eager.replay.reward_mean.float(), eager.replay.reward_std.float()
@@ -100,13 +120,15 @@ def measure(
         theirs = public.sample(batch)
         actions["public code"] = lambda: public.update(theirs)
         actions["draw, public code"] = lambda: public.sample(batch)
+        if own is onednn:
+            actions["public code, oneDNN"] = multiplied_by(own, actions["public code"])
     actions |= {
         "stand-in": lambda: plain.update(drawn, mean, std, draw),
-        "eager": lambda: eager.update(drawn),
-        "compiled": lambda: compiled.update(drawn),
-        "products": products(batch),
+        "eager": multiplied_by(own, lambda: eager.update(drawn)),
+        "compiled": multiplied_by(own, lambda: compiled.update(drawn)),
+        "products": multiplied_by(own, products(batch)),
         "draw, ours": lambda: eager.replay.sample(batch),
-        "act": lambda: eager.act(obs),
+        "act": multiplied_by(own, lambda: eager.act(obs)),
     }
     with FlopCounterMode(display=False) as counter:
         eager.update(drawn)

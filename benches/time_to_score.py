@@ -29,7 +29,7 @@ from innerattn.train.build import build_learner, keep_heap_small, thread_count, 
 from innerattn.train.collect import Collector
 from innerattn.train.compilation import compiles
 from innerattn.train.loop import training_worlds
-from innerattn.train.matmul_backend import best_matmul_backend
+from innerattn.train.matmul_backend import chosen_matmul_backend
 from innerattn.train.schedule import Schedule
 
 sys.path.append(str(Path(__file__).parents[1] / "examples"))
@@ -78,7 +78,8 @@ def train_ours(config: RunConfig) -> Training:
         seed=config.train.seed,
         num_threads=config.train.threads,
     )
-    with torch_threads(thread_count(config)), best_matmul_backend(), closing(env):
+    backend = chosen_matmul_backend(config.train.matmul_backend)
+    with torch_threads(thread_count(config)), backend, closing(env):
         learner = build_learner(config, env, training=True)
         schedule = Schedule(config, env, learner)
         device = torch.device("cpu")

@@ -145,6 +145,11 @@ class TrainConfig(Model):
     compile: Literal["auto", "on", "off"] = Field(
         "auto", description="compile the update before training; auto: if the run is long enough"
     )
+    matmul_backend: Annotated[Literal["auto", "default"], ADDED_LATER] = Field(
+        "auto",
+        description="what multiplies matrices on a CPU; auto: oneDNN on AMD processors with "
+        "AVX-512, where it is faster; default: PyTorch's own choice",
+    )
     num_envs: int = Field(64, ge=1, le=1_000_000, description="worlds stepped side by side")
     env_steps: int = Field(
         150_000,

@@ -20,7 +20,7 @@ from innerattn.train.checkpoint import RunFolder, refuse_existing, versions
 from innerattn.train.checkpoint_info import Stage
 from innerattn.train.compilation import compiles
 from innerattn.train.interruption import Interruptions, remembered_interruptions
-from innerattn.train.matmul_backend import best_matmul_backend
+from innerattn.train.matmul_backend import chosen_matmul_backend
 from innerattn.train.parts import Parts
 from innerattn.train.progress import Progress
 from innerattn.train.resume import NothingSavedError, NothingToResumeError, Saved, read_saved
@@ -138,7 +138,7 @@ def _prepared(
     keep_heap_small()
     with (
         torch_threads(threads),
-        best_matmul_backend() as matmul_backend,
+        chosen_matmul_backend(config.train.matmul_backend) as matmul_backend,
         remembered_interruptions() as interruptions,
     ):
         env = BatchEnv(

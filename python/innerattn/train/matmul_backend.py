@@ -10,43 +10,52 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import torch
+from torch import Tensor
 
 _LARGEST_ERROR = 1e-5
 """Relative to the largest entry; float32 gives some 1e-6, bfloat16 some 1e-2."""
+_PROBES = ((4, 256, 128, 128), (4, 128, 512, 128), (1, 1_024, 64, 5))
+"""Batch, rows, inner size and columns of the products that are checked."""
 
 
 @contextmanager
-def best_matmul_backend() -> Iterator[str]:
-    """Use the best library inside the block.
+def chosen_matmul_backend(choice: Literal["auto", "default"]) -> Iterator[str]:
+    """Use a library inside the block.
+
+    Args:
+        choice: "auto" is oneDNN where it is faster, really multiplies and is exact; "default" is
+            PyTorch's own choice.
 
     Yields:
         The library and its measured error, e.g. "onednn, error 2.1e-07", for ``run.json``.
     """
-    if not _onednn_is_faster():
-        yield f"default, error {_error():.1e}"
+    default = _products()
+    if choice == "default" or not _onednn_is_faster():
+        yield f"default, error {_error(default):.1e}"
         return
-    with _onednn():
-        error = _error()
-        if error <= _LARGEST_ERROR:
-            yield f"onednn, error {error:.1e}"
+    with onednn():
+        found = _products()
+        if _differ(found, default) and _error(found) <= _LARGEST_ERROR:
+            yield f"onednn, error {_error(found):.1e}"
             return
-    yield f"default, error {_error():.1e} (onednn {error:.1e})"
+    why = f"{_error(found):.1e}" if _differ(found, default) else "not in use"
+    yield f"default, error {_error(default):.1e} (onednn {why})"
 
 
 @contextmanager
-def _onednn() -> Iterator[None]:
-    """Let oneDNN multiply.
+def onednn() -> Iterator[None]:
+    """Let oneDNN multiply inside the block, where PyTorch and the processor allow it.
 
-    The setting allows TF32. On processors that have instructions for such a format, oneDNN may then
-    really be less exact; that is why the error is measured.
+    No setting asks for oneDNN and float32. This one allows bfloat16, which oneDNN uses only on
+    processors with AMX; that is why the error is measured. "tf32" does nothing without AMX.
     """
     mkldnn: Any = torch.backends.mkldnn  # older versions have no such setting
     matmul = mkldnn.matmul
     before = matmul.fp32_precision
-    matmul.fp32_precision = "tf32"
+    matmul.fp32_precision = "bf16"
     try:
         yield
     finally:
@@ -63,10 +72,29 @@ def _onednn_is_faster() -> bool:
     )
 
 
-def _error() -> float:
-    """Largest error of a batched product, as a share of the largest entry, against float64."""
+def _factors() -> list[tuple[Tensor, Tensor]]:
     source = torch.Generator().manual_seed(0)
-    left = torch.randn(4, 128, 128, generator=source)
-    right = torch.randn(4, 128, 256, generator=source)
-    exact = torch.bmm(left.double(), right.double())
-    return float(((torch.bmm(left, right) - exact).abs().max() / exact.abs().max()).item())
+    return [
+        (
+            torch.randn(batch, rows, inner, generator=source),
+            torch.randn(batch, columns, inner, generator=source).transpose(1, 2),
+        )
+        for batch, rows, inner, columns in _PROBES
+    ]
+
+
+def _products() -> list[Tensor]:
+    """Products by the library that is in use."""
+    return [torch.bmm(left, right) for left, right in _factors()]
+
+
+def _differ(some: list[Tensor], others: list[Tensor]) -> bool:
+    """Whether another library multiplied: two libraries round differently."""
+    return not all(map(torch.equal, some, others))
+
+
+def _error(products: list[Tensor]) -> float:
+    """Largest error of a product, as a share of its largest entry, against float64."""
+    exact = [torch.bmm(left.double(), right.double()) for left, right in _factors()]
+    pairs = zip(products, exact, strict=True)
+    return max(float((found - true).abs().max() / true.abs().max()) for found, true in pairs)
