@@ -28,7 +28,6 @@ from innerattn.policies import PolicyInput, scripted_policy
 from innerattn.train.build import build_learner, keep_heap_small, thread_count, torch_threads
 from innerattn.train.collect import Collector
 from innerattn.train.compilation import compiles
-from innerattn.train.loop import training_worlds
 from innerattn.train.matmul_backend import chosen_matmul_backend
 from innerattn.train.schedule import Schedule
 
@@ -73,7 +72,7 @@ class Greedy:
 def train_ours(config: RunConfig) -> Training:
     """Train as `innerattn train` does; after every control step of all worlds."""
     env = BatchEnv(
-        training_worlds(config),
+        config.training_scenario,
         config.train.num_envs,
         seed=config.train.seed,
         num_threads=config.train.threads,

@@ -9,7 +9,6 @@ from innerattn.config import Scenario, load_run_config
 from innerattn.envs import BatchEnv
 from innerattn.evaluate import run_episodes, scripted_policy
 from innerattn.train.build import build_learner
-from innerattn.train.loop import training_worlds
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "examples" / "scenarios").glob("*.toml"))
@@ -51,7 +50,7 @@ def test_the_command_in_the_file_can_train(file: Path) -> None:
         overrides=overrides,
         scenario_file=file,
     )
-    env = BatchEnv(training_worlds(config), 2, num_threads=1)
+    env = BatchEnv(config.training_scenario, 2, num_threads=1)
     try:
         assert build_learner(config, env, training=True) is not None
     finally:

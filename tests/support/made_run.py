@@ -78,7 +78,7 @@ def made_attention(rng: np.random.Generator, method: str, record: Record) -> np.
 
 
 def _write_metrics(path: Path, method: str, rng: np.random.Generator, chance: int) -> None:
-    """Entropy and rescues; no episode has ended at the first time."""
+    """Entropy, time and rescues; no episode has ended at the first time."""
     names = ("food_0", "food_1", "navigation_0", "medical_0")
     even = float(np.log(3.0))
     rescues = np.random.default_rng(chance + 1).random(LOGGED)
@@ -89,5 +89,6 @@ def _write_metrics(path: Path, method: str, rng: np.random.Generator, chance: in
                 values[:] = even
             entropy = dict(zip(names, values.tolist(), strict=True))
             logged = {"env_steps": 100 * (line + 1), "attention_entropy": entropy}
+            logged["seconds"] = 0.5 * (line + 1) + float(rescues[line])
             logged["rescues_per_episode"] = line * float(rescues[line]) if line else None
             file.write(json.dumps(logged) + "\n")

@@ -11,7 +11,6 @@ from torch import Tensor
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.train import Progress, resume, train
-from innerattn.train.loop import training_worlds
 from innerattn.train.parts import Parts
 from innerattn.train.resume import read_saved
 from innerattn.train.row_files import read_rows
@@ -76,7 +75,7 @@ def test_forged_states_are_refused_or_go_on(stopped: Path) -> None:
     saved = read_saved(stopped)
     config, stage = saved.config, saved.info.counters.stage
     env: Any
-    with BatchEnv(training_worlds(config), config.train.num_envs, num_threads=1) as env:
+    with BatchEnv(config.training_scenario, config.train.num_envs, num_threads=1) as env:
         parts = Parts(config, env, stage)
         for name, ring in parts.rings(stage).items():
             read_rows(stopped / "checkpoints" / "rows", name, ring, saved.info.rows[name])

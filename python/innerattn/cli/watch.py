@@ -76,15 +76,8 @@ class Watch(Command):
 
 def _scripts_beside(folder: Path) -> dict[str, float]:
     """Rescues per episode of scripts in the worlds that a run trains in."""
-    from innerattn.evaluate import run_episodes, scripted_policy
+    from innerattn.evaluate.training_score import training_rescues
     from innerattn.records.run_folder import read_config
-    from innerattn.train.loop import training_worlds
 
     config = read_config(folder)
-    worlds, seed = training_worlds(config), config.evaluate.seed
-    found = {}
-    for name in SCRIPTS:
-        policy = scripted_policy(name, worlds, seed)
-        played = run_episodes(policy, worlds, SCRIPT_EPISODES, seed, num_threads=1)
-        found[name] = float(played.rescue_counts().mean())
-    return found
+    return {name: training_rescues(config, name, SCRIPT_EPISODES, 1) for name in SCRIPTS}

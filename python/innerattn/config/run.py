@@ -84,6 +84,12 @@ class RunConfig(Model):
         given = self.train.potential_discount
         return self.algorithm.gamma if given is None else given
 
+    @property
+    def training_scenario(self) -> Scenario:
+        """The worlds of training: `scenario`, or with another engine or length of episodes."""
+        chosen = {"episode_steps": self.train.episode_steps, "engine": self.train.engine}
+        return self.scenario.replace(**{k: v for k, v in chosen.items() if v is not None})
+
     def in_use(self) -> dict[str, dict[str, Any]]:
         """The values that the run depends on, as JSON values by section and key.
 

@@ -11,7 +11,7 @@ from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from innerattn.config import RunConfig, Scenario
+from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.records.run_files import RunFiles
 from innerattn.records.run_folder import config_of
@@ -28,7 +28,7 @@ from innerattn.train.run_lock import only_training_in
 from innerattn.train.saved import Checkpoints
 from innerattn.train.stages import Stages
 
-__all__ = ["Progress", "resume", "train", "training_worlds"]
+__all__ = ["Progress", "resume", "train"]
 
 _log = logging.getLogger(__name__)
 
@@ -120,12 +120,6 @@ def _begin_anew(path: Path, progress: Callable[[Progress], None] | None) -> None
         stops.check()
 
 
-def training_worlds(config: RunConfig) -> Scenario:
-    """The scenario in which a run trains: its own, or with another engine or episode length."""
-    chosen = {"episode_steps": config.train.episode_steps, "engine": config.train.engine}
-    return config.scenario.replace(**{k: v for k, v in chosen.items() if v is not None})
-
-
 @contextmanager
 def _prepared(
     config: RunConfig, threads: int, stage: Stage
@@ -142,7 +136,7 @@ def _prepared(
         remembered_interruptions() as interruptions,
     ):
         env = BatchEnv(
-            training_worlds(config),
+            config.training_scenario,
             config.train.num_envs,
             seed=config.train.seed,
             num_threads=config.train.threads,

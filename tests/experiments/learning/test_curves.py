@@ -1,14 +1,23 @@
 """Learning curves against plain loops over the lines of metrics."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from innerattn.experiments.learning.curves import PARTS, SCRIPTS, in_parts, learning_curves
+from innerattn.envs import BatchEnv
+from innerattn.experiments.learning.curves import (
+    EPISODES,
+    PARTS,
+    SCRIPTS,
+    in_parts,
+    learning_curves,
+)
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import FinishedRun, read_run
+from innerattn.policies import PolicyInput, WorldState, scripted_policy
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -36,9 +45,10 @@ def test_a_curve_is_the_mean_over_runs(runs: list[FinishedRun]) -> None:
     own = [run for run in runs if run.method == "td-inner"]
     (curve,) = learning_curves([own])
     assert (curve.situation, curve.method) == ("mixed", "td-inner")
-    courses = []
+    courses, all_lines = [], []
     for run in own:
-        lines = map(json.loads, (run.folder / "metrics.jsonl").read_text().splitlines())
+        lines = list(map(json.loads, (run.folder / "metrics.jsonl").read_text().splitlines()))
+        all_lines.append(lines)
         courses.append([one for one in lines if one["rescues_per_episode"] is not None])
     parts = min(PARTS, 2 * min(map(len, courses)) // 3)
     width = min(lines[-1]["env_steps"] for lines in courses) / parts
@@ -51,8 +61,33 @@ def test_a_curve_is_the_mean_over_runs(runs: list[FinishedRun]) -> None:
         means.append([np.mean(values) if values else np.nan for values in by_part])
     np.testing.assert_allclose(curve.env_steps, (np.arange(parts) + 0.5) * width)
     np.testing.assert_allclose(curve.rescues.mean, np.mean(means, axis=0))
+    seconds = [
+        np.interp(
+            curve.env_steps,
+            [0, *(one["env_steps"] for one in lines)],
+            [0, *(one["seconds"] for one in lines)],
+        )
+        for lines in all_lines
+    ]
+    np.testing.assert_allclose(curve.seconds, np.mean(seconds, axis=0))
     scripted = own[0].summary["scripted"]
     assert curve.scripts == {name: scripted[name]["mean"] for name in SCRIPTS}
+
+
+def test_scripts_play_episodes_as_long_as_those_of_training(runs: list[FinishedRun]) -> None:
+    run = next(run for run in runs if run.method == "td-inner")
+    train = run.config.train.replace(episode_steps=50, engine="discs")
+    longer = replace(run, config=run.config.model_copy(update={"train": train}))
+    (curve,) = learning_curves([[longer]])
+    scenario = run.config.scenario.replace(episode_steps=50, engine="discs")
+    policy, rescues = scripted_policy("hungarian", scenario), 0
+    with BatchEnv(scenario, EPISODES, seed=run.seed) as env:
+        obs = env.reset()
+        for _ in range(50):
+            step = env.step(policy.act(PolicyInput(obs, WorldState.of(env))))
+            obs, rescues = step.obs, rescues + len(step.rescues)
+    assert curve.scripts["hungarian"] == rescues / EPISODES
+    assert curve.scripts["hungarian"] > 1.5 * run.summary["scripted"]["hungarian"]["mean"]
 
 
 def test_runs_in_which_no_episode_ended_have_no_curve(finished_study: Path) -> None:

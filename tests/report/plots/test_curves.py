@@ -1,4 +1,4 @@
-"""Learning curves: a panel for each situation, a line for each method, scripts beside them."""
+"""Learning curves: two panels for each situation, a line for each method, scripts beside them."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ def line(situation: str, method: str, *, band: bool = True) -> CurveLine:
     mean = np.arange(4.0)
     half = np.ones(4) if band else np.full(4, np.nan)
     rescues = np.stack([mean, mean - half, mean + half])
-    return CurveLine(situation, method, steps, rescues, {"greedy": 2.5})
+    return CurveLine(situation, method, steps, steps / 10.0, rescues, {"greedy": 2.5})
 
 
 @pytest.mark.parametrize("band", [True, False])
@@ -21,13 +21,16 @@ def test_lines_bands_and_scripts(band: bool) -> None:
         for situation, method in (("mixed", "a"), ("single", "a"), ("mixed", "b"))
     ]
     figure = draw_curves(lines, "rescues")
-    mixed, single = figure.axes
-    assert [panel.get_title() for panel in figure.axes] == ["mixed", "single"]
+    mixed, single, mixed_by_time, _ = figure.axes
+    assert [panel.get_title() for panel in figure.axes] == ["mixed", "single", "", ""]
     assert mixed.get_ylabel() == "rescues"
     drawn = {one.get_label(): one for one in mixed.get_lines() if one.get_label() in "ab"}
     assert sorted(drawn) == ["a", "b"]
     assert drawn["a"].get_xdata().tolist() == [1.0, 2.0, 3.0, 4.0]
     assert drawn["a"].get_ydata().tolist() == [0.0, 1.0, 2.0, 3.0]
+    (timed,) = [one for one in mixed_by_time.get_lines() if one.get_label() == "a"]
+    assert timed.get_xdata() == pytest.approx(np.array([100.0, 200.0, 300.0, 400.0]) / 60.0)
+    assert timed.get_ydata().tolist() == drawn["a"].get_ydata().tolist()
     (alone,) = [one for one in single.get_lines() if one.get_label() == "a"]
     assert alone.get_color() == drawn["a"].get_color() != drawn["b"].get_color()
     for panel in figure.axes:

@@ -1,4 +1,4 @@
-"""Courses of training from the metrics of finished runs: rescues against env-steps."""
+"""Courses of training from the metrics of finished runs: rescues against env-steps and time."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from innerattn.evaluate.training_score import training_rescues
 from innerattn.experiments.run import FinishedRun, read_metrics
 from innerattn.stats.seeds import SeedCurve, seed_curve
 
@@ -17,6 +18,8 @@ PARTS = 40
 """Points of a curve at most: means over so many equal parts of a run."""
 SCRIPTS = ("hungarian", "greedy")
 """The scripted policies that a curve is shown beside."""
+EPISODES = 500
+"""Episodes of each script that are played where no evaluation has episodes as long."""
 
 
 @dataclass(frozen=True)
@@ -27,14 +30,16 @@ class LearningCurve:
         situation: of the worlds.
         method: of training.
         env_steps: (P,) in the middle of each part.
+        seconds: (P,) of training until then, with what compiling took; means over runs.
         rescues: (P,) per training episode, over runs; NaN where no episode ended.
-        scripts: rescues per episode of `SCRIPTS` by name, in the worlds of the first run's
-            evaluation; empty where training episodes have another length.
+        scripts: rescues per episode of `SCRIPTS` by name, in episodes as long as those of training:
+            in the worlds of the first run's evaluation, or in worlds as those it trained in.
     """
 
     situation: str
     method: str
     env_steps: Array
+    seconds: Array
     rescues: SeedCurve
     scripts: dict[str, float]
 
@@ -61,18 +66,23 @@ def _curve(group: Sequence[FinishedRun]) -> LearningCurve | None:
     fewest = min(len(steps) for steps, _ in courses)
     parts = max(1, min(PARTS, 2 * fewest // 3))
     edges = np.linspace(0.0, end, parts + 1)
-    first = group[0]
-    comparable = all(
-        run.config.train.episode_steps in (None, run.config.scenario.episode_steps) for run in group
-    )
-    scripted = first.summary["scripted"] if comparable else {}
+    middles = (edges[1:] + edges[:-1]) / 2.0
     return LearningCurve(
-        situation=first.situation,
-        method=first.method,
-        env_steps=(edges[1:] + edges[:-1]) / 2.0,
+        situation=group[0].situation,
+        method=group[0].method,
+        env_steps=middles,
+        seconds=np.mean([_seconds_at(run, middles) for run in group], axis=0),
         rescues=seed_curve(np.stack([in_parts(steps, values, edges) for steps, values in courses])),
-        scripts={name: float(scripted[name]["mean"]) for name in SCRIPTS if name in scripted},
+        scripts=_scripts(group[0]),
     )
+
+
+def _scripts(run: FinishedRun) -> dict[str, float]:
+    config = run.config
+    if config.train.episode_steps not in (None, config.scenario.episode_steps):
+        return {name: training_rescues(config, name, EPISODES, None) for name in SCRIPTS}
+    scripted = run.summary["scripted"]
+    return {name: float(scripted[name]["mean"]) for name in SCRIPTS if name in scripted}
 
 
 def in_parts(steps: Array, values: Array, edges: Array) -> Array:
@@ -100,3 +110,9 @@ def _course(run: FinishedRun) -> tuple[Array, Array]:
     found = read_metrics(run, "env_steps", "rescues_per_episode")
     known = np.array([both for both in found if both[1] is not None], np.float64).reshape(-1, 2)
     return known[:, 0], known[:, 1]
+
+
+def _seconds_at(run: FinishedRun, env_steps: Array) -> Array:
+    """Seconds of training until then, by linear interpolation between lines of metrics."""
+    found = np.array([(0.0, 0.0), *read_metrics(run, "env_steps", "seconds")], np.float64)
+    return np.interp(env_steps, found[:, 0], found[:, 1])

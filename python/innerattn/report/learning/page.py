@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from innerattn.experiments.learning.curves import EPISODES
 from innerattn.experiments.learning.study import BySeed, Learning
 from innerattn.report.plots.curves import CurveLine
 from innerattn.report.table import Table, columns, markdown, plain_table
@@ -44,10 +45,12 @@ def learning_page(found: Learning, budget: str, figure: str | None, left_out: Se
     if figure is not None:
         parts += [
             f"## {CURVES}\n",
-            f"![Rescues per training episode against env-steps]({figure})\n",
+            f"![Rescues per training episode against env-steps and time]({figure})\n",
             "Curves are training episodes with sampled actions: means over seeds with 95 % "
-            "intervals (Student's t), of two seeds the range. Dotted lines are the scripts in the "
-            "worlds of the evaluation, where training episodes are as long as those.\n",
+            "intervals (Student's t), of two seeds the range. Minutes are means over seeds. Dotted "
+            "lines are scripts in episodes as long as those of training: in the worlds of the "
+            f"evaluation, or, where its episodes have another length, in {EPISODES} episodes in "
+            "worlds as those of the training.\n",
         ]
     return "\n".join(parts)
 
@@ -87,6 +90,7 @@ def curve_lines(found: Learning) -> list[CurveLine]:
             curve.situation,
             curve.method,
             curve.env_steps,
+            curve.seconds,
             np.stack([curve.rescues.mean, curve.rescues.low, curve.rescues.high]),
             curve.scripts,
         )

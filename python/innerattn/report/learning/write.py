@@ -75,6 +75,7 @@ def _curve(curve: LearningCurve) -> dict[str, Any]:
         "situation": curve.situation,
         "method": curve.method,
         "env_steps": curve.env_steps.tolist(),
+        "seconds": curve.seconds.tolist(),
         "rescues_per_episode": curve.rescues.to_json(),
         "scripts": curve.scripts,
     }
