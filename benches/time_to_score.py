@@ -1,7 +1,8 @@
 """How long teams train until they reach a score, side by side with other ways to train.
 
-`python benches/time_to_score.py` trains one team after the other, in the worlds of `mixed`, and
-writes its table into `docs/performance.md`. The clock stands still while a team is measured.
+`python benches/time_to_score.py` trains one team after the other, in the worlds of `mixed`, writes
+its table into `docs/performance.md` and draws what it saw. The clock stands still while a team is
+measured.
 """
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ import argparse
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import torch
 from page import machine, publish, table
@@ -25,11 +26,23 @@ from innerattn.cores import let_waiting_threads_sleep
 from innerattn.envs import BatchEnv
 from innerattn.evaluate.play import run_episodes
 from innerattn.policies import PolicyInput, scripted_policy
+from innerattn.report.plots.drawing import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PAGE_WIDTH_IN,
+    PURPLE,
+    write_figure,
+)
 from innerattn.train.build import build_learner, keep_heap_small, thread_count, torch_threads
 from innerattn.train.collect import Collector
 from innerattn.train.compilation import compiles
 from innerattn.train.matmul_backend import chosen_matmul_backend
 from innerattn.train.schedule import Schedule
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 sys.path.append(str(Path(__file__).parents[1] / "examples"))
 sys.path.append(str(Path(__file__).parents[1] / "examples" / "libraries"))
@@ -40,6 +53,11 @@ from single_file_mappo import train as train_plain
 SCORES = (0.5, 0.7, 0.8, 0.9)
 EPISODES = 500
 SITUATION = "mixed"
+FIGURE = Path(__file__).parents[1] / "docs" / "images" / "time_to_score.png"
+STYLES = (
+    *((BLUE, "-"), (ORANGE, "-"), (GREEN, "-"), (GREEN, "--"), (ORANGE, "--"), (PURPLE, "-.")),
+)
+"""Of the contestants in their order."""
 
 
 class Acting(Protocol):
@@ -50,6 +68,14 @@ class Acting(Protocol):
 
 
 Training = Iterator[tuple[int, Acting]]
+
+
+class Look(NamedTuple):
+    """A team at some time of its training: seconds of training, env-steps and score."""
+
+    seconds: float
+    env_steps: int
+    score: float
 
 
 class Greedy:
@@ -104,29 +130,62 @@ def rescues(policy: object, scenario: Scenario) -> float:
 
 def measure(
     training: Training, score: Callable[[Acting], float], most_seconds: float, every: float
-) -> tuple[dict[float, float], float, float]:
-    """Seconds of training to each score that was reached, the last score, and env-steps/s."""
-    reached: dict[float, float] = {}
-    seconds, next_look, done, newest = 0.0, every, 0, 0.0
+) -> list[Look]:
+    """Looks at a team in training, at equal times and at the end."""
+    looks: list[Look] = []
+    seconds, next_look, env_steps = 0.0, every, 0
     began = time.perf_counter()
     team: Acting | None = None
     for env_steps, team in training:
-        done = env_steps
         spent = seconds + time.perf_counter() - began
         if spent < next_look:
             continue
         seconds, next_look = spent, spent + every
-        newest = score(team)
-        reached |= {goal: seconds for goal in SCORES if newest >= goal and goal not in reached}
+        looks.append(Look(seconds, env_steps, score(team)))
         if seconds >= most_seconds:
             break
         began = time.perf_counter()
     else:
         seconds += time.perf_counter() - began
         assert team is not None
-        newest = score(team)
-        reached |= {goal: seconds for goal in SCORES if newest >= goal and goal not in reached}
-    return reached, newest, done / seconds
+        looks.append(Look(seconds, env_steps, score(team)))
+    return looks
+
+
+def row(name: str, looks: Sequence[Look]) -> list[str]:
+    """A row of the table: seconds to each score, the last score and env-steps/s."""
+    cells = []
+    for goal in SCORES:
+        reached = [look.seconds for look in looks if look.score >= goal]
+        cells.append(f"{reached[0]:.0f} s" if reached else "–")
+    last = looks[-1]
+    return [name, *cells, f"{last.score:.2f}", f"{last.env_steps / last.seconds:,.0f}"]
+
+
+def draw(courses: dict[str, list[Look]], greedy: float) -> Figure:
+    """Scores against time and against env-steps, beside the scripts."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(PAGE_WIDTH_IN, 3.6), layout="constrained")
+    by_time, by_steps = figure.subplots(1, 2, sharey=True)
+    for (name, looks), (colour, style) in zip(courses.items(), STYLES, strict=False):
+        seconds, env_steps, scores = zip(*looks, strict=True)
+        line = {"linestyle": style, "color": colour, "linewidth": 1.4, "label": name}
+        by_time.plot(seconds, scores, **line)
+        by_steps.plot(env_steps, scores, **line)
+    by_time.set_xlabel("training [s]", fontsize=8)
+    by_steps.set_xlabel("training [env-steps]", fontsize=8)
+    by_steps.set_xscale("log")
+    by_time.set_ylabel("score, 25 steps", fontsize=8)
+    by_time.set_ylim(0.0, 1.06)
+    for panel in (by_time, by_steps):
+        panel.tick_params(labelsize=7, length=2)
+        for script, height in (("hungarian", 1.0), ("greedy", greedy)):
+            panel.axhline(height, color=BLACK, linewidth=0.8, linestyle=(0, (1, 1)))
+            panel.annotate(script, (0.02, height), xycoords=("axes fraction", "data"), fontsize=6)
+    handles, names = by_time.get_legend_handles_labels()
+    figure.legend(handles, names, fontsize=7, ncols=3, loc="outside lower center", frameon=False)
+    return figure
 
 
 def benchmarl_pace() -> float:
@@ -151,8 +210,9 @@ def main() -> None:
     let_waiting_threads_sleep()
     keep_heap_small()
     scenario = Scenario.preset(SITUATION)
-    low, high = (
-        rescues(scripted_policy(name, scenario), scenario) for name in ("random", "hungarian")
+    low, middle, high = (
+        rescues(scripted_policy(name, scenario), scenario)
+        for name in ("random", "greedy", "hungarian")
     )
 
     def score(team: Acting) -> float:
@@ -172,12 +232,12 @@ def main() -> None:
     }
     pace = benchmarl_pace()  # first: where it fails, no training is lost
     print(f"BenchMARL: {pace:,.0f} env-steps/s", flush=True)
-    rows = []
+    rows, courses = [], {}
     for name, begin in contestants.items():
-        reached, newest, speed = measure(begin(), score, given.most_seconds, given.every)
-        cells = [f"{reached[goal]:.0f} s" if goal in reached else "–" for goal in SCORES]
-        rows.append([name, *cells, f"{newest:.2f}", f"{speed:,.0f}"])
-        print(f"{name}: {reached}, ends at {newest:.2f}, {speed:,.0f} env-steps/s", flush=True)
+        looks = measure(begin(), score, given.most_seconds, given.every)
+        rows.append(row(name, looks))
+        courses[name.replace("`", "")] = looks
+        print(" | ".join(rows[-1]), flush=True)
     rows.append(["BenchMARL's MAPPO in VMAS", *["–"] * (len(SCORES) + 1), f"{pace:,.0f}"])
     head = ["trained", *(f"to {goal}" for goal in SCORES), "last score", "env-steps/s"]
     note = (
@@ -185,6 +245,7 @@ def main() -> None:
         f"a look every {given.every:.0f} s of training, at most {given.most_seconds:.0f} s."
     )
     publish("time_to_score", f"{table(head, rows)}\n\n{note}")
+    write_figure(FIGURE, draw(courses, (middle - low) / (high - low)))
 
 
 if __name__ == "__main__":

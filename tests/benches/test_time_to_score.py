@@ -48,11 +48,27 @@ def test_the_clock_stands_still_while_a_team_is_measured(clock: Clock, most_seco
         assert isinstance(team, Team)
         return team.level
 
-    found, last, speed = time_to_score.measure(training(clock, 47), score, most_seconds, 5.0)
+    looks = time_to_score.measure(training(clock, 47), score, most_seconds, 5.0)
+    name, *reached, last, speed = time_to_score.row("a team", looks)
+    assert (name, speed) == ("a team", "100")
     if most_seconds == 30.0:
-        assert found == {0.5: 25.0}
-        assert last == pytest.approx(0.6)
+        assert [look.seconds for look in looks] == [5.0, 10.0, 15.0, 20.0, 25.0, 30.0]
+        assert (reached, last) == (["25 s", "–", "–", "–"], "0.60")
     else:  # looked at every 5 s, and once at the end
-        assert found == {0.5: 25.0, 0.7: 35.0, 0.8: 40.0, 0.9: 45.0}
-        assert last == pytest.approx(0.94)
-    assert speed == pytest.approx(100.0)
+        assert looks[-1] == (47.0, 4_700, pytest.approx(0.94))
+        assert (reached, last) == (["25 s", "35 s", "40 s", "45 s"], "0.94")
+
+
+def test_the_figure_has_every_team_and_both_scripts() -> None:
+    looks = [time_to_score.Look(10.0, 500, 0.5), time_to_score.Look(20.0, 1_000, 0.7)]
+    figure = time_to_score.draw({"one": looks, "other": looks[:1]}, 0.8)
+    by_time, by_steps = figure.axes
+    for panel, times in ((by_time, [10.0, 20.0]), (by_steps, [500.0, 1_000.0])):
+        drawn = {line.get_label(): line for line in panel.get_lines()}
+        assert drawn["one"].get_xdata().tolist() == times
+        assert drawn["one"].get_ydata().tolist() == [0.5, 0.7]
+        assert drawn["other"].get_ydata().tolist() == [0.5]
+        assert [(text.get_text(), text.xy[1]) for text in panel.texts] == [
+            ("hungarian", 1.0),
+            ("greedy", 0.8),
+        ]
