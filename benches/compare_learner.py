@@ -145,7 +145,7 @@ def protocol_table() -> str:
     for case in cases:
         pace, start = (statistics.median(values) for values in zip(*found[case], strict=True))
         minutes = (start + pace * PROTOCOL_UPDATES) / 60.0
-        rows.append([case, f"{1e3 * pace:.1f}", f"{start:.0f}", f"{minutes:.1f}"])
+        rows.append([case, f"{1e3 * pace:.1f}", f"{max(start, 0.0):.0f}", f"{minutes:.1f}"])
     head = ["--compile", "update and its steps, ms", "start, s", "25,000 updates, min"]
     return table(head, rows)
 
