@@ -70,7 +70,11 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
         ("learning-ablations", "fast", "--seeds 3"),
         ("attention", "fast", "--seeds 10 --situations mixed"),
         ("learning", "strong", "--methods ppo-inner --seeds 5"),
-        ("learning-warm-start", "strong", "--methods ppo-inner --seeds 3 --situations single,mixed"),
+        (
+            "learning-warm-start",
+            "strong",
+            "--methods ppo-inner --seeds 3 --situations single,mixed",
+        ),
     ],
 )
 def test_tables_are_made_of_the_archive(
