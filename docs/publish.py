@@ -39,9 +39,12 @@ PLACES = {
 KEPT = {
     ("swapped", "short"): "swapped",
     ("attention", "fast"): "fast",
+    ("attention", "strong"): "strong",
+    ("learning", "fast"): "fast",
     ("learning-ablations", "fast"): "fast",
     ("learning", "strong"): "strong",
     ("learning-warm-start", "strong"): "strong",
+    ("learning-long", "strong"): "strong",
 }
 """Names of archives of runs, which several targets may share; runs are added to what is there."""
 Parts = Mapping[str, tuple[str, ...]]
@@ -57,6 +60,7 @@ TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
         ("learning-continuous", "fast", "learning_fast_continuous"),
         ("learning-warm-start", "quick", "warm_start_quick"),
         ("learning-warm-start", "strong", "warm_start_strong"),
+        ("learning-long", "strong", "learning_strong_long"),
     )
 } | {
     ("swapped", "short"): (DOCS / "crossed.md", ({"swapped": (swapped.ANSWER, swapped.SHARES)},)),
@@ -64,10 +68,13 @@ TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
         DOCS / "learning.md",
         ({"ablations_fast": (ablations.DIFFERENCES,)},),
     ),
-    ("attention", "fast"): (
-        DOCS / "attention.md",
-        ({"attention_fast": (attention.COMPARISONS, attention.SCORES)},),
-    ),
+    **{
+        ("attention", budget): (
+            DOCS / "attention.md",
+            ({f"attention_{budget}": (attention.COMPARISONS, attention.SCORES)},),
+        )
+        for budget in ("fast", "strong")
+    },
     ("robustness", "short"): (
         DOCS / "robustness.md",
         (

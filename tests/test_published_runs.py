@@ -1,6 +1,7 @@
 """The pages about studies show what their commands make of the archived runs, and are short."""
 
 import csv
+import json
 import math
 import re
 import shutil
@@ -68,7 +69,12 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
     [
         ("swapped", "short", "--seeds 10 --situations single"),
         ("learning-ablations", "fast", "--seeds 3"),
-        ("attention", "fast", "--seeds 10 --situations mixed"),
+        ("attention", "fast", "--seeds 10 --situations mixed,mixed-8"),
+        (
+            "attention",
+            "strong",
+            "--seeds 3 --situations mixed --methods ppo-inner,ppo-uniform,mappo",
+        ),
         ("learning", "strong", "--methods ppo-inner --seeds 5"),
         (
             "learning-warm-start",
@@ -82,7 +88,11 @@ def test_tables_are_made_of_the_archive(
 ) -> None:
     shutil.copyfile(RECORDS / f"{KEPT[target, budget]}.parquet", tmp_path / FILE)
     words = ["reproduce", target, "--budget", budget, *options.split(), "--report-only"]
-    assert main([*words, "--out", str(tmp_path)]) == 0
+    code = main([*words, "--out", str(tmp_path)])
+    runs = json.loads((tmp_path / "runs.json").read_text("utf-8"))["runs"]
+    missing = [run["folder"] for run in runs if run["state"] != "finished"]
+    assert code == bool(missing)
+    assert all(re.match(r"runs/mixed-8-\S+-fast-s\d$", folder) for folder in missing)
     shown, (parts,) = TABLES[target, budget]
     assert f"innerattn reproduce {target} --budget {budget} {options}" in shown.read_text("utf-8")
     found = by_heading((tmp_path / report_name(target)).read_text("utf-8"))
