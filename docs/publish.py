@@ -40,7 +40,6 @@ KEPT = {
     ("swapped", "short"): "swapped",
     ("attention", "fast"): "fast",
     ("attention", "strong"): "strong",
-    ("learning", "fast"): "fast",
     ("learning-ablations", "fast"): "fast",
     ("learning", "strong"): "strong",
     ("learning-warm-start", "strong"): "strong",

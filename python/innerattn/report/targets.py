@@ -17,7 +17,7 @@ from innerattn.experiments.attention.arms import SITUATIONS as ATTENTION_SITUATI
 from innerattn.experiments.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
 from innerattn.experiments.crossed.arms import plan_crossed, plan_swapped
 from innerattn.experiments.learning.recipe import plan_ablations
-from innerattn.experiments.learning.variants import CONTINUOUS, ENTITIES, WARM_START
+from innerattn.experiments.learning.variants import CONTINUOUS, ENTITIES, LONG, WARM_START
 from innerattn.experiments.learning.variants import SITUATIONS as LEARNING_SITUATIONS
 from innerattn.experiments.plan import METHODS, SITUATIONS, PlannedRun, plan
 from innerattn.experiments.robustness.design import plan_robustness
@@ -265,6 +265,15 @@ TARGETS: dict[str, Target] = {
             shows="what each method learns after it imitated hungarian",
             plan=WARM_START.plan,
             report=_learning("learning_warm_start"),
+            situations=LEARNING_SITUATIONS,
+        ),
+        Target(
+            name="learning-long",
+            shows="what PPO learns in 30 million env-steps",
+            plan=LONG.plan,
+            report=_learning("learning_long"),
+            methods=("mappo",),
+            further=("ppo-inner", "ppo-uniform"),
             situations=LEARNING_SITUATIONS,
         ),
         Target(

@@ -33,7 +33,8 @@ class LearningCurve:
         seconds: (P,) of training until then, with what compiling took; means over runs.
         rescues: (P,) per training episode, over runs; NaN where no episode ended.
         scripts: rescues per episode of `SCRIPTS` by name, in episodes as long as those of training:
-            in the worlds of the first run's evaluation, or in worlds as those it trained in.
+            in the worlds of the evaluation of the situation's first run, or in worlds as those it
+            trained in.
     """
 
     situation: str
@@ -53,11 +54,14 @@ def learning_curves(groups: Sequence[Sequence[FinishedRun]]) -> list[LearningCur
     Raises:
         RunError: a run has no readable metrics.
     """
-    curves = (_curve(group) for group in groups)
+    scripts: dict[str, dict[str, float]] = {}
+    curves = (_curve(group, scripts) for group in groups)
     return [curve for curve in curves if curve is not None]
 
 
-def _curve(group: Sequence[FinishedRun]) -> LearningCurve | None:
+def _curve(
+    group: Sequence[FinishedRun], scripts: dict[str, dict[str, float]]
+) -> LearningCurve | None:
     courses = [_course(run) for run in group]
     if not all(len(steps) for steps, _ in courses):
         return None
@@ -67,13 +71,16 @@ def _curve(group: Sequence[FinishedRun]) -> LearningCurve | None:
     parts = max(1, min(PARTS, 2 * fewest // 3))
     edges = np.linspace(0.0, end, parts + 1)
     middles = (edges[1:] + edges[:-1]) / 2.0
+    situation = group[0].situation
+    if situation not in scripts:  # they play once for all methods
+        scripts[situation] = _scripts(group[0])
     return LearningCurve(
-        situation=group[0].situation,
+        situation=situation,
         method=group[0].method,
         env_steps=middles,
         seconds=np.mean([_seconds_at(run, middles) for run in group], axis=0),
         rescues=seed_curve(np.stack([in_parts(steps, values, edges) for steps, values in courses])),
-        scripts=_scripts(group[0]),
+        scripts=scripts[situation],
     )
 
 

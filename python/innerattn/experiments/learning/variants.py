@@ -44,3 +44,5 @@ CONTINUOUS = Variant("continuous", {"scenario.actions": "continuous"})
 """Robots that command forces in the plane instead of one of five actions."""
 WARM_START = Variant("from-hungarian", {"train.warm_start": "hungarian"})
 """Teams that imitate a script before they learn from rewards."""
+LONG = Variant("long", {"train.env_steps": 30_000_000})
+"""Three times the env-steps of the budget `strong`."""
