@@ -182,7 +182,8 @@ def draw(courses: dict[str, list[Look]], greedy: float) -> Figure:
         panel.tick_params(labelsize=7, length=2)
         for script, height in (("hungarian", 1.0), ("greedy", greedy)):
             panel.axhline(height, color=BLACK, linewidth=0.8, linestyle=(0, (1, 1)))
-            panel.annotate(script, (0.02, height), xycoords=("axes fraction", "data"), fontsize=6)
+            place = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
+            panel.annotate(script, (0.02, height), (0.0, 2.0), fontsize=6, **place)
     handles, names = by_time.get_legend_handles_labels()
     figure.legend(handles, names, fontsize=7, ncols=3, loc="outside lower center", frameon=False)
     return figure

@@ -76,6 +76,7 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
             "--seeds 3 --situations mixed --methods ppo-inner,ppo-uniform,mappo",
         ),
         ("learning", "strong", "--methods ppo-inner --seeds 5"),
+        ("learning-long", "strong", "--seeds 5"),
         (
             "learning-warm-start",
             "strong",
