@@ -73,7 +73,7 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
         (
             "attention",
             "strong",
-            "--seeds 3 --situations mixed --methods ppo-inner,ppo-uniform,mappo",
+            "--seeds 5 --situations mixed --methods ppo-inner,ppo-uniform,mappo",
         ),
         ("learning", "strong", "--methods ppo-inner --seeds 5"),
         ("learning-long", "strong", "--seeds 5"),
