@@ -2,10 +2,13 @@
 
 import http.client
 import json
+import os
+import signal
 import socket
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from http.server import ThreadingHTTPServer
 from typing import Any
 
 import pytest
@@ -120,6 +123,34 @@ def test_a_taken_port_and_two_words(server: LocalServer) -> None:
 
 
 JSON = {"Content_Type": "application/json"}
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_an_interruption_inside_a_request_ends_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    def handled(self: ThreadingHTTPServer, *request: Any) -> None:
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+        except KeyboardInterrupt:  # as the start of a thread does with it
+            raise RuntimeError("release unlocked lock") from None
+        process(self, *request)
+
+    process = ThreadingHTTPServer.process_request
+    monkeypatch.setattr(ThreadingHTTPServer, "process_request", handled)
+    server, answers = LocalServer(PAGES), []
+
+    def ask() -> None:
+        with suppress(TimeoutError):
+            answers.append(asked(server, f"/{server.word}/")[2])
+        server.close()  # in case nothing has ended it
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    with pytest.raises(KeyboardInterrupt):
+        server.serve()
+    asking.join()
+    assert answers == ["first"]
+    with socket.socket() as free:
+        free.bind((HOST, server.port))
 
 
 def test_messages_are_taken(taking: LocalServer) -> None:

@@ -12,10 +12,12 @@ import secrets
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import FrameType
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
 from innerattn.errors import InnerattnError, RunError, one_line
+from innerattn.signals import Interrupted, requests_handled_by
 
 HOST = "127.0.0.1"
 MOST_BODY_BYTES = 4096
@@ -72,11 +74,10 @@ class LocalServer:
         kind: type[_Handler] = _Handler if take is None else _TakingHandler
         members = {"pages": pages, "word": self.word, "take": staticmethod(take or _nothing)}
         try:
-            self._server = ThreadingHTTPServer((HOST, port), type("Handler", (kind,), members))
+            self._server = _Server((HOST, port), type("Handler", (kind,), members))
         except OSError as error:
             why = "is taken" if error.errno == errno.EADDRINUSE else str(error.strerror)
             raise RunError(f"--port {port}: {why}") from error
-        self._server.daemon_threads = True
 
     @property
     def port(self) -> int:
@@ -89,15 +90,37 @@ class LocalServer:
         return f"http://{HOST}:{self.port}/{self.word}/"
 
     def serve(self) -> None:
-        """Serve until `close` is called from another thread, or until Ctrl-C."""
+        """Serve until `close` is called from another thread.
+
+        Raises:
+            Interrupted: a signal asked for the end, such as Ctrl-C; no request is cut short.
+        """
         try:
-            self._server.serve_forever(poll_interval=0.1)
+            with requests_handled_by(self._server.note):
+                self._server.serve_forever(poll_interval=0.1)
         finally:
             self._server.server_close()
 
     def close(self) -> None:
         """End `serve`."""
         self._server.shutdown()
+
+
+class _Server(ThreadingHTTPServer):
+    """Ends between two requests: inside one, an exception of a signal would be lost as its own."""
+
+    daemon_threads = True
+    noted: int | None = None
+
+    def note(self, number: int, frame: FrameType | None) -> None:
+        """Handle a signal."""
+        del frame
+        self.noted = number
+
+    def service_actions(self) -> None:
+        """Raise what was noted; called between requests, ten times a second."""
+        if self.noted is not None:
+            raise Interrupted(self.noted)
 
 
 def _nothing(path: str, body: bytes) -> Answer:
