@@ -44,6 +44,7 @@ KEPT = {
     ("learning", "strong"): "strong",
     ("learning-warm-start", "strong"): "strong",
     ("learning-long", "strong"): "strong",
+    ("learning-afterstates", "strong"): "strong",
 }
 """Names of archives of runs, which several targets may share; runs are added to what is there."""
 Parts = Mapping[str, tuple[str, ...]]
@@ -60,6 +61,7 @@ TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
         ("learning-warm-start", "quick", "warm_start_quick"),
         ("learning-warm-start", "strong", "warm_start_strong"),
         ("learning-long", "strong", "learning_strong_long"),
+        ("learning-afterstates", "strong", "learning_strong_afterstates"),
     )
 } | {
     ("swapped", "short"): (DOCS / "crossed.md", ({"swapped": (swapped.ANSWER, swapped.SHARES)},)),

@@ -43,7 +43,8 @@ def test_what_each_target_needs() -> None:
         ("ppo-inner", "ppo-uniform", "mappo", "ppo-frozen", "ppo-oracle"),
         ("mixed", "mixed-8", "mixed-16"),
     )
-    assert needs["learning-long"] == (("mappo",), ("mixed", "double", "single"))
+    for name in ("learning-long", "learning-afterstates"):
+        assert needs[name] == (("mappo",), ("mixed", "double", "single"))
     assert needs["learning-ablations"] == (("ppo-inner",), ("mixed",))
     assert needs["robustness"] == (METHODS, ("mixed",))
     assert {name for name, target in TARGETS.items() if target.steps} == {"fig4", "fig5", "all"}

@@ -3,12 +3,13 @@
 from contextlib import closing
 
 import pytest
+import torch
 
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
-from innerattn.nn import EntityColumns
-from innerattn.train.columns import entity_columns
+from innerattn.nn import NUM_ELEMENTS, EntityColumns, SquareSymmetry
+from innerattn.train.columns import entity_columns, state_columns
 
 OWN = ["own.position.x", "own.available"]
 TEAMMATES = ["teammate_0.x", "teammate_0.y", "teammate_1.x", "teammate_1.y"]
@@ -51,3 +52,24 @@ def test_worlds_have_such_columns(situation: str, robots: int) -> None:
 def test_other_columns_are_refused(names: list[str], reason: str) -> None:
     with pytest.raises(ConfigError, match=rf"^network\.encoder = 'entities': .*{reason}.*'flat'"):
         entity_columns(names)
+
+
+@pytest.mark.parametrize("situation", ["single", "double", "mixed"])
+def test_the_state_of_a_turned_world_has_the_same_form(situation: str) -> None:
+    with closing(BatchEnv(situation, 50, seed=4, num_threads=1)) as env:
+        env.reset()
+        names, states = env.state_names(), torch.from_numpy(env.state())
+    states[:10, names.index("victim_0.position.x") :] = 0.0  # no victim: a robot's place decides
+    symmetry = SquareSymmetry(state_columns(names), torch.device("cpu"))
+    form = symmetry.turn(states, symmetry.frame(states))
+    for element in range(NUM_ELEMENTS):
+        turned = symmetry.turn(states, torch.full((50,), element))
+        by_hand = states.clone()
+        for axis, other, bit in (("x", "y", 1), ("y", "x", 2)):
+            for name in names:
+                if name.endswith(f".{axis}"):
+                    partner = name[:-1] + (other if element >= 4 else axis)
+                    sign = -1.0 if element & bit else 1.0
+                    by_hand[:, names.index(partner)] = sign * states[:, names.index(name)]
+        assert torch.equal(turned, by_hand)
+        assert torch.equal(symmetry.turn(turned, symmetry.frame(turned)), form)

@@ -56,6 +56,7 @@ FAULTS = {
         for kind, value in (("position_noise", 0.2), ("frozen_sensor", 0.5))
     ]
 }
+ARRIVALS = {"ppo.bootstrap": "afterstate", "scenario.rescue_radius_m": 0.9}
 METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo")
 CASES: dict[str, dict[str, Any]] = {
     **{method: {"train.method": method} for method in METHODS},
@@ -78,6 +79,12 @@ CASES: dict[str, dict[str, Any]] = {
         "scenario.actions": "continuous",
         "network.symmetry": "canonical",
         **POTENTIAL,
+    },
+    "ppo-inner afterstates": {"train.method": "ppo-inner", **ARRIVALS},
+    "mappo afterstates canonical": {
+        "train.method": "mappo",
+        "network.symmetry": "canonical",
+        **ARRIVALS,
     },
     "two threads": {"train.method": "td-inner", "train.threads": 2},
 }

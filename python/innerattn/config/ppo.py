@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from innerattn.config.files import PRESETS
-from innerattn.config.model import MOST_ROWS
+from innerattn.config.model import ADDED_LATER, MOST_ROWS
 from innerattn.config.registry import Algorithm, AlgorithmConfig
 
 
@@ -47,6 +47,11 @@ class PPOConfig(AlgorithmConfig):
         "counterfactual",
         description="baseline: expectation of Q over the robot's own actions, or a value head; "
         "mappo and continuous actions need the value head",
+    )
+    bootstrap: Annotated[Literal["state", "afterstate"], ADDED_LATER] = Field(
+        "state",
+        description="what the value after a step is of: the next state, or that state before it is "
+        "drawn where new victims appear",
     )
     attention_logit_penalty: float = Field(
         0.0,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,6 +58,6 @@ def world_states(
         np.concatenate([is_task & present[..., None], places], axis=2),
         obstacles,
     ]
-    rows = [part.reshape(len(positions), -1) for part in parts]
+    rows = [part.reshape(len(part), math.prod(part.shape[1:])) for part in parts]
     states = aligned_empty((len(positions), sum(row.shape[1] for row in rows)), np.float32)
     return np.concatenate(rows, axis=1, out=states)

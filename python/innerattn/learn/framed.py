@@ -13,7 +13,7 @@ from torch import Tensor
 from innerattn.learn.interruptions import Interruptions
 from innerattn.learn.resume import State, inside, take_generator, under
 from innerattn.learn.ring import Ring
-from innerattn.learn.types import Learner, ResumableLearner, Transitions
+from innerattn.learn.types import Afterstates, Learner, ResumableLearner, Transitions
 from innerattn.nn import NUM_ELEMENTS, SquareSymmetry
 
 
@@ -24,7 +24,13 @@ class FramedLearner:
         learner: The learner inside, whose observations and actions are turned.
     """
 
-    def __init__(self, learner: Learner, symmetry: SquareSymmetry, drawn: int | None) -> None:
+    def __init__(
+        self,
+        learner: Learner,
+        symmetry: SquareSymmetry,
+        drawn: int | None,
+        states: SquareSymmetry | None = None,
+    ) -> None:
         """Wrap a learner.
 
         Args:
@@ -32,9 +38,11 @@ class FramedLearner:
             symmetry: The group for its observations.
             drawn: Seed of the elements that are drawn in training, one for each world and control
                 step; None: every observation has its own frame.
+            states: The group for states of worlds, each of which has its own frame; None: they stay
+                as they are.
         """
         self.learner = learner
-        self._symmetry = symmetry
+        self._symmetry, self._states = symmetry, states
         self._generator = None if drawn is None else torch.Generator().manual_seed(drawn)
         self._acted: tuple[Tensor, Tensor, Tensor] | None = None
 
@@ -69,8 +77,15 @@ class FramedLearner:
             obs=seen,
             actions=self._symmetry.turn_actions(batch.actions, element),
             next_obs=self._symmetry.turn(batch.next_obs, after),
+            afterstates=self._turned(batch.afterstates),
         )
         self.learner.observe(turned, truncated)
+
+    def _turned(self, afterstates: Afterstates | None) -> Afterstates | None:
+        if afterstates is None or self._states is None:
+            return afterstates
+        states = afterstates.states
+        return afterstates._replace(states=self._states.turn(states, self._states.frame(states)))
 
     def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
         """Train the policy to take given actions; see `Learner.imitate`."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -17,6 +18,7 @@ from innerattn.learn import losses
 from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
+from innerattn.learn.afterstate import AfterstateCritic
 from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot, finite
 from innerattn.learn.networks import draw_networks
 from innerattn.learn.resume import (
@@ -29,7 +31,14 @@ from innerattn.learn.resume import (
     whole,
 )
 from innerattn.learn.ring import Ring
-from innerattn.learn.rollout import Rollout, RolloutBuffer, rows_of, standardised, steps_of
+from innerattn.learn.rollout import (
+    Arrivals,
+    Rollout,
+    RolloutBuffer,
+    rows_of,
+    standardised,
+    steps_of,
+)
 from innerattn.learn.types import Scheduled, Team, Transitions
 
 _METRICS = (
@@ -91,8 +100,11 @@ class PPO(ActorCritic):
         """Build networks and optimisers; arguments as in `ActorCritic`, numbers in ``ppo``.
 
         Raises:
-            ValueError: As in `ActorCritic`, or continuous actions have no counterfactual baseline.
+            ValueError: As in `ActorCritic`, or continuous actions have no counterfactual baseline,
+                or states have no columns that `ppo.bootstrap` needs.
         """
+        if ppo.bootstrap == "afterstate" and not team.state_width:
+            raise ValueError(f"state_width = 0: ppo.bootstrap = {ppo.bootstrap!r} needs a state")
         if team.action_width and ppo.advantage != "value":
             raise ValueError(f"ppo.advantage = {ppo.advantage!r}: continuous actions need 'value'")
         outputs = None if ppo.advantage == "counterfactual" else 1
@@ -111,6 +123,13 @@ class PPO(ActorCritic):
         self._shuffle = torch.Generator().manual_seed(self._data_seed)
         self._buffer = RolloutBuffer(ppo.rollout_steps, team, device, dtype)
         self._steps_of_frozen = False
+        self._afterstates: AfterstateCritic | None = None
+        if ppo.bootstrap == "afterstate":
+            sizes = team.state_width, team.num_robots, network.hidden_width
+            afterstate_seed = int(np.random.SeedSequence([seed, 3]).generate_state(1, np.uint64)[0])
+            self._afterstates = AfterstateCritic(
+                sizes, seed=afterstate_seed, device=device, dtype=dtype
+            )
         self._passes: _Passes | None = None
         self._gamma, self._entropy_weight = ppo.gamma, ppo.entropy_weight
         self.scale = ReturnScale(team.num_robots, ppo.gamma, device)
@@ -281,6 +300,7 @@ class PPO(ActorCritic):
         step, env = steps.cut.nonzero(as_tuple=True)
         next_actions = self._actions.draw(self.actor(steps.after), self._noise)
         next_value[step, :, env] = self._evaluate(steps.after, next_actions)[2].t()
+        next_value = self._without_arrivals(steps.arrivals, next_value)
         advantage = generalised_advantage(
             reward,
             value,
@@ -298,6 +318,21 @@ class PPO(ActorCritic):
             advantage=standardised(rows_of(advantage)),
             target=rows_of(advantage + value),
         )
+
+    def _without_arrivals(self, arrivals: Arrivals | None, next_value: Tensor) -> Tensor:
+        """The values (T, R, E) after each step, before it is drawn where victims appear."""
+        critic, config = self._afterstates, self._config
+        if critic is None or arrivals is None or not len(arrivals.step):
+            return next_value
+        critic.fit(
+            arrivals,
+            next_value,
+            passes=config.epochs,
+            minibatch_size=config.minibatch_size,
+            grad_clip=config.critic_grad_clip,
+            rate=torch.tensor(self._rate, dtype=torch.float64),
+        )
+        return critic.put_in_place(arrivals, next_value)
 
     def _evaluate(
         self, obs: Tensor, actions: Tensor, log_probs: Tensor | None = None
@@ -349,6 +384,8 @@ class PPO(ActorCritic):
             **under("scale", self.scale.resume_state()),
             **under("buffer", self._buffer.resume_state()),
         }
+        if self._afterstates is not None:
+            state |= under("afterstates", self._afterstates.resume_state())
         if self._passes is not None:
             passes = self._passes
             state |= under("rollout", passes.rollout._asdict())
@@ -364,6 +401,8 @@ class PPO(ActorCritic):
         self._steps_of_frozen = bool(take_whole(state, "frozen", 0, 1))
         self.scale.load_resume_state(inside("scale", state))
         self._buffer.load_resume_state(inside("buffer", state))
+        if self._afterstates is not None:
+            self._afterstates.load_resume_state(inside("afterstates", state))
         self._passes = None
         if "epoch" in state:
             rollout = Rollout.taken_from(inside("rollout", state), self._team, self._number(0.0))

@@ -11,6 +11,20 @@ from innerattn.learn.resume import State, take, take_within
 from innerattn.learn.types import Team, Transitions
 
 
+class Arrivals(NamedTuple):
+    """The n steps of a rollout with which victims appeared, and the worlds without these victims.
+
+    Attributes:
+        step: (n,) int64.
+        env: (n,) int64.
+        states: (n, S).
+    """
+
+    step: Tensor
+    env: Tensor
+    states: Tensor
+
+
 class Steps(NamedTuple):
     """T control steps of E worlds; rows go through the worlds of a step, step after step.
 
@@ -23,6 +37,7 @@ class Steps(NamedTuple):
         ended: (T, E) bool, terminated or truncated by a time limit.
         cut: (T, E) bool, steps whose successor is not in the rollout: ends, and the last step.
         after: (R, n, D) observations after the n cut steps, of the same episode, in order.
+        arrivals: Where victims appeared; None if that was not told with every step.
     """
 
     obs: Tensor
@@ -33,6 +48,7 @@ class Steps(NamedTuple):
     ended: Tensor
     cut: Tensor
     after: Tensor
+    arrivals: Arrivals | None
 
 
 class RolloutBuffer:
@@ -53,6 +69,7 @@ class RolloutBuffer:
         self._filled = 0
         self._all_known = True
         self._after: list[Tensor] = []
+        self._arrivals: list[Arrivals] = []
 
     @property
     def full(self) -> bool:
@@ -61,7 +78,7 @@ class RolloutBuffer:
 
     def clear(self) -> None:
         """Hold no step; the memory is kept."""
-        self._filled, self._all_known, self._after = 0, True, []
+        self._filled, self._all_known, self._after, self._arrivals = 0, True, [], []
 
     def add(self, batch: Transitions, truncated: Tensor, log_probs: Tensor | None) -> None:
         """Take one control step.
@@ -84,6 +101,9 @@ class RolloutBuffer:
             self._all_known = False
         else:
             self._log_probs[:, :, step].copy_(log_probs)
+        if batch.afterstates is not None:
+            env, states = (tensor.to(self._device) for tensor in batch.afterstates)
+            self._arrivals.append(Arrivals(torch.full_like(env, step), env, states.to(self._dtype)))
         self._filled += 1
         cut = batch.next_obs if self.full else batch.next_obs[ended.to(batch.next_obs.device)]
         self._after.append(cut.to(self._device, self._dtype))
@@ -101,7 +121,11 @@ class RolloutBuffer:
             ended=self._ended,
             cut=cut,
             after=torch.cat(self._after).transpose(0, 1),
+            arrivals=self._all_arrivals() if len(self._arrivals) == self._filled else None,
         )
+
+    def _all_arrivals(self) -> Arrivals:
+        return Arrivals._make(torch.cat(parts) for parts in zip(*self._arrivals, strict=True))
 
     def resume_state(self) -> dict[str, Tensor]:
         """The steps held; see `Resumable`."""
@@ -116,6 +140,8 @@ class RolloutBuffer:
             "ended": self._ended[:held].to(torch.uint8),
             "after": torch.cat(self._after),
         }
+        if self._arrivals:
+            state |= {f"arrivals.{k}": v for k, v in self._all_arrivals()._asdict().items()}
         return state | ({"log_probs": self._log_probs[:, :, :held]} if self._all_known else {})
 
     def load_resume_state(self, state: State) -> None:
@@ -150,6 +176,16 @@ class RolloutBuffer:
             cut += int((flags["ended"][-1] == 0).sum())
         after = take(state, "after", self._dtype, cut, robots, width)
         self._after = [after.to(self._device)]
+        if "arrivals.states" in state:
+            self._arrivals = self._taken_arrivals(state, held, envs)
+
+    def _taken_arrivals(self, state: State, held: int, envs: int) -> list[Arrivals]:
+        """Arrivals of a state, step by step."""
+        states = take(state, "arrivals.states", self._dtype, None, None)
+        step = take_within(state, "arrivals.step", torch.int64, 0, held - 1, len(states))
+        env = take_within(state, "arrivals.env", torch.int64, 0, envs - 1, len(states))
+        whole = Arrivals(*(tensor.to(self._device) for tensor in (step, env, states)))
+        return [Arrivals._make(tensor[whole.step == k] for tensor in whole) for k in range(held)]
 
     def _reserve(self, envs: int) -> None:
         """Make the memory for E worlds; what is held is dropped."""

@@ -35,6 +35,8 @@ class Team(NamedTuple):
         partners: The columns of an observation that tell who can help whom; needed only where
             `network.attention` is "oracle".
         action_width: W, numbers of a continuous action; 0 where actions are discrete.
+        state_width: S, columns of the state of a world; needed only where `ppo.bootstrap` is
+            "afterstate".
         swapped: Two robots that swap their initial weights; None: none do.
     """
 
@@ -46,6 +48,7 @@ class Team(NamedTuple):
     entities: EntityColumns | None = None
     partners: PartnerColumns | None = None
     action_width: int = 0
+    state_width: int = 0
     swapped: tuple[int, int] | None = None
 
     @property
@@ -70,6 +73,18 @@ class Scheduled(NamedTuple):
     reward_weights: Tensor | None = None
 
 
+class Afterstates(NamedTuple):
+    """The n worlds in which victims appeared with a control step, without these victims.
+
+    Attributes:
+        env: (n,) int64, numbers of the worlds, whose episodes all go on.
+        states: (n, S) float32.
+    """
+
+    env: Tensor
+    states: Tensor
+
+
 class Transitions(NamedTuple):
     """B transitions of the whole team.
 
@@ -81,6 +96,7 @@ class Transitions(NamedTuple):
         terminated: (B,) bool; a time limit is not a termination.
         reward_parts: (B, R, P) float32, whose weighted sum the reward is; None if the run weighs
             no rewards. A learner that remembers rewards weighs them anew.
+        afterstates: Of the worlds in which victims appeared; None if the learner asks for none.
     """
 
     obs: Tensor
@@ -89,6 +105,7 @@ class Transitions(NamedTuple):
     next_obs: Tensor
     terminated: Tensor
     reward_parts: Tensor | None = None
+    afterstates: Afterstates | None = None
 
 
 class Learner(Protocol):

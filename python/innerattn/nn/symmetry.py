@@ -95,7 +95,8 @@ class SquareSymmetry:
     def turn(self, obs: Tensor, element: Tensor) -> Tensor:
         """Observations (..., D) of worlds turned by elements (...)."""
         elements = element.flatten()
-        rows = obs.reshape(len(elements), -1) * self._signs.index_select(0, elements).to(obs.dtype)
+        signs = self._signs.index_select(0, elements).to(obs.dtype)
+        rows = obs.reshape(signs.shape) * signs
         swapped = (elements >= 4).nonzero().squeeze(1)
         # Row by row: to choose between two copies of everything takes four times as long.
         rows.index_copy_(0, swapped, rows[swapped].index_select(1, self._swapped))

@@ -17,7 +17,13 @@ from innerattn.experiments.attention.arms import SITUATIONS as ATTENTION_SITUATI
 from innerattn.experiments.crossed.arms import SITUATIONS as CROSSED_SITUATIONS
 from innerattn.experiments.crossed.arms import plan_crossed, plan_swapped
 from innerattn.experiments.learning.recipe import plan_ablations
-from innerattn.experiments.learning.variants import CONTINUOUS, ENTITIES, LONG, WARM_START
+from innerattn.experiments.learning.variants import (
+    AFTERSTATES,
+    CONTINUOUS,
+    ENTITIES,
+    LONG,
+    WARM_START,
+)
 from innerattn.experiments.learning.variants import SITUATIONS as LEARNING_SITUATIONS
 from innerattn.experiments.plan import METHODS, SITUATIONS, PlannedRun, plan
 from innerattn.experiments.robustness.design import plan_robustness
@@ -272,6 +278,15 @@ TARGETS: dict[str, Target] = {
             shows="what PPO learns in 30 million env-steps",
             plan=LONG.plan,
             report=_learning("learning_long"),
+            methods=("mappo",),
+            further=("ppo-inner", "ppo-uniform"),
+            situations=LEARNING_SITUATIONS,
+        ),
+        Target(
+            name="learning-afterstates",
+            shows="what PPO learns in as many with the values of afterstates",
+            plan=AFTERSTATES.plan,
+            report=_learning("learning_afterstates"),
             methods=("mappo",),
             further=("ppo-inner", "ppo-uniform"),
             situations=LEARNING_SITUATIONS,

@@ -10,7 +10,7 @@ from pkgutil import resolve_name
 
 import torch
 
-from innerattn.config import RunConfig, Scenario
+from innerattn.config import PPOConfig, RunConfig, Scenario
 from innerattn.config.registry import methods
 from innerattn.cores import usable_cores
 from innerattn.envs import BatchEnv
@@ -18,7 +18,12 @@ from innerattn.errors import ConfigError
 from innerattn.learn.framed import FramedLearner
 from innerattn.learn.types import Learner, LearnerClass, Team
 from innerattn.nn import SquareSymmetry, VectorColumns
-from innerattn.train.columns import entity_columns, partner_columns, vector_columns
+from innerattn.train.columns import (
+    entity_columns,
+    partner_columns,
+    state_columns,
+    vector_columns,
+)
 
 
 def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -> Learner:
@@ -41,7 +46,10 @@ def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -
         return learner
     symmetry = SquareSymmetry(_turning_columns(config.scenario, names), device)
     if config.network.symmetry == "canonical":
-        return FramedLearner(learner, symmetry, None)
+        states = None
+        if needs_afterstates(config):
+            states = SquareSymmetry(state_columns(env.state_names()), device)
+        return FramedLearner(learner, symmetry, None, states)
     return FramedLearner(learner, symmetry, config.train.seed) if training else learner
 
 
@@ -57,8 +65,15 @@ def team_of(config: RunConfig, env: BatchEnv) -> Team:
         entities=entity_columns(names) if config.network.encoder == "entities" else None,
         partners=partner_columns(names) if config.network.attention == "oracle" else None,
         action_width=2 if env.continuous else 0,
+        state_width=len(env.state_names()) if needs_afterstates(config) else 0,
         swapped=_swapped(config),
     )
+
+
+def needs_afterstates(config: RunConfig) -> bool:
+    """Whether the learner asks for `Transitions.afterstates`."""
+    algorithm = config.algorithm
+    return isinstance(algorithm, PPOConfig) and algorithm.bootstrap == "afterstate"
 
 
 def _swapped(config: RunConfig) -> tuple[int, int] | None:

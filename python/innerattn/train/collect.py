@@ -16,7 +16,8 @@ from torch import Tensor
 from innerattn.envs import BatchEnv
 from innerattn.learn.divergence import refuse_not_finite_reward
 from innerattn.learn.resume import State, take, take_within
-from innerattn.learn.types import Learner, Transitions
+from innerattn.learn.types import Afterstates, Learner, Transitions
+from innerattn.train.afterstates import afterstates
 from innerattn.train.schedule import Schedule
 
 _MOST = 2**62
@@ -41,6 +42,7 @@ class Collector:
         device: torch.device,
         schedule: Schedule | None = None,
         stagger_starts: bool = False,
+        afterstates: bool = False,
     ) -> None:
         """Reset the worlds.
 
@@ -50,11 +52,13 @@ class Collector:
             device: where tensors are made.
             schedule: weighs the rewards; None: they are the worlds' own.
             stagger_starts: let worlds be at different steps of their episodes.
+            afterstates: tell the learner of worlds in which victims appear.
         """
         self._env = env
         self._learner = learner
         self._device = device
         self._schedule = schedule
+        self._afterstates = afterstates
         self._obs = self._tensor(_staggered(env) if stagger_starts else env.reset())
         self._open_rescues: NDArray[np.int64] = np.zeros(env.num_envs, np.int64)
         self._episodes = self._rescues = self._total = 0
@@ -79,6 +83,11 @@ class Collector:
         )
         if self._schedule is not None:
             transitions = self._schedule.weigh(transitions, step)
+        if self._afterstates:
+            going_on = ~(step.terminated | step.truncated)
+            env, states = afterstates(self._env, going_on)
+            found = Afterstates(self._tensor(env), self._tensor(states))
+            transitions = transitions._replace(afterstates=found)
         refuse_not_finite_reward(transitions.reward)
         self._obs = self._tensor(step.obs)
         np.add.at(self._open_rescues, step.rescues["env"], 1)

@@ -77,6 +77,24 @@ def vector_columns(names: Sequence[str]) -> VectorColumns:
     )
 
 
+def state_columns(names: Sequence[str]) -> VectorColumns:
+    """Columns of a world's state that turn with the world: pairs ``*.x`` and ``*.y``.
+
+    Victims choose the frame, in the order of their slots; then the robots' places and velocities.
+
+    Args:
+        names: Of all columns, as `innerattn.envs.BatchEnv.state_names` gives them.
+    """
+    place = {name: column for column, name in enumerate(names)}
+    stems = [name.removesuffix(".x") for name in names if name.endswith(".x")]
+    pairs = {stem: (place[f"{stem}.x"], place[f"{stem}.y"]) for stem in stems}
+    victims = [pairs[stem] for stem in stems if stem.startswith("victim_")]
+    robots = [pairs[stem] for stem in stems if not stem.startswith(("victim_", "obstacle_"))]
+    return VectorColumns(
+        width=len(names), vectors=tuple(pairs.values()), handed=(), anchors=(*victims, *robots)
+    )
+
+
 def partner_columns(names: Sequence[str]) -> PartnerColumns:
     """The columns that tell who can help whom: abilities, places, and the first victim's needs.
 

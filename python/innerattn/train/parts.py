@@ -14,7 +14,7 @@ from innerattn.learn.resume import Resumable, State, inside, take, under
 from innerattn.learn.ring import Ring
 from innerattn.learn.types import Learner, ResumableLearner
 from innerattn.train.attention_log import AttentionLog
-from innerattn.train.build import build_learner, team_of
+from innerattn.train.build import build_learner, needs_afterstates, team_of
 from innerattn.train.checkpoint_info import Stage
 from innerattn.train.collect import Collector
 from innerattn.train.imitate import Imitation
@@ -50,7 +50,9 @@ class Parts:
         self.schedule = Schedule(config, env, self.learner)
         device = torch.device(config.train.device)
         stagger = config.train.stagger_starts
-        self.collector = Collector(env, self.learner, device, self.schedule, stagger)
+        self.collector = Collector(
+            env, self.learner, device, self.schedule, stagger, needs_afterstates(config)
+        )
         warm = stage == "imitating" and config.train.warm_start != "none"
         self.imitation = Imitation(config, env, self.learner, self.collector) if warm else None
         refuse_what_does_not_fit(self.rings(stage), config)

@@ -89,6 +89,9 @@ ABLATIONS: tuple[Ablation, ...] = (
         "potential",
         train__potential="hungarian",
     ),
+    _ablation(
+        "value of the next state", "of its afterstate", "afterstate", ppo__bootstrap="afterstate"
+    ),
 )
 """One change each, in the order of the table."""
 

@@ -46,3 +46,5 @@ WARM_START = Variant("from-hungarian", {"train.warm_start": "hungarian"})
 """Teams that imitate a script before they learn from rewards."""
 LONG = Variant("long", {"train.env_steps": 30_000_000})
 """Three times the env-steps of the budget `strong`."""
+AFTERSTATES = Variant("afterstates", {**LONG.changes, "ppo.bootstrap": "afterstate"})
+"""As many env-steps, with the values of afterstates."""
