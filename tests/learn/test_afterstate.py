@@ -1,5 +1,7 @@
 """The value of afterstates: its fit against a plain loop, and what it changes in advantages."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
@@ -18,12 +20,22 @@ ARRIVED = [[0, 2], [], [1], [3], [], [0, 1, 3]]
 """Worlds in which victims appear, step by step."""
 
 
-def make(bootstrap: str, advantage: str = "value", state_width: int = STATE_WIDTH) -> PPO:
+def make(
+    bootstrap: str,
+    advantage: str = "value",
+    state_width: int = STATE_WIDTH,
+    afterstate_epochs: int | None = None,
+) -> PPO:
     attention = "none" if advantage == "value" else "inner"
     return PPO(
         Team(ROBOTS, OBS_WIDTH, NUM_ACTIONS, state_width=state_width),
         NetworkConfig(hidden_width=8, attention_heads=2, attention=attention),
-        PPOConfig(**NUMBERS, bootstrap=bootstrap, advantage=advantage),
+        PPOConfig(
+            **NUMBERS,
+            bootstrap=bootstrap,
+            advantage=advantage,
+            afterstate_epochs=afterstate_epochs,
+        ),
         seed=3,
         device=CPU,
         dtype=torch.float64,
@@ -98,6 +110,24 @@ def test_where_no_victim_appears_nothing_changes(advantage: str) -> None:
         observed(learner, ARRIVED)
         learner.learn()
     assert not torch.equal(*(x.state()["actor.first.weight"] for x in (state, afterstate)))
+
+
+@pytest.mark.parametrize(("epochs", "passes"), [(None, 2), (7, 7)])
+def test_the_fit_makes_as_many_passes_as_it_is_told(
+    epochs: int | None, passes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[int] = []
+    fit = AfterstateCritic.fit
+
+    def watched(self: AfterstateCritic, *arguments: Any, passes: int, **numbers: Any) -> None:
+        made.append(passes)
+        fit(self, *arguments, passes=passes, **numbers)
+
+    monkeypatch.setattr(AfterstateCritic, "fit", watched)
+    learner = make("afterstate", afterstate_epochs=epochs)
+    observed(learner, ARRIVED)
+    learner.learn()
+    assert made == [passes]
 
 
 def test_the_fit_agrees_with_a_plain_loop() -> None:

@@ -53,6 +53,12 @@ class PPOConfig(AlgorithmConfig):
         description="what the value after a step is of: the next state, or that state before it is "
         "drawn where new victims appear",
     )
+    afterstate_epochs: Annotated[int | None, ADDED_LATER] = Field(
+        None,
+        ge=1,
+        le=1_000,
+        description="passes over a rollout's afterstates; None: as many as over the rollout",
+    )
     attention_logit_penalty: float = Field(
         0.0,
         ge=0.0,

@@ -327,7 +327,7 @@ class PPO(ActorCritic):
         critic.fit(
             arrivals,
             next_value,
-            passes=config.epochs,
+            passes=config.afterstate_epochs or config.epochs,
             minibatch_size=config.minibatch_size,
             grad_clip=config.critic_grad_clip,
             rate=torch.tensor(self._rate, dtype=torch.float64),

@@ -90,7 +90,17 @@ ABLATIONS: tuple[Ablation, ...] = (
         train__potential="hungarian",
     ),
     _ablation(
-        "value of the next state", "of its afterstate", "afterstate", ppo__bootstrap="afterstate"
+        "value of the next state",
+        "of its afterstate",
+        "afterstate",
+        ppo__bootstrap="afterstate",
+        ppo__afterstate_epochs=10,
+    ),
+    _ablation(
+        "value of the next state",
+        "of its afterstate, fitted in two passes",
+        "afterstate-two-passes",
+        ppo__bootstrap="afterstate",
     ),
 )
 """One change each, in the order of the table."""
