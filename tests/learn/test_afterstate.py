@@ -1,7 +1,5 @@
 """The value of afterstates: its fit against a plain loop, and what it changes in advantages."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 import torch
@@ -20,22 +18,12 @@ ARRIVED = [[0, 2], [], [1], [3], [], [0, 1, 3]]
 """Worlds in which victims appear, step by step."""
 
 
-def make(
-    bootstrap: str,
-    advantage: str = "value",
-    state_width: int = STATE_WIDTH,
-    afterstate_epochs: int | None = None,
-) -> PPO:
+def make(bootstrap: str, advantage: str = "value", state_width: int = STATE_WIDTH) -> PPO:
     attention = "none" if advantage == "value" else "inner"
     return PPO(
         Team(ROBOTS, OBS_WIDTH, NUM_ACTIONS, state_width=state_width),
         NetworkConfig(hidden_width=8, attention_heads=2, attention=attention),
-        PPOConfig(
-            **NUMBERS,
-            bootstrap=bootstrap,
-            advantage=advantage,
-            afterstate_epochs=afterstate_epochs,
-        ),
+        PPOConfig(**NUMBERS, bootstrap=bootstrap, advantage=advantage),
         seed=3,
         device=CPU,
         dtype=torch.float64,
@@ -112,26 +100,13 @@ def test_where_no_victim_appears_nothing_changes(advantage: str) -> None:
     assert not torch.equal(*(x.state()["actor.first.weight"] for x in (state, afterstate)))
 
 
-@pytest.mark.parametrize(("epochs", "passes"), [(None, 2), (7, 7)])
-def test_the_fit_makes_as_many_passes_as_it_is_told(
-    epochs: int | None, passes: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    made: list[int] = []
-    fit = AfterstateCritic.fit
-
-    def watched(self: AfterstateCritic, *arguments: Any, passes: int, **numbers: Any) -> None:
-        made.append(passes)
-        fit(self, *arguments, passes=passes, **numbers)
-
-    monkeypatch.setattr(AfterstateCritic, "fit", watched)
-    learner = make("afterstate", afterstate_epochs=epochs)
-    observed(learner, ARRIVED)
-    learner.learn()
-    assert made == [passes]
-
-
-def test_the_fit_agrees_with_a_plain_loop() -> None:
-    critic = AfterstateCritic((STATE_WIDTH, ROBOTS, 8), seed=5, device=CPU, dtype=torch.float64)
+@pytest.mark.parametrize(("afterstate_epochs", "passes"), [(None, 2), (3, 3)])
+def test_the_fit_agrees_with_a_plain_loop(afterstate_epochs: int | None, passes: int) -> None:
+    ppo = PPOConfig(
+        epochs=2, afterstate_epochs=afterstate_epochs, minibatch_size=4, critic_grad_clip=0.5
+    )
+    sizes = (STATE_WIDTH, ROBOTS, 8)
+    critic = AfterstateCritic(sizes, ppo, seed=5, device=CPU, dtype=torch.float64)
     source = np.random.default_rng(0)
     step, env = np.nonzero(source.random((STEPS, ENVS)) < 0.5)
     states, next_value = source.normal(size=(len(step), 3)), source.normal(size=(STEPS, 2, ENVS))
@@ -149,15 +124,8 @@ def test_the_fit_agrees_with_a_plain_loop() -> None:
     draws = torch.Generator()
     draws.set_state(critic.resume_state()["draws"])
     arrivals = Arrivals(*map(torch.from_numpy, (step, env, states)))
-    critic.fit(
-        arrivals,
-        torch.from_numpy(next_value),
-        passes=3,
-        minibatch_size=4,
-        grad_clip=0.5,
-        rate=torch.tensor(0.01, dtype=torch.float64),
-    )
-    for _ in range(3):
+    critic.replaced(arrivals, torch.from_numpy(next_value), 0.01)
+    for _ in range(passes):
         order = torch.randperm(len(step), generator=draws).tolist()
         for start in range(0, len(order), 4):
             rows = order[start : start + 4]
@@ -175,15 +143,14 @@ def test_the_fit_agrees_with_a_plain_loop() -> None:
 
 
 def test_it_learns_the_mean_over_draws() -> None:
-    critic = AfterstateCritic((1, 1, 16), seed=0, device=CPU, dtype=torch.float32)
+    ppo = PPOConfig(afterstate_epochs=20, minibatch_size=400, critic_grad_clip=9.0)
+    critic = AfterstateCritic((1, 1, 16), ppo, seed=0, device=CPU, dtype=torch.float32)
     source = torch.Generator().manual_seed(0)
     kind = torch.randint(2, (25, 64), generator=source)
     next_value = (3.0 * kind + torch.randn(25, 64, generator=source)).unsqueeze(1)
     step, env = torch.ones(25, 64).nonzero(as_tuple=True)
     arrivals = Arrivals(step, env, kind[step, env].float().unsqueeze(1))
-    rate = torch.tensor(0.01, dtype=torch.float64)
-    critic.fit(arrivals, next_value, passes=20, minibatch_size=400, grad_clip=9.0, rate=rate)
-    found = critic.put_in_place(arrivals, next_value)[:, 0]
+    found = critic.replaced(arrivals, next_value, 0.01)[:, 0]
     for number in range(2):
         expected = next_value[:, 0][kind == number].mean()
         torch.testing.assert_close(found[kind == number].mean(), expected, atol=0.1, rtol=0.0)

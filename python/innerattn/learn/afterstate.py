@@ -1,18 +1,20 @@
 """The value of afterstates: worlds after a rescue, before it is drawn where new victims appear.
 
 A new victim is near or far by chance, whatever the robots did, and the value of the next state with
-it. The value of the afterstate is the mean over all draws. Put in the place of the next state's
-value, it leaves the expectation of advantages as it is, and most of their variance out. Source:
-Sutton & Barto 2018, section 6.8 (afterstates).
+it. The value of the afterstate is the mean over all draws. In the place of the next state's value,
+it keeps the mean of advantages and takes the noise of the draw out of them. Source: Sutton & Barto
+2018, section 6.8 (afterstates).
 """
 
 from __future__ import annotations
 
 from functools import partial
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from innerattn.config import PPOConfig
 from innerattn.learn import losses
 from innerattn.learn.adam import AdamStepper, Forward
 from innerattn.learn.gradients import clip_norm
@@ -27,12 +29,13 @@ class AfterstateCritic:
     """One network for the whole team, from the state of a world to a value for each robot.
 
     Attributes:
-        network: Maps states (1, n, S) to values (1, n, R).
+        network: Maps states (1, n, S) to values (1, R, n).
     """
 
     def __init__(
         self,
         sizes: tuple[int, int, int],
+        ppo: PPOConfig,
         *,
         seed: int,
         device: torch.device,
@@ -42,57 +45,49 @@ class AfterstateCritic:
 
         Args:
             sizes: S, columns of a state; R, robots; and the width of both hidden layers.
-            seed: Seed of the parameters and of the order of rows.
+            ppo: Says how the network is fitted.
+            seed: Seed of the run, for the parameters and the order of rows.
             device: Where the network lives.
             dtype: Floating-point type of the network.
         """
-        width, self._robots, hidden = sizes
-        self._draws = torch.Generator().manual_seed(seed)
-        network = CentralCritic(1, width, self._robots, hidden, self._draws)
-        self.network = network.to(device, dtype)
+        width, robots, hidden = sizes
+        draws_seed = int(np.random.SeedSequence([seed, 3]).generate_state(1, np.uint64)[0])
+        self._draws = torch.Generator().manual_seed(draws_seed)
+        self.network = CentralCritic(1, width, robots, hidden, self._draws).to(device, dtype)
         self._adam = AdamStepper(self.network)
-        self._dtype, self._device = dtype, device
-
-    def fit(
-        self,
-        arrivals: Arrivals,
-        next_value: Tensor,
-        *,
-        passes: int,
-        minibatch_size: int,
-        grad_clip: float,
-        rate: Tensor,
-    ) -> None:
-        """Fit the network to the values of the states that followed.
-
-        Args:
-            arrivals: The n afterstates of a rollout, at least one.
-            next_value: (T, R, E) value of the state after each step.
-            passes: Passes over the afterstates.
-            minibatch_size: Afterstates per step of Adam.
-            grad_clip: Largest norm of the gradients.
-            rate: () float64, the step size.
-        """
-        wanted = next_value[arrivals.step, :, arrivals.env].t()
-        for _ in range(passes):
-            order = torch.randperm(len(arrivals.step), generator=self._draws).to(self._device)
-            for chosen in torch.split(order, minibatch_size):
-                loss_of = partial(self._loss, arrivals.states[chosen], wanted[:, chosen])
-                gradients, _ = self._adam.gradients(loss_of)
-                norm = clip_norm(gradients, grad_clip)
-                self._adam.step(gradients, rate, norm.isfinite())
+        self._config = ppo
 
     @torch.no_grad()
-    def put_in_place(self, arrivals: Arrivals, next_value: Tensor) -> Tensor:
-        """The values (T, R, E) after each step, those of the afterstates where victims appeared.
+    def replaced(self, arrivals: Arrivals, next_value: Tensor, rate: float) -> Tensor:
+        """The values after each step, those of the afterstates where victims appeared.
+
+        The network is fitted to the values of these states before.
 
         Args:
-            arrivals: The n afterstates, at least one.
+            arrivals: The n afterstates of a rollout.
             next_value: (T, R, E) value of the state after each step; it stays as it is.
+            rate: The step size.
+
+        Returns:
+            (T, R, E).
         """
+        if not len(arrivals.step):
+            return next_value
+        self._fit(arrivals.states, next_value[arrivals.step, :, arrivals.env].t(), rate)
         found = next_value.clone()
         found[arrivals.step, :, arrivals.env] = self._values(self.network, arrivals.states).t()
         return found
+
+    def _fit(self, states: Tensor, wanted: Tensor, rate: float) -> None:
+        """Pass over states (n, S), whose values are to become ``wanted`` (R, n)."""
+        config, step_size = self._config, torch.tensor(rate, dtype=torch.float64)
+        for _ in range(config.afterstate_epochs or config.epochs):
+            order = torch.randperm(len(states), generator=self._draws).to(states.device)
+            for chosen in torch.split(order, config.minibatch_size):
+                loss_of = partial(self._loss, states[chosen], wanted[:, chosen])
+                gradients, _ = self._adam.gradients(loss_of)
+                norm = clip_norm(gradients, config.critic_grad_clip)
+                self._adam.step(gradients, step_size, norm.isfinite())
 
     def resume_state(self) -> dict[str, Tensor]:
         """The fit, and what it goes on with; see `Resumable`."""

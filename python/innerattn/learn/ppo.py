@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -31,14 +30,7 @@ from innerattn.learn.resume import (
     whole,
 )
 from innerattn.learn.ring import Ring
-from innerattn.learn.rollout import (
-    Arrivals,
-    Rollout,
-    RolloutBuffer,
-    rows_of,
-    standardised,
-    steps_of,
-)
+from innerattn.learn.rollout import Rollout, RolloutBuffer, rows_of, standardised, steps_of
 from innerattn.learn.types import Scheduled, Team, Transitions
 
 _METRICS = (
@@ -126,10 +118,7 @@ class PPO(ActorCritic):
         self._afterstates: AfterstateCritic | None = None
         if ppo.bootstrap == "afterstate":
             sizes = team.state_width, team.num_robots, network.hidden_width
-            afterstate_seed = int(np.random.SeedSequence([seed, 3]).generate_state(1, np.uint64)[0])
-            self._afterstates = AfterstateCritic(
-                sizes, seed=afterstate_seed, device=device, dtype=dtype
-            )
+            self._afterstates = AfterstateCritic(sizes, ppo, seed=seed, device=device, dtype=dtype)
         self._passes: _Passes | None = None
         self._gamma, self._entropy_weight = ppo.gamma, ppo.entropy_weight
         self.scale = ReturnScale(team.num_robots, ppo.gamma, device)
@@ -300,7 +289,8 @@ class PPO(ActorCritic):
         step, env = steps.cut.nonzero(as_tuple=True)
         next_actions = self._actions.draw(self.actor(steps.after), self._noise)
         next_value[step, :, env] = self._evaluate(steps.after, next_actions)[2].t()
-        next_value = self._without_arrivals(steps.arrivals, next_value)
+        if self._afterstates is not None and steps.arrivals is not None:
+            next_value = self._afterstates.replaced(steps.arrivals, next_value, self._rate)
         advantage = generalised_advantage(
             reward,
             value,
@@ -318,21 +308,6 @@ class PPO(ActorCritic):
             advantage=standardised(rows_of(advantage)),
             target=rows_of(advantage + value),
         )
-
-    def _without_arrivals(self, arrivals: Arrivals | None, next_value: Tensor) -> Tensor:
-        """The values (T, R, E) after each step, before it is drawn where victims appear."""
-        critic, config = self._afterstates, self._config
-        if critic is None or arrivals is None or not len(arrivals.step):
-            return next_value
-        critic.fit(
-            arrivals,
-            next_value,
-            passes=config.afterstate_epochs or config.epochs,
-            minibatch_size=config.minibatch_size,
-            grad_clip=config.critic_grad_clip,
-            rate=torch.tensor(self._rate, dtype=torch.float64),
-        )
-        return critic.put_in_place(arrivals, next_value)
 
     def _evaluate(
         self, obs: Tensor, actions: Tensor, log_probs: Tensor | None = None
