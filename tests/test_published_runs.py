@@ -77,7 +77,7 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
         ),
         ("learning", "strong", "--methods ppo-inner --seeds 5"),
         ("learning-long", "strong", "--seeds 5"),
-        ("learning-afterstates", "strong", "--seeds 5 --situations mixed,double"),
+        ("learning-afterstates", "strong", "--seeds 5"),
         (
             "learning-warm-start",
             "strong",
