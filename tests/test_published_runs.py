@@ -69,7 +69,7 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
     [
         ("swapped", "short", "--seeds 10 --situations single"),
         ("learning-ablations", "fast", "--seeds 3"),
-        ("attention", "fast", "--seeds 10 --situations mixed,mixed-8"),
+        ("attention", "fast", "--seeds 10 --situations mixed,mixed-8,mixed-16"),
         (
             "attention",
             "strong",
@@ -94,7 +94,7 @@ def test_tables_are_made_of_the_archive(
     runs = json.loads((tmp_path / "runs.json").read_text("utf-8"))["runs"]
     missing = [run["folder"] for run in runs if run["state"] != "finished"]
     assert code == bool(missing)
-    assert all(re.match(r"runs/mixed-8-\S+-fast-s\d$", folder) for folder in missing)
+    assert all(re.match(r"runs/mixed-(8|16)-\S+-fast-s\d$", folder) for folder in missing)
     shown, (parts,) = TABLES[target, budget]
     assert f"innerattn reproduce {target} --budget {budget} {options}" in shown.read_text("utf-8")
     found = by_heading((tmp_path / report_name(target)).read_text("utf-8"))

@@ -12,6 +12,7 @@ from innerattn.experiments.attention.arms import METHODS, SITUATIONS
 from innerattn.experiments.attention.study import RULES, read_attention
 from innerattn.experiments.plan import plan
 from innerattn.experiments.run import FinishedRun
+from innerattn.report.attention.page import score_panels
 from innerattn.report.attention.write import FILES, write_attention
 from innerattn.stats.comparison import holm
 
@@ -82,6 +83,21 @@ def test_the_study_is_of_teams_of_three_sizes() -> None:
         for situation in SITUATIONS
     ]
     assert sizes == [4, 8, 16]
+
+
+def test_a_panel_has_the_methods_that_were_run_there(runs: list[FinishedRun]) -> None:
+    made = [
+        run
+        for run in study(runs[0])
+        if (run.situation, run.method) not in {("mixed-8", "mappo"), ("mixed-8", "ppo-frozen")}
+    ]
+    rows = score_panels(read_attention(made))
+    drawn = {row[0].situation: [[arm.name for arm in panel.arms] for panel in row] for row in rows}
+    assert drawn == {"mixed": [[*METHODS[:4]]] * 2, "mixed-8": [[*METHODS[:2]]] * 2}
+    (short, long), _ = rows
+    scores = [run.summary["score"]["mean"] for run in made if run.method == METHODS[0]][:6]
+    assert short.arms[0].values == pytest.approx(scores)
+    assert long.arms[0].values == pytest.approx([-score for score in scores])
 
 
 def test_files_are_the_same_twice_and_say_the_rules(

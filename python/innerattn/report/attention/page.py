@@ -76,7 +76,7 @@ def scores_table(found: AttentionStudy, budget: str) -> Table:
 
 
 def score_panels(found: AttentionStudy) -> list[list[ArmPanel]]:
-    """A row for each situation, a panel for each length."""
+    """A row for each situation, a panel for each length, with the methods that were run there."""
     rows = []
     methods = list(dict.fromkeys(one.trained for one in found.learnt))
     for situation in dict.fromkeys(one.situation for one in found.learnt):
@@ -84,11 +84,10 @@ def score_panels(found: AttentionStudy) -> list[list[ArmPanel]]:
         panels = []
         for length in (0, 1):
             dots = []
-            for method in methods:
-                one = here.get(method)
-                values = None if one is None else (one.score, one.long_score)[length]
-                known = () if values is None else tuple(x for x in values.each if x is not None)
-                mean = None if values is None else values.mean
+            for method in (method for method in methods if method in here):
+                values = (here[method].score, here[method].long_score)[length]
+                known = tuple(x for x in values.each if x is not None)
+                mean = values.mean
                 bar = None
                 if mean is not None and mean.bounded:
                     bar = (mean.mean, mean.low, mean.high)

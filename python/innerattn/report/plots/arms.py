@@ -56,18 +56,21 @@ def draw_arms(rows: Sequence[Sequence[ArmPanel]]) -> Figure:
     """A row of panels for each situation, arms named at the left.
 
     Args:
-        rows: at least one row; all have the same figures and arms in the same order.
+        rows: at least one row; all have the same figures, those of a row the same arms.
     """
     from matplotlib.figure import Figure
 
-    arms = len(rows[0][0].arms)
-    height = 0.7 + len(rows) * (0.55 + 0.2 * arms)
-    figure = Figure(figsize=(PAGE_WIDTH_IN, height), layout="constrained")
-    panels = figure.subplots(len(rows), len(rows[0]), sharey=True, sharex="col", squeeze=False)
+    heights = [0.55 + 0.2 * len(row[0].arms) for row in rows]
+    figure = Figure(figsize=(PAGE_WIDTH_IN, 0.7 + sum(heights)), layout="constrained")
+    panels = figure.subplots(
+        len(rows), len(rows[0]), sharey="row", sharex="col", squeeze=False, height_ratios=heights
+    )
     for row, drawn in enumerate(rows):
         for column, part in enumerate(drawn):
             _panel(panels[row, column], part)
-        panels[row, 0].set_yticks(range(arms), [arm.name for arm in drawn[0].arms], fontsize=7)
+        names = [arm.name for arm in drawn[0].arms]
+        panels[row, 0].set_yticks(range(len(names)), names, fontsize=7)
+        panels[row, 0].set_ylim(len(names) - 0.4, -0.6)
         panels[row, 0].set_title(drawn[0].situation, fontsize=9, loc="left")
     for column, part in enumerate(rows[-1]):
         panels[-1, column].set_xlabel(part.label, fontsize=7)
@@ -75,7 +78,6 @@ def draw_arms(rows: Sequence[Sequence[ArmPanel]]) -> Figure:
             low, high = part.limits
             margin = 0.05 * (high - low)
             panels[-1, column].set_xlim(low - margin, high + margin)
-    panels[0, 0].set_ylim(arms - 0.4, -0.6)
     return figure
 
 
