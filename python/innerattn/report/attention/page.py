@@ -78,20 +78,19 @@ def scores_table(found: AttentionStudy, budget: str) -> Table:
 def score_panels(found: AttentionStudy) -> list[list[ArmPanel]]:
     """A row for each situation, a panel for each length, with the methods that were run there."""
     rows = []
-    methods = list(dict.fromkeys(one.trained for one in found.learnt))
     for situation in dict.fromkeys(one.situation for one in found.learnt):
-        here = {one.trained: one for one in found.learnt if one.situation == situation}
+        here = [one for one in found.learnt if one.situation == situation]
         panels = []
         for length in (0, 1):
             dots = []
-            for method in (method for method in methods if method in here):
-                values = (here[method].score, here[method].long_score)[length]
+            for one in here:
+                values = (one.score, one.long_score)[length]
                 known = tuple(x for x in values.each if x is not None)
                 mean = values.mean
                 bar = None
                 if mean is not None and mean.bounded:
                     bar = (mean.mean, mean.low, mean.high)
-                dots.append(ArmDots(method, method == LEARNT, known, bar))
+                dots.append(ArmDots(one.trained, one.trained == LEARNT, known, bar))
             steps = found.learnt[0].episode_steps[length]
             panels.append(ArmPanel(situation, f"score, {steps} steps", tuple(dots), marks=(1.0,)))
         rows.append(panels)
