@@ -64,7 +64,7 @@ TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
         ("learning-afterstates", "strong", "learning_strong_afterstates"),
     )
 } | {
-    ("swapped", "short"): (DOCS / "crossed.md", ({"swapped": (swapped.ANSWER, swapped.SHARES)},)),
+    ("swapped", "short"): (DOCS / "swapped.md", ({"swapped": (swapped.ANSWER, swapped.SHARES)},)),
     ("learning-ablations", "fast"): (
         DOCS / "learning.md",
         ({"ablations_fast": (ablations.DIFFERENCES,)},),

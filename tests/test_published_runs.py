@@ -19,6 +19,8 @@ DOCS = ROOT / "docs"
 RECORDS = DOCS / "records"
 PAGES = ("reproduction", "paper_protocol", "crossed")
 NEEDS_STEPS = ("## Fig. 4: ", "## Fig. 5: ")
+NOT_RUN = re.compile(r"runs/(mixed-(8|16)-\S+-s\d|double-\S+-(helpers|team)\S*-short-s[3-9])$")
+"""Runs of a command's plan that its page says have not been run."""
 
 sys.path.insert(0, str(DOCS))
 from publish import KEPT, PLACES, TABLES, by_heading, report_name, sections  # noqa: E402
@@ -34,6 +36,16 @@ def part(name: str, section: str) -> str:
     return text.split(f"<!-- {section}: end -->")[0].strip()
 
 
+def make(words: list[str], archive: Path, study: Path) -> None:
+    """Report on the archived runs, all of the plan but those that have not been run."""
+    shutil.copyfile(archive, study / FILE)
+    code = main(["reproduce", *words, "--report-only", "--out", str(study)])
+    runs = json.loads((study / "runs.json").read_text("utf-8"))["runs"]
+    missing = [run["folder"] for run in runs if run["state"] != "finished"]
+    assert code == bool(missing)
+    assert all(NOT_RUN.match(folder) for folder in missing)
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Folders of the studies, as the commands on the pages make them of the archives."""
@@ -44,9 +56,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         target = {"all": "table2"}.get(target, target)  # what else there is needs steps
         study = tmp_path_factory.mktemp("studies") / name
         study.mkdir()
-        shutil.copyfile(RECORDS / f"{name}.parquet", study / FILE)
-        arguments = ["reproduce", target, *options, "--report-only", "--out", str(study)]
-        assert main(arguments) == 0
+        make([target, *options], RECORDS / f"{name}.parquet", study)
         folders[name] = study
     return folders
 
@@ -88,13 +98,8 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
 def test_tables_are_made_of_the_archive(
     target: str, budget: str, options: str, tmp_path: Path
 ) -> None:
-    shutil.copyfile(RECORDS / f"{KEPT[target, budget]}.parquet", tmp_path / FILE)
-    words = ["reproduce", target, "--budget", budget, *options.split(), "--report-only"]
-    code = main([*words, "--out", str(tmp_path)])
-    runs = json.loads((tmp_path / "runs.json").read_text("utf-8"))["runs"]
-    missing = [run["folder"] for run in runs if run["state"] != "finished"]
-    assert code == bool(missing)
-    assert all(re.match(r"runs/mixed-(8|16)-\S+-s\d$", folder) for folder in missing)
+    archive = RECORDS / f"{KEPT[target, budget]}.parquet"
+    make([target, "--budget", budget, *options.split()], archive, tmp_path)
     shown, (parts,) = TABLES[target, budget]
     assert f"innerattn reproduce {target} --budget {budget} {options}" in shown.read_text("utf-8")
     found = by_heading((tmp_path / report_name(target)).read_text("utf-8"))
@@ -176,9 +181,7 @@ def test_the_answer_about_seeds_is_what_was_measured() -> None:
 
 
 def test_the_table_of_learning_is_made_of_the_same_runs(tmp_path: Path) -> None:
-    shutil.copyfile(RECORDS / "reproduction.parquet", tmp_path / FILE)
-    arguments = ["reproduce", "learning", "--budget", "short", "--report-only"]
-    assert main([*arguments, "--out", str(tmp_path)]) == 0
+    make(["learning", "--budget", "short"], RECORDS / "reproduction.parquet", tmp_path)
     made = (tmp_path / "learning.md").read_text("utf-8")
     shown = rows_of(part("learning", "learning_short"))
     assert rows_of(made) == shown
