@@ -82,6 +82,7 @@ class Reproduce(LongCommand):
         from innerattn.experiments.lock import StudyLock
         from innerattn.experiments.scan import finished_runs, scan_runs
         from innerattn.experiments.score_means import method_scores
+        from innerattn.report.left_out import left_out
         from innerattn.report.plots.drawing import check_format
 
         page = self.page is not None
@@ -111,8 +112,7 @@ class Reproduce(LongCommand):
                 raise
             write_account(out, self.target, self.budget, found)
             note = smoke_note(self.budget)
-            unusable = [one for one in found if one.state != "finished"]
-            reasons = [f"{one.planned.case}: {_reason(one)}" for one in unusable]
+            reasons = left_out(found)
             reasons += [f"{job}: {job.failure or 'not measured'}" for job in jobs]
             outputs = target.write(finished_runs(found), out, self.budget, reasons)
             account = write_account(out, self.target, self.budget, found, outputs)
@@ -172,7 +172,7 @@ class Reproduce(LongCommand):
         states = Counter(one.state for one in found)
         train, measure = len(to_train(found)), len(to_measure(found))
         count = train + measure
-        left_out = len(found) - count - states["finished"]
+        unused = len(found) - count - states["finished"]
         line = f"{self.target}, budget {self.budget}: {_count(len(found), 'run')} of "
         line += f"{_count(self.seeds, 'seed')}; "
         line += f"{states['finished']} finished, "
@@ -181,7 +181,7 @@ class Reproduce(LongCommand):
         else:
             line += f"{train} to train" + (f", {measure} to measure only" if measure else "")
             line += f", {places(count)} at a time" if count else ""
-        line += f"; {left_out} left out" if left_out else ""
+        line += f"; {unused} left out" if unused else ""
         console.print(line, soft_wrap=True)
         note = smoke_note(self.budget)
         if note:
@@ -189,7 +189,7 @@ class Reproduce(LongCommand):
         console.print(f"Study folder: {out}", soft_wrap=True)
         for one in found:
             if one.state in ("other_configuration", "unreadable"):
-                text = f"left out: {one.planned.folder}: {_reason(one)}"
+                text = f"left out: {one.planned.folder}: {one.reason}"
                 _say(f"{text} (move it away to have it trained)")
 
     def _train(self, found: Sequence[RunStatus], out: Path, lock: StudyLock) -> None:
@@ -236,10 +236,6 @@ def _chosen(option: str, text: str, known: Sequence[str]) -> tuple[str, ...]:
 
 def _count(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
-
-
-def _reason(found: RunStatus) -> str:
-    return f"{found.state.replace('_', ' ')}: {found.why}" if found.why else found.state
 
 
 def _say_why(planned: PlannedRun, reason: str) -> None:

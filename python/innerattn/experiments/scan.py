@@ -50,6 +50,12 @@ class RunStatus:
     why: str | None = None
     run: FinishedRun | None = None
 
+    @property
+    def reason(self) -> str:
+        """The state, and why it is that."""
+        name = self.state.replace("_", " ")
+        return f"{name}: {self.why}" if self.why else name
+
 
 def scan_runs(
     planned: Iterable[PlannedRun], out: Path, *, steps: bool = False, archived: bool = True

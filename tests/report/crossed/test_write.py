@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from markdown_rows import rows_of
@@ -9,7 +10,9 @@ from markdown_rows import rows_of
 from innerattn.experiments.crossed.arms import arm_of
 from innerattn.experiments.crossed.outcome import outcome_of
 from innerattn.experiments.run import FinishedRun
+from innerattn.report.crossed.tables import claims_table
 from innerattn.report.crossed.write import FILES, write_crossed
+from innerattn.report.table import markdown
 from innerattn.stats.text import format_estimate
 from innerattn.train.weights import digest_of
 
@@ -71,8 +74,18 @@ def test_the_page_opens_with_its_figure_and_links_the_rest(crossed_study: Crosse
     assert linked == {"crossed.png", "crossed_seeds.png", "crossed.csv", "crossed_tables.md"}
     claims = {row[0]: row[1:] for row in rows_of(text)}
     for answer in situation.answers:
-        assert claims[answer.claim] == [answer.measured, f"**{answer.holds}**"]
+        assert claims[answer.claim] == [situation.name, answer.measured, f"**{answer.holds}**"]
     assert len(text.split()) < 2_500
+
+
+def test_verdicts_of_situations_stand_below_one_another(crossed_study: Crossed) -> None:
+    out, runs = crossed_study
+    (mixed,) = write_crossed(runs, out, "short")
+    rows = rows_of(markdown(claims_table([mixed, replace(mixed, name="double")])))[1:]
+    assert [row[0] for row in rows[::2]] == [answer.claim for answer in mixed.answers]
+    assert {row[0] for row in rows[1::2]} == {""}
+    assert [row[1] for row in rows] == ["mixed", "double"] * len(mixed.answers)
+    assert [row[2:] for row in rows[::2]] == [row[2:] for row in rows[1::2]]
 
 
 def test_the_long_tables_hold_every_arm_and_effect(crossed_study: Crossed) -> None:

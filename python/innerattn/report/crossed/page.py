@@ -82,8 +82,10 @@ def _correlations(situations: Sequence[Situation]) -> str:
     ]
     if not found:
         return "There are too few seeds to say how alike the runs of one seed are."
+    *others, last = found
+    listed = f"{', '.join(others)} and {last}" if others else last
     return (
         "Under team credit, the intraclass correlation of runs of one seed is "
-        f"{' and '.join(found)}: 0 means that the seed says nothing about which robot does more, "
+        f"{listed}: 0 means that the seed says nothing about which robot does more, "
         "1 that it says everything."
     )

@@ -28,15 +28,13 @@ _CSV_RUN = ("folder", "config_sha256", "weights_sha256")
 
 
 def claims_table(situations: Sequence[Situation]) -> Table:
-    """What was expected, a row for each claim, with the verdicts of all situations."""
-    heads: list[Column] = [Column("claim", right=False)]
-    for situation in situations:
-        heads += columns([f"{situation.name}: measured", f"{situation.name}: holds?"])
+    """What was expected, with the verdict of each situation below one another."""
     rows = []
     for same in zip(*(situation.answers for situation in situations), strict=True):
-        cells = [cell for answer in same for cell in (answer.measured, f"**{answer.holds}**")]
-        rows.append([same[0].claim, *cells])
-    return plain_table(heads, rows)
+        for index, (situation, answer) in enumerate(zip(situations, same, strict=True)):
+            claim = "" if index else answer.claim
+            rows.append([claim, situation.name, answer.measured, f"**{answer.holds}**"])
+    return plain_table(columns(["claim", "situation", "measured", "holds?"]), rows)
 
 
 def seeds_table(situations: Sequence[Situation]) -> Table:
