@@ -83,7 +83,7 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
         (
             "attention",
             "strong",
-            "--seeds 5 --situations mixed,mixed-8 --methods ppo-inner,ppo-uniform,mappo",
+            "--seeds 10 --situations mixed,mixed-8 --methods ppo-inner,ppo-uniform,mappo",
         ),
         ("learning", "strong", "--methods ppo-inner --seeds 5"),
         ("learning-long", "strong", "--seeds 5"),
