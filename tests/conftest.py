@@ -123,7 +123,13 @@ def crossed_study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[
 
 @pytest.fixture
 def interruptible() -> Iterator[None]:
-    """Ctrl-C interrupts this process and those it begins, whatever it was begun with itself."""
+    """Ctrl-C interrupts this process and those it begins; the end of a terminal ends the latter.
+
+    Tests may have been begun by a shell's ``&`` or by ``nohup``, and processes inherit what these
+    ignore.
+    """
+    hangup = signal.signal(signal.SIGHUP, signal.SIG_DFL)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
+    signal.signal(signal.SIGHUP, hangup)

@@ -1,5 +1,6 @@
 """Signals and lost readers: the exit code, what is left, and one line of text."""
 
+import io
 import json
 import random
 import re
@@ -8,11 +9,14 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from innerattn.cli.main import main
+from innerattn.signals import Interrupted
 from innerattn.train.resume import read_saved
 from innerattn.train.saved import whole_checkpoints
 
@@ -21,10 +25,16 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 PARTIAL = re.compile(r"\..+\.([0-9a-f]{16}|[0-9]+)")
 
 
-def begin(run: Path, options: list[str]) -> subprocess.Popen[str]:
+@contextmanager
+def begin(run: Path, options: list[str]) -> Iterator[subprocess.Popen[str]]:
+    """A training, which ends with the test at the latest."""
     command = [sys.executable, "-m", "innerattn", "train", "--run-dir", str(run), *options]
     streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
-    return subprocess.Popen(command, **streams, text=True)  # type: ignore[call-overload,no-any-return]
+    with subprocess.Popen(command, **streams, text=True) as process:  # type: ignore[call-overload]
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def left_well(run: Path, sent: signal.Signals, code: int, err: str) -> None:
@@ -78,6 +88,27 @@ def test_while_modules_are_loaded(sent: signal.Signals) -> None:
         err = [line for line in process.stderr if not line.startswith("import time:")]
     assert process.returncode == 128 + sent
     assert err == ["innerattn: interrupted\n"]
+
+
+class Hasty(io.StringIO):
+    """What is read by someone who presses Ctrl-C as soon as it says so."""
+
+    pressed = False
+
+    def flush(self) -> None:
+        if "Ctrl-C ends it." in self.getvalue() and not self.pressed:
+            self.pressed = True
+            raise Interrupted(signal.SIGINT)
+
+
+@pytest.mark.parametrize("command", ["play", "watch"])
+def test_as_soon_as_a_page_is_served(
+    command: str, run_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = Hasty()
+    monkeypatch.setattr(sys, "stdout", out)
+    assert main([command, str(run_dir)]) == 0
+    assert out.pressed
 
 
 @pytest.mark.parametrize("sent", SIGNALS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -50,9 +51,9 @@ class Play(Command):
         self._world()
         sessions = Sessions(self._world)
         server = LocalServer(play_pages(self._name), self.port, sessions.take)
-        print(f"Play at {server.address}\nCtrl-C ends it.", flush=True)
+        greeting = f"Play at {server.address}\nCtrl-C ends it."
         try:
-            server.serve()
+            server.serve(partial(print, greeting, flush=True))
         except KeyboardInterrupt:
             print()
         return 0

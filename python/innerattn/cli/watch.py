@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -48,9 +49,9 @@ class Watch(Command):
             read_live(folder)
         pages = watch_pages(folders, _scripts_beside(folders[0]), self._play)
         server = LocalServer(pages, self.port)
-        print(f"Watch at {server.address}\nCtrl-C ends it.", flush=True)
+        greeting = f"Watch at {server.address}\nCtrl-C ends it."
         try:
-            server.serve()
+            server.serve(partial(print, greeting, flush=True))
         except KeyboardInterrupt:
             print()
         return 0

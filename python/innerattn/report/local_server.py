@@ -89,13 +89,17 @@ class LocalServer:
         """The address of the first page."""
         return f"http://{HOST}:{self.port}/{self.word}/"
 
-    def serve(self) -> None:
+    def serve(self, begun: Callable[[], object] = lambda: None) -> None:
         """Serve until `close` is called from another thread.
+
+        Args:
+            begun: called first; who connects from then on is answered.
 
         Raises:
             Interrupted: a signal asked for the end, such as Ctrl-C; no request is cut short.
         """
         try:
+            begun()
             with requests_handled_by(self._server.note):
                 self._server.serve_forever(poll_interval=0.1)
         finally:
