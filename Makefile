@@ -13,7 +13,7 @@ export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train robot test test-pool test-asan test-slow examples reliability soak lint format bench lock docs site schemas dist smoke setup clean
+.PHONY: train robot test test-pool test-asan test-gpu test-slow examples reliability soak lint format bench lock docs site schemas dist smoke setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -42,6 +42,9 @@ test-asan: setup ## the pool, snapshots, fuzzed inputs and arrays lent to Python
 	cp target/asan/x86_64-unknown-linux-gnu/debug/lib_core.so target/asan/python/innerattn/_core.abi3.so
 	$(ASAN_PYTHON) python tests/support/past_the_end.py 2>&1 | grep -q heap-buffer-overflow # it must notice this
 	$(ASAN_PYTHON) python -m pytest -q tests/envs/test_array_zoo.py tests/envs/test_copies.py tests/envs/test_batch_snapshots.py
+
+test-gpu: setup ## training on a CUDA device: beside the CPU, stopped and gone on with, seen from the command line
+	INNERATTN_TEST_DEVICE=cuda pytest tests/train/test_gpu.py tests/train/test_resume.py tests/train/test_divergence.py tests/train/test_weights.py
 
 test-slow: setup test-pool ## the long checks: ten million env-steps of contacts, compilers at their slowest
 	INNERATTN_SLOW=1 cargo test --quiet --test worlds containment

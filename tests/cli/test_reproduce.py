@@ -79,6 +79,20 @@ def test_a_page_about_the_finished_runs(
 
 
 @pytest.mark.usefixtures("in_this_process")
+def test_runs_are_trained_on_a_device_and_reported_from_any(
+    study: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["table2", study, "td-inner,td-uniform", "--seeds", "2"]
+    assert command(*options, "--device", "abacus") == 1
+    assert "train.device = 'abacus': not usable here" in capsys.readouterr().err
+    assert not (study / "runs.json").exists()
+    assert command(*options, "--device", "cpu:0") == 0  # not how the finished ones were trained
+    assert "2 finished, 2 to train" in capsys.readouterr().out
+    assert command(*options, "--report-only") == 0
+    assert [run["device"] for run in account(study)["runs"]] == ["cpu", "cpu", "cpu:0", "cpu:0"]
+
+
+@pytest.mark.usefixtures("in_this_process")
 def test_another_configuration_is_named_and_neither_used_nor_changed(
     study: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,3 +1,4 @@
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,11 +9,15 @@ from innerattn.train import train
 
 
 def small_config(**values: object) -> RunConfig:
-    """A run of 600 env-steps in 12 worlds, a few seconds long at most."""
+    """A run of 600 env-steps in 12 worlds, a few seconds long at most.
+
+    `make test-gpu` sets the device.
+    """
     small = {
         "train.env_steps": 600,
         "train.num_envs": 12,
         "train.threads": 1,
+        "train.device": os.environ.get("INNERATTN_TEST_DEVICE", "cpu"),
         "train.log_every_env_steps": 200,
         "td.warmup_env_steps": 200,
         "td.batch_size": 16,

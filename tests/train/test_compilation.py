@@ -5,14 +5,20 @@ import logging
 import os
 import subprocess
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
+from torch import Tensor
+from torch.fx import GraphModule
 
 from innerattn.config import load_run_config
 from innerattn.learn import TD
+from innerattn.learn.actor_critic import ActorCritic
+from innerattn.records.run_folder import newest_weights, read_info
 from innerattn.train import train
 from innerattn.train.compilation import compiles
+from innerattn.train.weights import digest_of
 
 TINY = {"train.env_steps": 128, "train.num_envs": 4, "train.threads": 1}
 
@@ -57,6 +63,46 @@ def test_a_run_says_whether_it_was_compiled(
     train(config, tmp_path / "run")
     assert json.loads((tmp_path / "run" / "run.json").read_text())["compiled"] is compiled
     assert len(calls) == int(compiled)
+
+
+@pytest.mark.parametrize("warm_start", ["none", "hungarian"])
+@pytest.mark.parametrize("method", ["td-inner", "ppo-inner"])
+def test_where_the_compiler_fails_the_run_is_that_without_it(
+    method: str,
+    warm_start: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def broken(graph: GraphModule, _: Sequence[Tensor]) -> Callable[..., Tensor]:
+        raise RuntimeError(f"no {'loop' if graph.graph.nodes else 'graph'}\nmore")
+
+    compiled_by = ActorCritic.compile
+    monkeypatch.setattr(ActorCritic, "compile", lambda self: compiled_by(self, broken))
+    monkeypatch.setattr("innerattn.train.compilation._problem", lambda _: None)
+    few = {
+        "train.method": method,
+        "train.warm_start": warm_start,
+        "imitation.env_steps": 64,
+        "imitation.critic_env_steps": 32,
+        "td.warmup_env_steps": 16,
+        "td.batch_size": 16,
+        "td.update_every_env_steps": 8,
+        "ppo.rollout_steps": 4,
+        "ppo.minibatch_size": 8,
+    }
+    runs = []
+    for choice in ("off", "on"):
+        config = load_run_config(overrides={**TINY, **few, "train.compile": choice})
+        with caplog.at_level(logging.WARNING):
+            runs.append(train(config, tmp_path / choice))
+    assert [record.getMessage() for record in caplog.records] == [
+        "Updates run uncompiled, which is slower: the compiler fails (RuntimeError: no loop)"
+    ]
+    assert digest_of(newest_weights(runs[0])) == digest_of(newest_weights(runs[1]))
+    infos = [read_info(run) for run in runs]
+    assert [(info.state, info.compiled) for info in infos] == [("done", False)] * 2
+    assert infos[0].updates == infos[1].updates > 0
 
 
 def test_without_a_compiler_training_goes_on_and_says_so(tmp_path: Path) -> None:

@@ -120,6 +120,7 @@ BRIEF: Mapping[str, Brief] = {
             ("--methods LIST", "methods, separated by commas ({methods})"),
             ("--situations LIST", "situations, separated by commas ({situations})"),
             ("--out FOLDER", "folder of the study (studies/BUDGET)"),
+            ("--device NAME", "where networks are trained: cpu, cuda, cuda:0 ({device})"),
             ("--report-only", "train nothing; report on the runs that are finished"),
             ("--page FILE", "write a page about the finished runs too: .html"),
             _QUIET,

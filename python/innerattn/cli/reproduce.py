@@ -17,7 +17,7 @@ from innerattn.cli.progress import SeveralMeasurements, SeveralRuns
 from innerattn.config import BUDGETS
 from innerattn.config.files import write_whole
 from innerattn.config.near import did_you_mean
-from innerattn.experiments.plan import SITUATIONS, PlannedRun
+from innerattn.experiments.plan import SITUATIONS, PlannedRun, on_device
 from innerattn.experiments.smoke import smoke_note
 from innerattn.report.tables.experiments import print_scores
 from innerattn.report.targets import TARGETS, Target
@@ -57,6 +57,8 @@ class Reproduce(LongCommand):
     """Methods, separated by commas; all: what the target needs."""
     situations: str = "all"
     """Situations, separated by commas; all: what the target needs."""
+    device: str = "cpu"
+    """Where networks are trained: cpu, cuda, cuda:0, ... Runs from any device are reported."""
     report_only: tyro.conf.FlagCreatePairsOff[bool] = False
     """Train and measure nothing: report on the runs that are finished, and name the others."""
     page: Path | None = None
@@ -163,7 +165,8 @@ class Reproduce(LongCommand):
             situations = _chosen("situations", self.situations, known)
         if not 1 <= self.seeds <= _MOST_SEEDS:
             raise UsageError(f"--seeds = {self.seeds}: must be 1 to {_MOST_SEEDS:,}")
-        return target.plan(methods, situations, range(self.seeds), self.budget, out)
+        planned = target.plan(methods, situations, range(self.seeds), self.budget, out)
+        return on_device(planned, self.device)
 
     def _print_plan(self, console: Console, found: Sequence[RunStatus], out: Path) -> None:
         from innerattn.experiments.processes import places

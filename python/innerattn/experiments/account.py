@@ -67,5 +67,6 @@ def _row(out: Path, found: RunStatus) -> dict[str, Any]:
         "config_sha256": found.run.config_sha256,
         "weights_sha256": found.run.weights_sha256,
         "commit": found.run.info.commit,
+        "device": found.run.info.device,
         "versions": found.run.info.versions,
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from innerattn.config import EvaluateConfig, RunConfig, load_run_config
@@ -110,6 +110,15 @@ def plan(
         for situation in situations
         for method in methods
     ]
+
+
+def on_device(planned: Sequence[PlannedRun], device: str) -> list[PlannedRun]:
+    """The same runs, trained on another device, such as "cuda"."""
+    found = []
+    for run in planned:
+        train = run.config.train.model_copy(update={"device": device})
+        found.append(replace(run, config=run.config.model_copy(update={"train": train})))
+    return found
 
 
 def of_seed(seed: int) -> dict[str, object]:

@@ -100,13 +100,13 @@ def differences(config: RunConfig, planned: RunConfig) -> list[str]:
     """Where ``config`` differs from what is planned: key, its value and the planned one.
 
     What counts is the values, not what a file spells out: a key that came later has its default.
-    Numbers that the planned run does not look at do not count.
+    Numbers that the planned run does not look at do not count, nor does the device.
     """
     values, wanted = _flat(config.model_dump(mode="json")), _flat(planned.in_use())
     return [
         f"{key} = {_short(values[key])}, planned {_short(value)}"
         for key, value in wanted.items()
-        if values[key] != value
+        if values[key] != value and key != "train.device"
     ]
 
 

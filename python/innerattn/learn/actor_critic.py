@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from innerattn.config import NetworkConfig
 from innerattn.learn import losses
 from innerattn.learn.adam import AdamStepper, Forward, Stepper
-from innerattn.learn.compiled import traced
+from innerattn.learn.compiled import CompilerError, failed_to_compile, first_line, traced
 from innerattn.learn.divergence import DivergenceError, not_finite, refuse_not_finite_gradients
 from innerattn.learn.gradients import average_over_robots
 from innerattn.learn.interruptions import Interruptions, NoInterruptions
@@ -289,6 +289,7 @@ class ActorCritic:
 
         Raises:
             DivergenceError: A number is not finite, and that is not to be skipped.
+            CompilerError: See there.
         """
         self.interruptions.check()
         try:
@@ -310,13 +311,22 @@ class ActorCritic:
         try:
             with self.interruptions.at_once():
                 self._rows.append(update())
-        except BaseException:
+        except BaseException as error:
             self.load(weights)
             for generator, draw in zip(self._generators(), draws, strict=True):
                 generator.set_state(draw)
             self.interruptions.check()  # the compiler may have made another error of it
-            raise
+            if not failed_to_compile(error):
+                raise
+            self._uncompile()
+            raise CompilerError(first_line(error)) from error
         self._compiled_for.add(batch_size)
+
+    def _uncompile(self) -> None:
+        """Do updates operation by operation from now on."""
+        assert self._plain_networks is not None  # `compile` was called
+        self._networks, self._plain_networks, self._compiled_for = self._plain_networks, None, None
+        del self._update_networks  # that of the class is there again
 
     def _take_metrics(self) -> dict[str, float] | None:
         """Means over the updates of a call of `learn`, which is done now; None if none was due."""

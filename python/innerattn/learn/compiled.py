@@ -34,6 +34,26 @@ from innerattn.nn.partner import OracleAttention
 _BETA_1, _BETA_2, _EPSILON = 0.9, 0.999, 1e-8  # torch's defaults, those of the paper on Adam
 
 
+class CompilerError(RuntimeError):
+    """The compiler makes no program of an update; nothing was learnt from it.
+
+    The message is its reason. The next call of `learn` goes on with the same update, uncompiled.
+    """
+
+
+def failed_to_compile(error: BaseException) -> bool:
+    """Whether an error of a compiled function is one of torch's compiler."""
+    from torch._dynamo.exc import TorchDynamoException
+
+    return isinstance(error, TorchDynamoException)
+
+
+def first_line(error: BaseException) -> str:
+    """The first line of an error's text that says something, or else the name of its type."""
+    lines = (text.strip() for text in str(error).splitlines())
+    return next((line for line in lines if line and line[-1] != ":"), type(error).__name__)
+
+
 class TracedNetwork(Network):
     """A network whose parameters are inputs of the graph."""
 

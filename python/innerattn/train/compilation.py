@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from innerattn.config import RunConfig
+from innerattn.learn.compiled import first_line
 
 _log = logging.getLogger(__name__)
 
@@ -32,8 +33,13 @@ def compiles(config: RunConfig) -> bool:
         return False
     problem = _problem(config.train.device)
     if problem is not None:
-        _log.warning("Updates run uncompiled, which is slower: no working compiler %s", problem)
+        say_uncompiled(f"no working compiler {problem}")
     return problem is None
+
+
+def say_uncompiled(why: str) -> None:
+    """Warn that updates are not compiled, though they should be."""
+    _log.warning("Updates run uncompiled, which is slower: %s", why)
 
 
 def _problem(device: str) -> str | None:
@@ -48,6 +54,5 @@ def _problem(device: str) -> str | None:
     try:
         torch.compile(line)(torch.ones(8, device=device))
     except Exception as error:  # whatever a missing part of the tool chain raises
-        reason = [text for text in str(error).splitlines() if text.strip()]
-        return f"({reason[0] if reason else type(error).__name__})"
+        return f"({first_line(error)})"
     return None

@@ -14,11 +14,13 @@ from dataclasses import replace
 from torch import Tensor
 
 from innerattn.errors import RunError
+from innerattn.learn.compiled import CompilerError
 from innerattn.learn.divergence import DivergenceError
 from innerattn.learn.types import Transitions
 from innerattn.records.run_folder import State
 from innerattn.train.checkpoint import RunFolder
 from innerattn.train.checkpoint_info import Best, CheckpointInfo, Counters, Stage
+from innerattn.train.compilation import say_uncompiled
 from innerattn.train.interruption import Interruptions
 from innerattn.train.metrics import Metrics, MetricsFile, refuse_divergence
 from innerattn.train.parts import Parts
@@ -137,7 +139,13 @@ class Stages:
             self._interruptions.check()
             if not self._at.learning:
                 self._collect_step(collect, self._at.stage_env_steps / total)
-            metrics = learn((self._at.stage_env_steps - worlds) / total)
+            share = (self._at.stage_env_steps - worlds) / total
+            try:
+                metrics = learn(share)
+            except CompilerError as error:
+                say_uncompiled(f"the compiler fails ({error})")
+                self._folder.info = replace(self._folder.info, compiled=False)
+                metrics = learn(share)
             self._end_step({**self._at.step_metrics, **metrics}, total)
             self._report(total)
             if self._at.stage_env_steps < total and self._is_checkpoint_due():
