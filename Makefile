@@ -43,8 +43,8 @@ test-asan: setup ## the pool, snapshots, fuzzed inputs and arrays lent to Python
 	$(ASAN_PYTHON) python tests/support/past_the_end.py 2>&1 | grep -q heap-buffer-overflow # it must notice this
 	$(ASAN_PYTHON) python -m pytest -q tests/envs/test_array_zoo.py tests/envs/test_copies.py tests/envs/test_batch_snapshots.py
 
-test-gpu: setup ## training on a CUDA device: beside the CPU, stopped and gone on with, seen from the command line
-	INNERATTN_TEST_DEVICE=cuda pytest tests/train/test_gpu.py tests/train/test_resume.py tests/train/test_divergence.py tests/train/test_weights.py
+test-gpu: setup ## training on a GPU (CUDA): beside the CPU, stopped and gone on with, by the command
+	INNERATTN_TEST_DEVICE=cuda pytest -m 'not slow' tests/train/test_gpu.py tests/train/test_resume.py tests/train/test_divergence.py tests/train/test_weights.py
 
 test-slow: setup test-pool ## the long checks: ten million env-steps of contacts, compilers at their slowest
 	INNERATTN_SLOW=1 cargo test --quiet --test worlds containment

@@ -1,8 +1,12 @@
 """An update as one compiled graph does what it does operation by operation, in float64."""
 
+import warnings
+from collections.abc import Callable, Sequence
+
 import pytest
 import torch
 from torch import Tensor
+from torch.fx import GraphModule
 
 from innerattn.config import NetworkConfig, PPOConfig, TDConfig
 from innerattn.learn import PPO, TD, Team, Transitions
@@ -118,6 +122,17 @@ def test_the_traced_update_agrees_by_kind() -> None:
 @pytest.mark.parametrize("algorithm", ["td", "ppo"])
 def test_the_compiled_update_agrees(algorithm: str) -> None:
     agree(algorithm, 4, "inductor", {"attention": "inner"}, {})
+
+
+def test_advice_of_the_compiler_is_not_passed_on() -> None:
+    def advising(graph: GraphModule, _: Sequence[Tensor]) -> Callable[..., Tensor]:
+        where = {"filename": "lowering.py", "lineno": 1, "module": "torch._inductor.lowering"}
+        warnings.warn_explicit("Cut an issue", UserWarning, **where)
+        return graph.forward
+
+    learner = make("ppo", 4, {"attention": "inner"}, {})
+    learner.compile(advising)
+    assert len(learn(learner, 4)) == 2
 
 
 @pytest.mark.slow

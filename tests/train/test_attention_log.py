@@ -84,3 +84,17 @@ def test_a_critic_without_attention_has_no_entropy() -> None:
     log = AttentionLog(NAMES, 4, DISCRETE)
     add(log, 0.5)
     assert log.entropy(Without()) == {}
+
+
+def test_it_goes_on_where_the_next_steps_lie() -> None:
+    before = AttentionLog(NAMES, 4, DISCRETE)
+    add(before, 0.5)
+    log = AttentionLog(NAMES, 4, DISCRETE, "meta")  # holds shapes only, and is everywhere
+    log.load_resume_state(before.resume_state())
+    log.add(*(torch.zeros(2, ROBOTS, *more, device="meta") for more in ((1,), ())))
+    state = log.resume_state()
+    assert {name: state[name].device.type for name in ("obs", "actions")} == {
+        "obs": "meta",
+        "actions": "meta",
+    }
+    assert state["obs"].shape == (2, 2, ROBOTS, 1)

@@ -21,7 +21,7 @@ from innerattn.learn.types import Learner
 from innerattn.nn import EntityColumns
 from innerattn.train import load_policy, train
 
-pytestmark = pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")
+pytestmark = pytest.mark.gpu
 
 Configure = Callable[..., RunConfig]
 ROBOTS, ROWS = 4, 64

@@ -5,6 +5,7 @@ It acts, imitates, reports attention, saves and loads. Each learner decides when
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
@@ -133,7 +134,7 @@ class ActorCritic:
         """Number of updates done so far."""
         return self._updates
 
-    def compile(self, backend: str = "inductor") -> None:
+    def compile(self, backend: str | Callable[..., Any] = "inductor") -> None:
         """Do updates as one compiled graph from now on; see `Learner.compile`."""
         plain = self._networks
         forms: Any = {field.name: traced(getattr(plain, field.name)) for field in fields(plain)}
@@ -309,7 +310,9 @@ class ActorCritic:
         weights = self.state()
         draws = [generator.get_state() for generator in self._generators()]
         try:
-            with self.interruptions.at_once():
+            with self.interruptions.at_once(), warnings.catch_warnings():
+                # On a GPU it advises what no user can do, or less precise products.
+                warnings.filterwarnings("ignore", category=UserWarning, module=r"torch\._inductor")
                 self._rows.append(update())
         except BaseException as error:
             self.load(weights)

@@ -26,15 +26,23 @@ _MOST_STEPS = 50
 class AttentionLog:
     """What the critic attended to in the last control steps, as many as an episode has."""
 
-    def __init__(self, robot_names: Sequence[str], episode_steps: int, actions: Actions) -> None:
+    def __init__(
+        self,
+        robot_names: Sequence[str],
+        episode_steps: int,
+        actions: Actions,
+        device: str = "cpu",
+    ) -> None:
         """Keep steps of an episode, evenly spread where they are many.
 
         Args:
             robot_names: of the team.
             episode_steps: length of an episode.
             actions: which actions there are.
+            device: where the steps that are added lie.
         """
         self._robot_names, self._actions = tuple(robot_names), actions
+        self._device = device
         self._stride = ceil(episode_steps / _MOST_STEPS)
         self._seen: deque[tuple[Tensor, Tensor]] = deque(maxlen=ceil(episode_steps / self._stride))
         self._steps = 0
@@ -68,7 +76,8 @@ class AttentionLog:
             shape = (*obs.shape[:3], *self._actions.shape)
             actions = take(state, "actions", self._actions.dtype, *shape)
             self._actions.refuse_unknown(actions)
-            self._seen.extend(zip(obs, actions, strict=True))
+            steps = zip(obs.to(self._device), actions.to(self._device), strict=True)
+            self._seen.extend(steps)
 
     def entropy(self, learner: Learner) -> dict[str, list[float]]:
         """Mean entropy by robot and head [nats] over the steps kept, with today's weights.

@@ -57,7 +57,9 @@ class Parts:
         self.imitation = Imitation(config, env, self.learner, self.collector) if warm else None
         refuse_what_does_not_fit(self.rings(stage), config)
         actions = team_of(config, env).actions
-        self.attention = AttentionLog(env.robot_names, env.scenario.episode_steps, actions)
+        self.attention = AttentionLog(
+            env.robot_names, env.scenario.episode_steps, actions, config.train.device
+        )
         self.interval = Interval()
         within = self.learner.learner if isinstance(self.learner, FramedLearner) else self.learner
         if isinstance(within, ActorCritic):
