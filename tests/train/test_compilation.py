@@ -16,7 +16,7 @@ from innerattn.config import load_run_config
 from innerattn.learn import TD
 from innerattn.learn.actor_critic import ActorCritic
 from innerattn.records.run_folder import newest_weights, read_info
-from innerattn.train import train
+from innerattn.train import Progress, resume, train
 from innerattn.train.compilation import compiles
 from innerattn.train.weights import digest_of
 
@@ -65,6 +65,16 @@ def test_a_run_says_whether_it_was_compiled(
     assert len(calls) == int(compiled)
 
 
+def at_env_step(count: int) -> Callable[[Progress], None]:
+    """Stops a training there, in the stage that learns from rewards."""
+
+    def stop(now: Progress) -> None:
+        if (now.stage, now.env_steps) == ("training", count):
+            raise KeyboardInterrupt
+
+    return stop
+
+
 @pytest.mark.parametrize("warm_start", ["none", "hungarian"])
 @pytest.mark.parametrize("method", ["td-inner", "ppo-inner"])
 def test_where_the_compiler_fails_the_run_is_that_without_it(
@@ -100,6 +110,14 @@ def test_where_the_compiler_fails_the_run_is_that_without_it(
         "Updates run uncompiled, which is slower: the compiler fails (RuntimeError: no loop)"
     ]
     assert digest_of(newest_weights(runs[0])) == digest_of(newest_weights(runs[1]))
+    caplog.clear()
+    cut = tmp_path / "cut"
+    with caplog.at_level(logging.WARNING):
+        with pytest.raises(KeyboardInterrupt):
+            train(config, cut, progress=at_env_step(64))
+        resume(cut)  # as it was; the compiler is not tried again
+    assert len(caplog.records) == 1
+    assert digest_of(newest_weights(cut)) == digest_of(newest_weights(runs[0]))
     infos = [read_info(run) for run in runs]
     assert [(info.state, info.compiled) for info in infos] == [("done", False)] * 2
     assert infos[0].updates == infos[1].updates > 0

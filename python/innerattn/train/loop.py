@@ -94,7 +94,9 @@ def resume(run_dir: str | Path, *, progress: Callable[[Progress], None] | None =
             _begin_anew(path, progress)
             return path
         info, stage = saved.run_info, saved.info.counters.stage
-        with _prepared(saved.config, info.threads, stage) as (parts, compiled, backend, stops):
+        # A run that was not compiled goes on alike.
+        prepared = _prepared(saved.config, info.threads, stage, compilable=info.compiled)
+        with prepared as (parts, compiled, backend, stops):
             if parts.resumable is None:
                 method = saved.config.train.method
                 raise NothingToResumeError(f"{path}: method {method!r} cannot go on from a file")
@@ -122,7 +124,7 @@ def _begin_anew(path: Path, progress: Callable[[Progress], None] | None) -> None
 
 @contextmanager
 def _prepared(
-    config: RunConfig, threads: int, stage: Stage
+    config: RunConfig, threads: int, stage: Stage, *, compilable: bool = True
 ) -> Iterator[tuple[Parts, bool, str, Interruptions]]:
     """The parts of a training, whether updates are compiled, and by what matrices are multiplied.
 
@@ -144,7 +146,7 @@ def _prepared(
         )
         with closing(env):
             parts = Parts(config, env, stage)
-            compiled = compiles(config)
+            compiled = compilable and compiles(config)
             if compiled:
                 parts.learner.compile()
             yield parts, compiled, matmul_backend, interruptions
@@ -159,7 +161,7 @@ def _warn_of_changes(saved: Saved, compiled: bool, backend: str) -> None:
         if info.versions.get(name) != now[name]
     ]
     if info.compiled != compiled:
-        changes.append("updates are now compiled" if compiled else "updates are no longer compiled")
+        changes.append("updates are no longer compiled")
     if info.matmul_backend.partition(",")[0] != backend.partition(",")[0]:
         changes.append("another library multiplies matrices")
     if changes:
