@@ -77,7 +77,7 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
 @pytest.mark.parametrize(
     ("target", "budget", "options"),
     [
-        ("swapped", "short", "--seeds 10 --situations single"),
+        ("swapped", "short", "--seeds 10 --situations single,mixed"),
         ("learning-ablations", "fast", "--seeds 3"),
         ("attention", "fast", "--seeds 10 --situations mixed,mixed-8,mixed-16"),
         (
