@@ -83,12 +83,13 @@ def update(learner: TD | PPO, seed: int, device: str) -> Tensor:
     return learner.update(Rollout(*(part.to(device) for part in rows)))
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-@pytest.mark.parametrize("network", NETWORKS)
+# A compilation takes half a minute.
+UPDATES = [(name, False) for name in NETWORKS] + [("inner", True), ("by kind", True)]
+
+
+@pytest.mark.parametrize(("network", "compiled"), UPDATES)
 @pytest.mark.parametrize("algorithm", ["td", "ppo"])
 def test_an_update_is_that_of_the_cpu(algorithm: str, network: str, compiled: bool) -> None:
-    if compiled and network not in ("inner", "by kind"):
-        pytest.skip("compiles for half a minute")
     torch.compiler.reset()
     learners = {name: make(algorithm, NETWORKS[network], name) for name in ("cpu", "cuda")}
     if compiled:
@@ -104,15 +105,13 @@ def test_an_update_is_that_of_the_cpu(algorithm: str, network: str, compiled: bo
 
 
 METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo", "ppo-oracle")
+RUNS = [(name, "off") for name in METHODS] + [("td-inner", "on"), ("ppo-inner", "on")]
 
 
-@pytest.mark.parametrize("compile_it", ["off", "on"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("method", "compile_it"), RUNS)
 def test_a_run_is_repeatable_and_is_used_without_a_gpu(
     small_config: Configure, tmp_path: Path, method: str, compile_it: str
 ) -> None:
-    if compile_it == "on" and method not in ("td-inner", "ppo-inner"):
-        pytest.skip("compiles for half a minute")
     options = {
         "train.method": method,
         "train.device": "cuda",
