@@ -77,6 +77,23 @@ def test_a_rollout_is_that_of_a_batch() -> None:
     assert uneven > 5
 
 
+def test_each_world_takes_a_seed_once() -> None:
+    env, batch = RescueTorchRLEnv(UNEVEN, ENVS, seed=1), BatchEnv(UNEVEN, ENVS, seed=7)
+    now = env.reset()
+    env.set_seed(7)  # after the first reset, as collectors do
+    found: list[list[torch.Tensor]] = [[] for _ in range(ENVS)]
+    for _ in range(100):
+        before, now = env.step_and_maybe_reset(env.rand_action(now))
+        for world in np.flatnonzero(before["next", "done"][:, 0].numpy()):
+            found[world].append(now["state"][world])
+    assert len({len(starts) for starts in found}) > 1  # worlds ended at different times
+    for episode in range(max(map(len, found))):
+        batch.reset()
+        for world, starts in enumerate(found):
+            if episode < len(starts):
+                np.testing.assert_array_equal(starts[episode].numpy(), batch.state()[world])
+
+
 def test_collector_and_replay() -> None:
     name = "Collector" if hasattr(collectors, "Collector") else "SyncDataCollector"
     collector = getattr(collectors, name)(

@@ -76,6 +76,7 @@ class RescueTorchRLEnv(EnvBase):  # type: ignore[misc]
         self.scenario = scenario
         self._worlds = worlds
         self._next_seed: int | None = None
+        self._unseeded = np.zeros(worlds.num_envs, bool)  # they take that seed when they are reset
         self._over = np.zeros((2, worlds.num_envs), bool)  # terminated, truncated
         self._robots: dict[str, list[int]] = {}
         for index, robot in enumerate(scenario.robots):
@@ -109,11 +110,14 @@ class RescueTorchRLEnv(EnvBase):  # type: ignore[misc]
 
     def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
-        chosen = None if mask is None else mask.reshape(self.num_envs).cpu().numpy()
-        obs = self._worlds.reset(self._next_seed, chosen)
-        if chosen is None or chosen.all():
-            self._next_seed = None
-        self._over[:, slice(None) if chosen is None else chosen] = False
+        everywhere = np.ones(self.num_envs, bool)
+        chosen = everywhere if mask is None else mask.reshape(self.num_envs).cpu().numpy()
+        seeded = chosen & self._unseeded
+        if seeded.any():
+            self._worlds.reset(self._next_seed, seeded)
+            self._unseeded &= ~chosen
+        obs = self._worlds.reset(None, chosen & ~seeded)
+        self._over[:, chosen] = False
         return self._seen(obs)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -146,8 +150,9 @@ class RescueTorchRLEnv(EnvBase):  # type: ignore[misc]
         return seen.to(self.device) if self.device is not None else seen
 
     def _set_seed(self, seed: int | None) -> None:
-        """Let the next reset of all worlds begin at the first episode of a seed."""
+        """Let the next reset of each world begin at the first episode of a seed."""
         self._next_seed = None if seed is None else whole_number("seed", seed, 0, MOST_SEED)
+        self._unseeded[:] = seed is not None
 
     @property
     def num_envs(self) -> int:
