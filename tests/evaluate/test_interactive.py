@@ -16,8 +16,10 @@ from innerattn.measures.moments import blocked, handoffs_of_all_robots
 from innerattn.policies import PolicyInput, WorldState, scripted_policy
 from innerattn.records.record import FIELDS
 
+SEED = 12_345
 
-def world(scenario: Scenario | None = None, *names: str, seed: int = 5) -> InteractiveWorld:
+
+def world(scenario: Scenario | None = None, *names: str, seed: int = SEED) -> InteractiveWorld:
     scenario = endless(scenario or Scenario.preset("mixed"))
     names = names or ("hungarian", "greedy")
     return InteractiveWorld(
@@ -27,8 +29,8 @@ def world(scenario: Scenario | None = None, *names: str, seed: int = 5) -> Inter
 
 def test_left_alone_it_is_an_episode_of_its_policy() -> None:
     scenario = Scenario.preset("mixed-16").replace(episode_steps=200)
-    policy = scripted_policy("hungarian", scenario, 5)
-    record = run_episodes(policy, scenario, 1, 5, record=FIELDS)
+    policy = scripted_policy("hungarian", scenario, SEED)
+    record = run_episodes(policy, scenario, 1, SEED, record=FIELDS)
     found = world(scenario)
     stopped, rescues, handoffs = blocked(record), [], []
     for step in range(200):
@@ -59,10 +61,10 @@ def test_left_alone_it_is_an_episode_of_its_policy() -> None:
 @pytest.mark.parametrize("actions", ["discrete", "continuous"])
 def test_a_steered_robot_does_what_it_is_told(actions: str) -> None:
     scenario = Scenario.preset("mixed").replace(actions=actions, situation="double")
-    found, env = world(scenario), BatchEnv(endless(scenario), 1, 5, num_threads=1)
+    found, env = world(scenario), BatchEnv(endless(scenario), 1, SEED, num_threads=1)
     env.reset()
     found.steer(2, (-1.0, 0.25))
-    policy = scripted_policy("hungarian", scenario, 5)
+    policy = scripted_policy("hungarian", scenario, SEED)
     for _ in range(10):
         chosen = policy.act(PolicyInput(env.observe(), WorldState.of(env)))
         chosen[0, 2] = 2 if actions == "discrete" else (-1.0, 0.25)

@@ -4,16 +4,20 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 import torch
 
 from innerattn.config import RunConfig, load_run_config
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError, RunError
+from innerattn.evaluate.play import run_episodes
 from innerattn.learn.types import Learner
+from innerattn.policies import scripted_policy
 from innerattn.records.run_folder import read_info
-from innerattn.train import Progress, load_policy, parts, train
+from innerattn.train import Progress, load_policy, loop, parts, train
 from innerattn.train.build import build_learner, thread_count
 
 Configure = Callable[..., RunConfig]
@@ -70,6 +74,32 @@ def test_the_same_run_twice_gives_the_same_weights(
     assert all(torch.equal(first[name], again[name]) for name in first)
     other = load_policy(train(small_config(**{"train.seed": 1}), tmp_path / "other"))[1].state()
     assert not all(torch.equal(first[name], other[name]) for name in first)
+
+
+def test_a_training_has_no_start_of_an_evaluation_with_its_seed(
+    small_config: Configure, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[BatchEnv] = []
+
+    def remembered(*args: Any, **options: Any) -> BatchEnv:
+        made.append(BatchEnv(*args, **options))
+        starts.append(made[-1].state())
+        return made[-1]
+
+    starts: list[Any] = []
+    monkeypatch.setattr(loop, "BatchEnv", remembered)
+    config = small_config(**{"train.seed": 12_345})
+    train(config, tmp_path / "run")
+    script = scripted_policy("random", config.scenario)
+    record = run_episodes(script, config.scenario, 12, 12_345, record=("positions",))
+    evaluated = record.steps["positions"][:, 0, :, 0].ravel()
+    trained = starts[0][:, ::4][:, : config.scenario.num_robots].ravel()
+    assert trained.shape == evaluated.shape
+    assert not np.isin(trained, evaluated).any()
+    again = run_episodes(
+        script, config.scenario, 12, 12_345, record=("positions",), purpose="training"
+    )
+    np.testing.assert_array_equal(again.steps["positions"][:, 0, :, 0].ravel(), trained)
 
 
 def test_progress_is_reported_each_step(small_config: Configure, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from innerattn import _core
 from innerattn.config import Scenario
+from innerattn.config.streams import stream_seed
 from innerattn.envs import BatchEnv
 from innerattn.evaluate.moment import Handoff, Moment, Rescue
 from innerattn.evaluate.play import Attentive
@@ -45,17 +46,17 @@ class InteractiveWorld:
         Args:
             scenario: the world.
             policies: by the name to show; the first one acts.
-            seed: of the world and of what policies draw.
+            seed: of the world and of what policies draw, 0 to 2**63 - 1.
 
         Raises:
-            ValueError: there is no policy.
+            ValueError: there is no policy, or the seed is out of range.
         """
         if not policies:
             raise ValueError("policies is empty: must hold at least one")
         self.scenario = scenario
         self.policies = dict(policies)
-        self._seed = seed
-        self._env = BatchEnv(scenario, 1, seed, num_threads=1)
+        self._seed = stream_seed(seed, "evaluation")
+        self._env = BatchEnv(scenario, 1, self._seed, num_threads=1)
         self._policy = next(iter(self.policies))
         self._steered: int | None = None
         self._drive = (0.0, 0.0)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
+from innerattn.config.streams import Purpose, stream_seed
 from innerattn.envs import BatchEnv
 from innerattn.policies import Policy, PolicyInput, WorldState
 from innerattn.records.record import FIELDS, Record, rescue_dtype
@@ -40,6 +41,7 @@ def run_episodes(
     record: Collection[str] = (),
     num_threads: int | None = None,
     progress: Callable[[int], None] | None = None,
+    purpose: Purpose = "evaluation",
 ) -> Record:
     """Run a policy for a number of episodes; it is reset first.
 
@@ -47,30 +49,33 @@ def run_episodes(
         policy: what drives the robots.
         scenario: the worlds; `episode_steps` is the length.
         episodes: how many.
-        seed: seed of the worlds; with ``first_episode`` it fixes the starts.
+        seed: seed of the worlds, 0 to 2**63 - 1; with ``first_episode`` it fixes the starts.
         first_episode: number of the first episode.
         record: which of `FIELDS` to keep for every step; attention is kept only if the policy has
             it.
         num_threads: threads that step the worlds; none: all cores.
         progress: called with the number of episodes each time some are done.
+        purpose: "training" for the random streams that a training with this seed has; those of
+            "evaluation" are none of a training's, whatever its seed.
 
     Returns:
         The record.
 
     Raises:
-        ValueError: less than one episode, or an unknown field to record.
+        ValueError: less than one episode, a seed out of range, or an unknown field to record.
     """
     if episodes < 1:
         raise ValueError(f"episodes = {episodes}: must be at least 1")
     unknown = set(record) - set(FIELDS)
     if unknown:
         raise ValueError(f"record = {sorted(unknown)}: known are {', '.join(FIELDS)}")
-    policy.reset(_draw_seed(seed, first_episode))
+    streams = stream_seed(seed, purpose)
+    policy.reset(_draw_seed(streams, first_episode))
     parts = []
     for start in range(first_episode, first_episode + episodes, _WORLDS_AT_ONCE):
         count = min(_WORLDS_AT_ONCE, first_episode + episodes - start)
         env = BatchEnv(
-            scenario, count, seed=seed, num_threads=num_threads, first_env=start, copy=False
+            scenario, count, seed=streams, num_threads=num_threads, first_env=start, copy=False
         )
         with closing(env):
             parts.append(_run_batch(policy, env, seed, start, record))

@@ -47,5 +47,5 @@ def training_rescues(config: RunConfig, script: str, episodes: int, threads: int
     """
     scenario, seed = config.training_scenario, config.train.seed
     policy = scripted_policy(script, scenario, seed)
-    record = run_episodes(policy, scenario, episodes, seed, num_threads=threads)
+    record = run_episodes(policy, scenario, episodes, seed, num_threads=threads, purpose="training")
     return len(record.rescues) / episodes

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from innerattn.config import RunConfig
+from innerattn.config.streams import stream_seed
 from innerattn.envs import BatchEnv
 from innerattn.records.run_files import RunFiles
 from innerattn.records.run_folder import config_of
@@ -140,7 +141,7 @@ def _prepared(
         env = BatchEnv(
             config.training_scenario,
             config.train.num_envs,
-            seed=config.train.seed,
+            seed=stream_seed(config.train.seed, "training"),
             num_threads=config.train.threads,
             copy=False,
         )
