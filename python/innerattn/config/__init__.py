@@ -9,14 +9,10 @@ from typing import TYPE_CHECKING
 from innerattn.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from innerattn.config.algorithm import Algorithm, AlgorithmConfig
     from innerattn.config.load import load_run_config, read_toml, write_toml
     from innerattn.config.ppo import PPOConfig
-    from innerattn.config.registry import (
-        Algorithm,
-        AlgorithmConfig,
-        register_algorithm,
-        register_attention,
-    )
+    from innerattn.config.registry import register_algorithm, register_attention
     from innerattn.config.run import BUDGETS, RunConfig, refuse_late_faults
     from innerattn.config.scenario import SCENARIOS, Fault, Obstacle, Robot, Scenario, Task
     from innerattn.config.sections import (
@@ -55,8 +51,8 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
-        "Algorithm": "registry",
-        "AlgorithmConfig": "registry",
+        "Algorithm": "algorithm",
+        "AlgorithmConfig": "algorithm",
         "BUDGETS": "run",
         "EvaluateConfig": "sections",
         "Fault": "scenario",

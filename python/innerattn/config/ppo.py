@@ -6,9 +6,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from innerattn.config.algorithm import Algorithm, AlgorithmConfig
 from innerattn.config.files import PRESETS
 from innerattn.config.model import ADDED_LATER, MOST_ROWS
-from innerattn.config.registry import Algorithm, AlgorithmConfig
 
 
 class PPOConfig(AlgorithmConfig):

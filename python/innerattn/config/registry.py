@@ -8,86 +8,27 @@ point group `innerattn.extensions`.
 from __future__ import annotations
 
 import logging
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
-from importlib.resources.abc import Traversable
-from typing import NamedTuple
 
-from pydantic import Field
-
-from innerattn.config.model import Model
+from innerattn.config.algorithm import Algorithm, Method
+from innerattn.config.ppo import PPO
+from innerattn.config.td import TD
 
 EXTENSIONS = "innerattn.extensions"
 """Entry point group; every entry point names a module, which registers things when imported."""
 
 _log = logging.getLogger(__name__)
 
-Needs = Mapping[str, Mapping[str, object]]
-"""Values that a method needs, by section and key."""
-
-
-class AlgorithmConfig(Model, ABC):
-    """Base of the configuration section of an algorithm; `place` is the name of the section."""
-
-    gamma: float = Field(0.95, ge=0.0, le=1.0, description="discount per control step")
-
-    @property
-    @abstractmethod
-    def rows_per_update(self) -> int:
-        """Transitions that one update computes with; decides how many threads are worth it."""
-
-    @abstractmethod
-    def rows_of_training(self, env_steps: int) -> int:
-        """Transitions that all updates of ``env_steps`` compute with, each as often as it is used.
-
-        Decides whether compiling the update pays.
-        """
-
-
-@dataclass(frozen=True)
-class Algorithm:
-    """A learning algorithm, as a configuration sees it.
-
-    Attributes:
-        config: Model of its section, with a default for every key.
-        learner: Its learner as "module:Class"; see `innerattn.learn.types.LearnerClass`.
-        attends: Whether its critic takes any registered attention, so that there is a method
-            NAME-ATTENTION for each, e.g. "td-inner".
-        methods: Further methods by name, with the values they need.
-        continuous: Values that its methods need where actions are continuous; None: they learn
-            discrete actions only.
-        budgets: Folder of what the algorithm changes in a built-in budget, BUDGET.toml; a budget
-            without a file is not changed.
-        warm_budgets: Likewise, on top of `budgets`, after a warm start.
-    """
-
-    config: type[AlgorithmConfig]
-    learner: str
-    attends: bool = False
-    methods: Mapping[str, Needs] = field(default_factory=dict)
-    continuous: Needs | None = None
-    budgets: Traversable | None = None
-    warm_budgets: Traversable | None = None
-
-    @property
-    def name(self) -> str:
-        """Name of the algorithm and of its section."""
-        return self.config.place
-
-
-class Method(NamedTuple):
-    """A value of `train.method`: an algorithm and the values that it needs, by section and key."""
-
-    algorithm: Algorithm
-    needs: Needs
-
-
-_algorithms: dict[str, Algorithm] = {}
-_attentions: dict[str, str] = {}
+_algorithms = {algorithm.name: algorithm for algorithm in (TD, PPO)}
+_attentions = {
+    "inner": "innerattn.nn:InnerAttention",
+    "uniform": "innerattn.nn:UniformAttention",
+    "frozen": "innerattn.nn:FrozenAttention",
+    "oracle": "innerattn.nn:OracleAttention",
+}
 
 
 def register_algorithm(algorithm: Algorithm) -> None:
@@ -96,7 +37,6 @@ def register_algorithm(algorithm: Algorithm) -> None:
     Raises:
         ValueError: Its name or one of its methods is taken.
     """
-    _register_ours()
     if algorithm.name in _algorithms:
         raise ValueError(f"algorithm {algorithm.name!r} is registered already")
     taken = _methods_of(_algorithms.values()).keys() & _methods_of([algorithm]).keys()
@@ -117,12 +57,6 @@ def register_attention(name: str, attention: str) -> None:
     Raises:
         ValueError: The name is taken.
     """
-    _register_ours()
-    add_attention(name, attention)
-
-
-def add_attention(name: str, attention: str) -> None:
-    """The same for modules of this package, which are imported on the way to `_register_ours`."""
     if name in (*_attentions, "none"):
         raise ValueError(f"attention {name!r} is registered already")
     _attentions[name] = attention
@@ -157,15 +91,9 @@ def _methods_of(algorithms: Iterable[Algorithm]) -> dict[str, Method]:
     return found
 
 
-def _register_ours() -> None:
-    """Import the modules of this package that register something, if nobody has done so before."""
-    import innerattn.config.run  # noqa: F401
-
-
 @cache
 def _load_extensions() -> None:
     """Import the modules that installed packages name; leave out those that cannot be imported."""
-    _register_ours()
     for extension in entry_points(group=EXTENSIONS):
         try:
             import_module(extension.value)

@@ -12,27 +12,19 @@ from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from innerattn.config.algorithm import AlgorithmConfig, Needs
 from innerattn.config.files import preset_names
 from innerattn.config.model import Model, config_error, places_of_keys, values_for_digest
 from innerattn.config.near import did_you_mean
-from innerattn.config.ppo import PPO, PPOConfig
-from innerattn.config.registry import (
-    AlgorithmConfig,
-    Needs,
-    algorithms,
-    methods,
-    register_algorithm,
-)
+from innerattn.config.ppo import PPOConfig
+from innerattn.config.registry import algorithms, methods
 from innerattn.config.scenario import Scenario
 from innerattn.config.sections import EvaluateConfig, ImitationConfig, NetworkConfig, TrainConfig
-from innerattn.config.td import TD, TDConfig
+from innerattn.config.td import TDConfig
 from innerattn.errors import ConfigError
 
 BUDGETS = preset_names("budgets")
 """Names of the built-in budgets: how long to train, and with which numbers."""
-
-register_algorithm(TD)
-register_algorithm(PPO)
 
 
 def refuse_late_faults(scenario: Scenario, evaluate: EvaluateConfig) -> None:

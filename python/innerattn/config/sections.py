@@ -10,13 +10,8 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from innerattn.config.model import ADDED_LATER, MOST_ROWS, MOST_STEPS, Model, OneOf
-from innerattn.config.registry import add_attention, attentions, methods
+from innerattn.config.registry import attentions, methods
 from innerattn.config.schedule import ScheduleConfig
-
-add_attention("inner", "innerattn.nn:InnerAttention")
-add_attention("uniform", "innerattn.nn:UniformAttention")
-add_attention("frozen", "innerattn.nn:FrozenAttention")
-add_attention("oracle", "innerattn.nn:OracleAttention")
 
 Method = Annotated[str, OneOf(methods)]
 Attention = Annotated[str, OneOf(lambda: (*attentions(), "none"))]

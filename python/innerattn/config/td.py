@@ -6,8 +6,8 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from innerattn.config.algorithm import Algorithm, AlgorithmConfig
 from innerattn.config.model import MOST_ROWS, MOST_STEPS
-from innerattn.config.registry import Algorithm, AlgorithmConfig
 
 
 class TDConfig(AlgorithmConfig):

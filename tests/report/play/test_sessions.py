@@ -18,7 +18,9 @@ from innerattn.report.play.sessions import Sessions
 def world() -> InteractiveWorld:
     scenario = endless(Scenario.preset("mixed").replace(max_victims=3))
     names = ("hungarian", "greedy")
-    return InteractiveWorld(scenario, {name: scripted_policy(name, scenario) for name in names}, 10_001)
+    return InteractiveWorld(
+        scenario, {name: scripted_policy(name, scenario) for name in names}, 10_001
+    )
 
 
 class Clock:
