@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from best_line import best_line
 
 from innerattn.config import RunConfig, load_run_config
 from innerattn.envs import BatchEnv
@@ -25,13 +26,6 @@ Configure = Callable[..., RunConfig]
 
 def files(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
-
-
-def best_line(run: Path) -> int:
-    """Env-steps of the first line of metrics with the most rescues."""
-    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
-    found = [line for line in lines if line["rescues_per_episode"] is not None]
-    return int(max(found, key=lambda line: line["rescues_per_episode"])["env_steps"])
 
 
 def test_a_finished_run_holds_what_is_promised(finished_run: Path) -> None:

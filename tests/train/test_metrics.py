@@ -17,13 +17,15 @@ def test_interval_counts_from_line_to_line() -> None:
     interval.add_losses({})
     interval.add_losses({"critic_loss": 1.0, "q": 2.0})
     interval.add_losses({"critic_loss": 3.0, "q": 4.0})
-    line = interval.close(1000, 20, Tally(4, 10, 4), {"food_0": [1.0]})
+    line = interval.close(1000, 20, Tally(4, 10, 4, 12), {"food_0": [1.0]})
     assert line["losses"] == {"critic_loss": 2.0, "q": 3.0}
     assert line["rescues_per_episode"] == 2.5
+    assert line["rescues_per_env_step"] == 0.012
     assert line["attention_entropy"] == {"food_0": [1.0]}
-    line = interval.close(1500, 30, Tally(0, 0, 4), {})
+    line = interval.close(1500, 30, Tally(0, 0, 4, 1), {})
     assert line["losses"] == {}
     assert line["rescues_per_episode"] is None
+    assert line["rescues_per_env_step"] == 0.002
     assert (line["env_steps"], line["updates"], line["episodes"]) == (1500, 30, 4)
 
 
@@ -32,10 +34,10 @@ def test_rates_are_of_the_interval_alone(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr("innerattn.train.metrics.time.perf_counter", lambda: now[0])
     interval = Interval()
     now[0] = 110.0
-    line = interval.close(1000, 20, Tally(0, 0, 0), {})
+    line = interval.close(1000, 20, Tally(0, 0, 0, 0), {})
     assert (line["seconds"], line["env_steps_per_s"], line["updates_per_s"]) == (10.0, 100.0, 2.0)
     now[0] = 115.0
-    line = interval.close(4000, 30, Tally(0, 0, 0), {})
+    line = interval.close(4000, 30, Tally(0, 0, 0, 0), {})
     assert (line["seconds"], line["env_steps_per_s"], line["updates_per_s"]) == (15.0, 600.0, 2.0)
 
 

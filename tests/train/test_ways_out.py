@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from best_line import best_line
 
 from innerattn.config import RunConfig, write_toml
 from innerattn.errors import RunError
@@ -184,13 +185,17 @@ def test_two_trainings_in_one_folder_are_refused(small_config: Configure, tmp_pa
     train(small_config(**OFTEN), run, progress=second)
 
 
+@pytest.mark.parametrize("end", [None, 1])
 def test_the_best_weights_are_those_of_the_best_line(
-    small_config: Configure, tmp_path: Path
+    end: int | None, small_config: Configure, tmp_path: Path
 ) -> None:
-    run = train(small_config(**OFTEN), tmp_path / "run")
+    """With ``end`` the first episode that ends has the most rescues there can be."""
+    easy = {"scenario.end_when_rescued": end, "scenario.rescue_radius_m": 0.6}
+    run = train(small_config(**OFTEN, **easy), tmp_path / "run")
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
-    rated = [line for line in lines if line["rescues_per_episode"] is not None]
-    best = max(rated, key=lambda line: line["rescues_per_episode"])["env_steps"]
+    first = next(line for line in lines if line["episodes"])
+    best = best_line(run)
+    assert best > first["env_steps"] or end is None
     weights = read_weights(run / "checkpoints" / f"best-{best}.safetensors")
     assert int(weights["updates"]) == next(
         line["updates"] for line in lines if line["env_steps"] == best

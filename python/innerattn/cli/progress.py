@@ -7,12 +7,15 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from types import TracebackType
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
+from innerattn.records.logged import logged_rescues, unit_of_rescues
+
 if TYPE_CHECKING:
+    from innerattn.config import RunConfig
     from innerattn.evaluate.robustness import Stage
     from innerattn.evaluate.training_score import ScriptedRescues
     from innerattn.experiments.processes import Job
@@ -105,10 +108,15 @@ class Training(Work):
         console: Console | None = None,
         clock: Callable[[], float] = time.monotonic,
         scripts: Callable[[], ScriptedRescues] | None = None,
+        config: RunConfig | None = None,
     ) -> None:
-        """As `Work`; ``scripts`` is called once, when the first score is to be shown."""
+        """As `Work`; ``scripts`` is called once, when the first score is to be shown.
+
+        ``config`` says what rescues are counted over; none: over episodes.
+        """
         super().__init__(console, clock)
         self._scripts = cache(scripts) if scripts is not None else None
+        self._config = config
         self._known: float | None = None
 
     def __call__(self, progress: TrainProgress) -> None:
@@ -118,7 +126,7 @@ class Training(Work):
             self._start = self._clock() - progress.seconds
             self._known = None
         seconds = max(progress.seconds, 1e-9)
-        rescues = progress.metrics["rescues_per_episode"] if progress.metrics else None
+        rescues = self._logged(progress.metrics) if progress.metrics else None
         if rescues is not None:  # none where no episode ended in the last interval
             self._known = rescues
         parts = [
@@ -129,11 +137,18 @@ class Training(Work):
         note = " | ".join(parts)
         self.show(progress.env_steps, progress.total_env_steps, note, progress.seconds)
 
+    def _logged(self, line: Mapping[str, Any]) -> float | None:
+        if self._config is not None:
+            return logged_rescues(self._config, line)
+        found: float | None = line["rescues_per_episode"]
+        return found
+
     def _rescues(self, rescues: float) -> str:
         score = None
         if self._scripts is not None and not self._console.quiet:
             score = self._scripts().score(rescues)
-        told = f"{rescues:.2f} rescues/episode"
+        per = "episode" if self._config is None else unit_of_rescues(self._config)
+        told = f"{rescues:.2f} rescues/{per}"
         return told if score is None else f"{told}, score {score:.2f}"
 
 

@@ -218,7 +218,7 @@ class _Train(_Sources):
         scripts = partial(scripted_rescues, config)
         with RunLoggers(self.log, Opened(run_dir, config), failed=say_not_logged) as loggers:
             try:
-                with Training(self.progress_console(), scripts=scripts) as progress:
+                with Training(self.progress_console(), scripts=scripts, config=config) as progress:
                     learn(_both(progress, loggers))
             except KeyboardInterrupt:
                 _say_what_is_kept([run_dir])

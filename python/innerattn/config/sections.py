@@ -179,8 +179,8 @@ class TrainConfig(Model):
     )
     keep_best: Annotated[bool, ADDED_LATER] = Field(
         True,
-        description="keep the weights of the logging interval with the most rescues per training "
-        "episode, too",
+        description="keep the weights of the logging interval with the most rescues per env-step, "
+        "too",
     )
     episode_steps: Annotated[int | None, ADDED_LATER] = Field(
         None,

@@ -13,6 +13,7 @@ import numpy as np
 from innerattn.config import RunConfig
 from innerattn.config.untrusted import parse_json, read_plain
 from innerattn.errors import RunError
+from innerattn.records.logged import logged_rescues, unit_of_rescues
 from innerattn.records.run_folder import State, newest_weights, read_config, read_info
 
 _MOST_BYTES = 1 << 30
@@ -37,7 +38,8 @@ class LiveRun:
         silent_s: since the last line was logged [s]; None before the first.
         checkpoint: env-steps of the newest checkpoint; None before the first.
         times: env-steps of the logged lines.
-        rescues: per training episode at these; None where no episode had ended.
+        rescues: at these, as `innerattn.records.logged.logged_rescues` counts them.
+        rescues_per: what they are counted over: "episode", or "N steps" where rescues end episodes.
         entropy: attention entropy at these, mean over robots and heads [nats]; empty without.
         even_nats: the entropy of even attention; None below three robots.
     """
@@ -55,6 +57,7 @@ class LiveRun:
     checkpoint: int | None
     times: tuple[int, ...]
     rescues: tuple[float | None, ...]
+    rescues_per: str
     entropy: tuple[float, ...]
     even_nats: float | None
 
@@ -68,7 +71,7 @@ def read_live(folder: Path) -> LiveRun:
     """
     info, config = read_info(folder), read_config(folder)
     path = folder / "metrics.jsonl"
-    logged = _read_logged(path)
+    logged = _read_logged(path, config)
     total, robots = _total(config), config.scenario.num_robots
     done = max(info.env_steps, *(line.env_steps for line in logged[-1:]), 0)
     speed = logged[-1].env_steps_per_s if logged else None
@@ -89,6 +92,7 @@ def read_live(folder: Path) -> LiveRun:
         checkpoint=_checkpoint(folder),
         times=tuple(line.env_steps for line in kept),
         rescues=tuple(line.rescues for line in kept),
+        rescues_per=unit_of_rescues(config),
         entropy=entropy if len(entropy) == len(kept) else (),
         even_nats=math.log(robots - 1) if robots > 2 else None,
     )
@@ -101,23 +105,22 @@ class _Logged(NamedTuple):
     env_steps_per_s: float
 
 
-def _read_logged(path: Path) -> list[_Logged]:
+def _read_logged(path: Path, config: RunConfig) -> list[_Logged]:
     """The lines of a metrics file; none before the first."""
     if not path.exists():
         return []
     try:
         lines = read_plain(path, _MOST_BYTES).splitlines()
-        return [_logged(parse_json(line)) for line in lines]
+        return [_logged(parse_json(line), config) for line in lines]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not the metrics of a run") from error
 
 
-def _logged(line: dict[str, Any]) -> _Logged:
-    rescues = line["rescues_per_episode"]
+def _logged(line: dict[str, Any], config: RunConfig) -> _Logged:
     values = [value for heads in line["attention_entropy"].values() for value in heads]
     return _Logged(
         int(line["env_steps"]),
-        None if rescues is None else float(rescues),
+        logged_rescues(config, line),
         float(np.mean(values)) if values else None,
         float(line["env_steps_per_s"]),
     )

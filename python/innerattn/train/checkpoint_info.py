@@ -24,11 +24,11 @@ _STRICT = ConfigDict(extra="forbid", strict=True)
 
 @dataclass(frozen=True)
 class Best:
-    """The best training rescues of a logging interval, and the env-steps at its end."""
+    """The most rescues per env-step of some logging intervals, and the env-steps at their end."""
 
     __pydantic_config__ = _STRICT
 
-    rescues_per_episode: _Finite
+    rescues_per_env_step: _Finite
     env_steps: _Count
 
 
@@ -45,7 +45,9 @@ class Counters:
         stage_updates_before: updates that were done before the stage.
         stage_seconds_before: time before the stage [s].
         seconds: of training so far [s].
-        best: what was best so far; None before an episode has ended.
+        best: what was best so far; None until enough env-steps were counted.
+        counted_rescues: rescues that no comparison with the best has counted yet.
+        counted_env_steps: the env-steps of these.
     """
 
     __pydantic_config__ = _STRICT
@@ -59,6 +61,8 @@ class Counters:
     stage_seconds_before: Annotated[_Finite, Field(ge=0)] = 0.0
     seconds: Annotated[_Finite, Field(ge=0)] = 0.0
     best: Best | None = None
+    counted_rescues: _Count = 0
+    counted_env_steps: _Count = 0
 
 
 @dataclass(frozen=True)
@@ -122,6 +126,9 @@ def checkpoint_info(data: bytes) -> CheckpointInfo:
         raise ValueError(f"schema version {version}, only {SCHEMA_VERSION} is known")
     if document.pop("sha256", None) != _digest(document):
         raise ValueError("does not fit its own digest; it was altered")
+    counters = document.get("counters")
+    if isinstance(counters, dict) and "rescues_per_episode" in (counters.get("best") or {}):
+        counters["best"] = None  # of an older version, in another unit: compare from here on
     try:
         return _CHECK.validate_json(json.dumps(document))
     except ValidationError as error:

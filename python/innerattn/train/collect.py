@@ -25,11 +25,19 @@ _MOST = 2**62
 
 @dataclass(frozen=True)
 class Tally:
-    """Episodes that ended since the last count, the rescues in them, and all episodes so far."""
+    """What happened since the last count.
+
+    Attributes:
+        episodes: those that ended.
+        rescues: in those episodes, whenever they began.
+        total_episodes: all that ended so far.
+        all_rescues: of all worlds, whether or not their episodes have ended.
+    """
 
     episodes: int
     rescues: int
     total_episodes: int
+    all_rescues: int
 
 
 class Collector:
@@ -61,7 +69,7 @@ class Collector:
         self._afterstates = afterstates
         self._obs = self._tensor(_staggered(env) if stagger_starts else env.reset())
         self._open_rescues: NDArray[np.int64] = np.zeros(env.num_envs, np.int64)
-        self._episodes = self._rescues = self._total = 0
+        self._episodes = self._rescues = self._total = self._all_rescues = 0
 
     def step(self) -> tuple[Transitions, Tensor]:
         """One control step of all worlds, with actions sampled from the policy.
@@ -91,13 +99,14 @@ class Collector:
         refuse_not_finite_reward(transitions.reward)
         self._obs = self._tensor(step.obs)
         np.add.at(self._open_rescues, step.rescues["env"], 1)
+        self._all_rescues += len(step.rescues)
         self._count(step.terminated | step.truncated)
         return transitions, truncated
 
     def take_tally(self) -> Tally:
         """Counts since the last call."""
-        tally = Tally(self._episodes, self._rescues, self._total)
-        self._episodes = self._rescues = 0
+        tally = Tally(self._episodes, self._rescues, self._total, self._all_rescues)
+        self._episodes = self._rescues = self._all_rescues = 0
         return tally
 
     def resume_state(self) -> dict[str, Tensor]:
@@ -105,7 +114,7 @@ class Collector:
         return {
             "obs": self._obs,
             "open_rescues": torch.from_numpy(self._open_rescues),
-            "tally": torch.tensor([self._episodes, self._rescues, self._total]),
+            "tally": torch.tensor([self._episodes, self._rescues, self._total, self._all_rescues]),
         }
 
     def load_resume_state(self, state: State) -> None:
@@ -114,8 +123,11 @@ class Collector:
         worlds = len(self._open_rescues)
         rescues = take_within(state, "open_rescues", torch.int64, 0, _MOST, worlds)
         self._open_rescues = rescues.numpy().copy()
-        tally = take_within(state, "tally", torch.int64, 0, _MOST, 3)
-        self._episodes, self._rescues, self._total = tally.tolist()
+        tally = take_within(state, "tally", torch.int64, 0, _MOST, None).tolist()
+        if len(tally) not in (3, 4):
+            raise ValueError(f"'tally' has {len(tally)} numbers: must have 4")
+        self._episodes, self._rescues, self._total = tally[:3]
+        self._all_rescues = sum(tally[3:])  # which older versions did not count
 
     def _count(self, ended: NDArray[np.bool_]) -> None:
         count = int(ended.sum())

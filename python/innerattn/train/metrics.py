@@ -28,8 +28,8 @@ _MOST_BYTES = 1 << 30
 _COUNTS = ("skipped_updates",)
 Metrics = Mapping[str, Any]
 """One line: env_steps, episodes, updates, seconds, env_steps_per_s, updates_per_s, losses by name,
-rescues_per_episode (none where no episode ended) and attention_entropy by robot and head [nats],
-empty where the critic has no attention."""
+rescues_per_episode (of the episodes that ended; none where none did), rescues_per_env_step (of all
+worlds) and attention_entropy by robot and head [nats], empty where the critic has no attention."""
 
 
 class MetricsFile:
@@ -135,6 +135,11 @@ class Interval:
         self._losses: dict[str, list[float]] = {}
 
     @property
+    def env_steps(self) -> int:
+        """Env-steps of training at the last line."""
+        return self._env_steps
+
+    @property
     def seconds(self) -> float:
         """Time since the start of training [s]."""
         return time.perf_counter() - self._start
@@ -172,16 +177,17 @@ class Interval:
     ) -> dict[str, Any]:
         """Return the line of this interval, and start the next one."""
         seconds = self.seconds
-        elapsed = max(seconds - self._seconds, 1e-9)
+        elapsed, steps = max(seconds - self._seconds, 1e-9), env_steps - self._env_steps
         line: dict[str, Any] = {
             "env_steps": env_steps,
             "episodes": tally.total_episodes,
             "updates": updates,
             "seconds": round(seconds, 3),
-            "env_steps_per_s": round((env_steps - self._env_steps) / elapsed, 1),
+            "env_steps_per_s": round(steps / elapsed, 1),
             "updates_per_s": round((updates - self._updates) / elapsed, 2),
             "losses": {name: _summary(name, all_) for name, all_ in self._losses.items()},
             "rescues_per_episode": tally.rescues / tally.episodes if tally.episodes else None,
+            "rescues_per_env_step": tally.all_rescues / max(steps, 1),
             "attention_entropy": dict(entropy),
         }
         self._seconds, self._env_steps, self._updates = seconds, env_steps, updates

@@ -207,24 +207,36 @@ class Stages:
 
     def _log(self) -> None:
         parts = self._parts
+        before, tally = parts.interval.env_steps, parts.collector.take_tally()
         self._metrics = parts.interval.close(
             self._at.env_steps,
             parts.learner.updates,
-            parts.collector.take_tally(),
+            tally,
             parts.attention.entropy(parts.learner),
         )
-        self._note_best(self._metrics["rescues_per_episode"])
+        self._note_best(tally.all_rescues, self._at.env_steps - before)
         line = self._metrics
         self._try("a line of metrics", lambda: self._file.append(line))
         self._try("the state of the run", lambda: self._mark("running"))
 
-    def _note_best(self, rescues: float | None) -> None:
-        best = self._at.best
-        if not self._config.keep_best or self._at.stage != "training" or rescues is None:
+    def _note_best(self, rescues: int, env_steps: int) -> None:
+        """Compare rescues per env-step of all worlds, over as long as each world's episode takes.
+
+        Rescues of the episodes that ended would favour early weights: where rescues end an episode,
+        the lucky ones end first.
+        """
+        if not self._config.keep_best or self._at.stage != "training":
             return
-        if best is None or rescues > best.rescues_per_episode:
-            self._at = replace(self._at, best=Best(rescues, self._at.env_steps))
+        at = self._at
+        rescues, env_steps = rescues + at.counted_rescues, env_steps + at.counted_env_steps
+        if env_steps < self._config.num_envs * self._parts.env.scenario.episode_steps:
+            self._at = replace(at, counted_rescues=rescues, counted_env_steps=env_steps)
+            return
+        best, rate = at.best, rescues / env_steps
+        if best is None or rate >= best.rescues_per_env_step:
+            best = Best(rate, at.env_steps)
             self._best_weights = self._parts.learner.state()
+        self._at = replace(at, best=best, counted_rescues=0, counted_env_steps=0)
 
     def _is_checkpoint_due(self) -> bool:
         every, now = self._config.checkpoint_every_env_steps, self._at.env_steps

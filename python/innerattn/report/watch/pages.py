@@ -93,12 +93,13 @@ def _state(folders: Sequence[Path], scripts: Mapping[str, float]) -> Answer:
 
 
 def _plots(runs: Sequence[LiveRun], scripts: Mapping[str, float]) -> list[Plot]:
+    per = " or ".join(dict.fromkeys(run.rescues_per for run in runs))
     rescues = Plot(
-        title="Rescues per training episode",
+        title=f"Rescues per {per} in training",
         note="",
         traces=[_line(index, run, run.rescues) for index, run in enumerate(runs)],
         x="env-steps",
-        y="rescues per episode",
+        y=f"rescues per {per}",
         levels=dict(scripts),
     )
     attentive = [(index, run) for index, run in enumerate(runs) if run.entropy]

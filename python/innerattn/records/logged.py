@@ -1,0 +1,36 @@
+"""How many rescues a line of a training's metrics tells of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from innerattn.config import RunConfig
+
+
+def logged_rescues(config: RunConfig, line: Mapping[str, Any]) -> float | None:
+    """Rescues per training episode.
+
+    Where rescues end an episode, the episodes that ended are the lucky ones; all rescues are taken
+    then, of as many env-steps of a world as its longest episode has.
+
+    Args:
+        config: of the run.
+        line: of its ``metrics.jsonl``.
+
+    Returns:
+        None where no episode ended; in older runs whose episodes rescues end, the mean over the
+        episodes that ended.
+    """
+    rate = line.get("rescues_per_env_step")
+    if config.training_scenario.end_when_rescued is None or rate is None:
+        found = line["rescues_per_episode"]
+        return None if found is None else float(found)
+    return float(rate) * config.training_scenario.episode_steps
+
+
+def unit_of_rescues(config: RunConfig) -> str:
+    """What `logged_rescues` is counted over: "episode", or "N steps" where rescues end episodes."""
+    scenario = config.training_scenario
+    ends_early = scenario.end_when_rescued is not None
+    return f"{scenario.episode_steps} steps" if ends_early else "episode"
