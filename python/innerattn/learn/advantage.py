@@ -11,6 +11,8 @@ from torch import Tensor
 
 from innerattn.learn.resume import State, take
 
+_ROUNDING = 1e-9  # share of a mean of returns in float64, by which equal ones differ at most
+
 
 def generalised_advantage(
     reward: Tensor,
@@ -81,6 +83,14 @@ class ReturnScale:
         self.squares += apart.square() * self.count * added / (self.count + added)
         self.mean += apart * added / (self.count + added)
         self.count += added
+
+    def forget_open_returns(self) -> None:
+        """Let the next rewards begin episodes: those before them are not the learner's."""
+        self._open = None
+
+    def has_spread(self) -> Tensor:
+        """(R,) bool: whether the returns of a robot have differed by more than rounding."""
+        return self.squares > self.count * (_ROUNDING * self.mean).square()
 
     def tensors(self) -> dict[str, Tensor]:
         """Live tensors by name, to be saved."""

@@ -131,6 +131,7 @@ class PPO(ActorCritic):
         """
         if self.actor_frozen != self._steps_of_frozen:
             self._buffer.clear()
+            self.scale.forget_open_returns()
             self._steps_of_frozen = self.actor_frozen
         self._buffer.add(batch, truncated, self._log_probs_of(batch.obs))
 
@@ -169,7 +170,7 @@ class PPO(ActorCritic):
         rollout = passes.rollout
         if passes.order is None:
             passes.order = torch.randperm(rollout.obs.shape[1], generator=self._shuffle)
-        minibatches = torch.split(passes.order, self._config.minibatch_size)
+        minibatches = _split(passes.order, self._config.minibatch_size)
         for chosen in minibatches[passes.done :]:
             rows = rollout.take(chosen.to(self._device))
             passes.learnt += self._do_update(len(chosen), partial(self.update, rows))
@@ -177,7 +178,7 @@ class PPO(ActorCritic):
         found = self._rows[len(self._rows) - passes.learnt :]
         passes.epoch, passes.order, passes.done, passes.learnt = passes.epoch + 1, None, 0, 0
         stop = self._config.stop_at_kl
-        if stop is None or not found:
+        if stop is None or not found or self.actor_frozen:  # imitation changes a frozen policy
             return False
         return float(torch.stack(found)[:, _METRICS.index("kl")].mean()) > stop
 
@@ -305,7 +306,8 @@ class PPO(ActorCritic):
             actions=steps.actions,
             log_prob=log_prob,
             value=fitted,
-            advantage=standardised(rows_of(advantage)),
+            # Rewards that never differ say nothing: advantages are then errors of the critic.
+            advantage=standardised(rows_of(advantage)) * self.scale.has_spread().unsqueeze(1),
             target=rows_of(advantage + value),
         )
 
@@ -391,3 +393,11 @@ class PPO(ActorCritic):
 
     def _running(self) -> dict[str, Tensor]:
         return {f"scale.{name}": tensor for name, tensor in self.scale.tensors().items()}
+
+
+def _split(order: Tensor, size: int) -> tuple[Tensor, ...]:
+    """Parts of at most ``size`` rows that differ by one row at most.
+
+    The few rows of a short last part would weigh as much as all rows of another part.
+    """
+    return torch.tensor_split(order, -(-len(order) // size))

@@ -10,6 +10,8 @@ from torch import Tensor
 from innerattn.learn.resume import State, take, take_within
 from innerattn.learn.types import Team, Transitions
 
+_ROUNDING = 8.0  # units in the last place of the largest advantage, by which equal ones differ
+
 
 class Arrivals(NamedTuple):
     """The n steps of a rollout with which victims appeared, and the worlds without these victims.
@@ -270,6 +272,12 @@ def steps_of(rows: Tensor, num_steps: int) -> Tensor:
 
 
 def standardised(advantage: Tensor) -> Tensor:
-    """Advantages (R, B) with mean 0 and standard deviation 1 for each robot."""
+    """Advantages (R, B) with mean 0 and standard deviation 1 for each robot.
+
+    They are 0 where they differ by no more than rounding: divided by their deviation, rounding
+    would pass for advantages.
+    """
     centred = advantage - advantage.mean(dim=1, keepdim=True)
-    return centred / (advantage.std(dim=1, correction=0, keepdim=True) + 1e-8)
+    deviation = advantage.std(dim=1, correction=0, keepdim=True)
+    rounding = _ROUNDING * torch.finfo(advantage.dtype).eps * advantage.abs().amax(1, keepdim=True)
+    return torch.where(deviation > rounding, centred / (deviation + 1e-8), 0.0)

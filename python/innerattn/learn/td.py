@@ -164,13 +164,16 @@ class TD(ActorCritic):
         """Update the critic, then the actors by the new critic, then the target networks.
 
         Args:
-            batch: At least one transition; rewards are normalised by the replay's statistics.
+            batch: At least one transition. Rewards are divided by their standard deviation in the
+                replay; where no episode terminates, their mean is taken off before.
 
         Returns:
             (6,) the metrics that `learn` names, in that order.
         """
         floor = self._config.reward_std_floor
-        reward = batch.reward.to(self._device) - self.replay.reward_mean
+        reward = batch.reward.to(self._device)
+        if not self._team.terminates:  # else a policy would be paid for the length of its episodes
+            reward = reward - self.replay.reward_mean
         reward = reward / self.replay.reward_std.clamp_min(floor)
         continues = ~batch.terminated.to(self._device)
         shape = (self._team.num_robots, self._team.num_actions, len(batch.obs))

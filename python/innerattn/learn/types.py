@@ -38,6 +38,7 @@ class Team(NamedTuple):
         state_width: S, columns of the state of a world; needed only where `ppo.bootstrap` is
             "afterstate".
         swapped: Two robots that swap their initial weights; None: none do.
+        terminates: Whether an episode may terminate, so that a policy decides how long it lasts.
     """
 
     num_robots: int
@@ -50,6 +51,7 @@ class Team(NamedTuple):
     action_width: int = 0
     state_width: int = 0
     swapped: tuple[int, int] | None = None
+    terminates: bool = False
 
     @property
     def actions(self) -> Actions:
