@@ -5,6 +5,7 @@ import json
 import os
 import signal
 import socket
+import struct
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -14,6 +15,7 @@ from typing import Any
 import pytest
 
 from innerattn.errors import RunError
+from innerattn.report import local_server
 from innerattn.report.local_server import HOST, MOST_BODY_BYTES, Answer, LocalServer
 
 
@@ -201,3 +203,124 @@ def test_a_message_without_a_length_is_not_waited_for(taking: LocalServer) -> No
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS"])
 def test_nothing_else_can_be_asked_for(taking: LocalServer, method: str) -> None:
     assert asked(taking, f"/{taking.word}/sessions", method, **JSON)[0] == 501
+
+
+def raw(server: LocalServer, request: bytes) -> bytes:
+    """The first answer to some bytes; empty where the connection just ends."""
+    with socket.create_connection((HOST, server.port), timeout=10) as connection:
+        connection.sendall(request)
+        with suppress(ConnectionError):
+            return connection.recv(65_536)
+        return b""
+
+
+def get(server: LocalServer, path: str, *more: str) -> bytes:
+    lines = (f"GET {path} HTTP/1.1", f"Host: {HOST}:{server.port}", *more, "", "")
+    return "\r\n".join(lines).encode()
+
+
+@pytest.mark.parametrize(
+    ("request_of", "status"),
+    [
+        (lambda s: get(s, "http://["), 403),
+        (lambda s: get(s, f"http://evil.example/{s.word}/"), 403),
+        (lambda s: get(s, f"//evil.example/{s.word}/"), 403),
+        (lambda s: get(s, f"/{s.word}/", "Host: evil.example"), 403),
+        (lambda s: get(s, f"/{s.word}/", f"Host: {HOST}:{s.port}"), 403),
+        (lambda s: get(s, "x" * 70_000), 414),
+        (lambda s: get(s, f"/{s.word}/", "a: " + "x" * 70_000), 431),
+        (lambda s: get(s, f"/{s.word}/", *[f"a{n}: 1" for n in range(200)]), 431),
+        (lambda s: get(s, f"/{s.word}/").replace(b"HTTP/1.1", b"HTTP/9.9"), 505),
+        (lambda s: get(s, f"/{s.word}/").replace(b"GET", b"\x00\xff"), 501),
+        (lambda s: get(s, f"/{s.word}/").replace(b"GET", b"BREW"), 501),
+        (lambda s: get(s, "/a b c d"), 400),
+        (lambda s: get(s, "/\ud800".encode("utf-8", "surrogatepass").decode("latin-1")), 400),
+    ],
+)
+def test_odd_requests_are_refused_with_the_headers_of_every_page(
+    taking: LocalServer,
+    request_of: Callable[[LocalServer], bytes],
+    status: int,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    head, _, text = raw(taking, request_of(taking)).partition(b"\r\n\r\n")
+    assert head.split()[1] == str(status).encode()
+    assert b"Content-Security-Policy: default-src 'none'" in head
+    assert b"first" not in text
+    assert asked(taking, f"/{taking.word}/")[2] == "first"
+    assert capfd.readouterr() == ("", "")
+
+
+def test_nothing_is_printed_of_a_connection_that_breaks(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    reset = struct.pack("ii", 1, 0)
+    began, go_on = threading.Event(), threading.Event()
+
+    def slow() -> Answer:
+        began.set()
+        go_on.wait(10)
+        return Answer("text/plain", "x" * 10_000_000)
+
+    with served(LocalServer({"": slow})) as server:
+        connection = socket.create_connection((HOST, server.port), timeout=10)
+        connection.sendall(get(server, f"/{server.word}/"))
+        assert began.wait(10)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, reset)
+        connection.close()
+        go_on.set()
+        assert asked(server, f"/{server.word}/")[0] == 200
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_fault_of_a_page_is_one_line(capfd: pytest.CaptureFixture[str]) -> None:
+    def faulty(*_: object) -> Answer:
+        raise ZeroDivisionError("a secret")
+
+    with served(LocalServer({"": faulty}, take=faulty)) as server:
+        for method in ("GET", "POST"):
+            status, headers, text = asked(server, f"/{server.word}/", method, b"{}", **JSON)
+            assert status == 500
+            assert "secret" not in text
+            assert "Content-Security-Policy" in headers
+    assert capfd.readouterr().err.splitlines() == 2 * [
+        "innerattn: error: ZeroDivisionError: a secret"
+    ]
+
+
+def test_clients_that_trickle_are_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local_server, "REQUEST_WITHIN_S", 0.3)
+    with served(LocalServer(PAGES, take=echo)) as server:
+        head = get(server, f"/{server.word}/")[:-2] + b"a: "
+        with socket.create_connection((HOST, server.port), timeout=0.05) as connection:
+            ended = False
+            for byte in head + b"x" * 200:  # 10 s, were it let
+                try:
+                    connection.sendall(bytes([byte]))
+                    ended = connection.recv(1) == b""
+                except TimeoutError:
+                    continue
+                except ConnectionError:
+                    ended = True
+                if ended:
+                    break
+            assert ended
+        assert asked(server, f"/{server.word}/")[2] == "first"
+
+
+def test_connections_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local_server, "MOST_CONNECTIONS", 3)
+    with served(LocalServer(PAGES)) as server:
+        held = [socket.create_connection((HOST, server.port), timeout=10) for _ in range(3)]
+        for connection in held:  # each is served once it is answered
+            connection.sendall(get(server, f"/{server.word}/"))
+            assert b" 200 " in connection.recv(4096)
+        assert raw(server, get(server, f"/{server.word}/")) == b""
+        for connection in held:
+            connection.close()
+        for _ in range(100):
+            with suppress(OSError, http.client.HTTPException):
+                if asked(server, f"/{server.word}/")[2] == "first":
+                    break
+        else:
+            raise AssertionError("places are not given back")

@@ -9,12 +9,16 @@ from __future__ import annotations
 import errno
 import json
 import secrets
+import socket
+import sys
+import threading
+import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from types import FrameType
-from typing import NamedTuple
-from urllib.parse import urlsplit
+from typing import Any, NamedTuple
 
 from innerattn.errors import InnerattnError, RunError, one_line
 from innerattn.signals import Interrupted, requests_handled_by
@@ -22,6 +26,10 @@ from innerattn.signals import Interrupted, requests_handled_by
 HOST = "127.0.0.1"
 MOST_BODY_BYTES = 4096
 """Longest message that a page may send."""
+REQUEST_WITHIN_S = 30.0
+"""How long a client may take to send a request, from its connection or its last answer on."""
+MOST_CONNECTIONS = 64
+"""As many connections are served at a time; others are closed at once."""
 
 _POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'self' 'unsafe-inline'; "
@@ -116,15 +124,57 @@ class _Server(ThreadingHTTPServer):
     daemon_threads = True
     noted: int | None = None
 
+    def __init__(self, address: tuple[str, int], handler: type[_Handler]) -> None:
+        super().__init__(address, handler)
+        self.waiting: dict[socket.socket, float] = {}
+        """Connections whose next request is not read yet, and since when [s]."""
+        self._open = 0
+        self._count = threading.Lock()
+
     def note(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal."""
         del frame
         self.noted = number
 
     def service_actions(self) -> None:
-        """Raise what was noted; called between requests, ten times a second."""
+        """Raise what was noted, and end what takes too long; called ten times a second."""
         if self.noted is not None:
             raise Interrupted(self.noted)
+        last = time.monotonic() - REQUEST_WITHIN_S
+        for connection in [one for one, since in self.waiting.copy().items() if since < last]:
+            with suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Let a thread serve a connection, unless there are too many."""
+        with self._count:
+            full = self._open >= MOST_CONNECTIONS
+            self._open += not full
+        if full:
+            self.shutdown_request(request)
+        else:
+            super().process_request(request, client_address)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Serve a connection to its end."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            with self._count:
+                self._open -= 1
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Print nothing of a connection that breaks, and one line of a fault of ours."""
+        del request, client_address
+        error = sys.exc_info()[1]
+        if isinstance(error, Exception) and not isinstance(error, OSError):
+            _fault(error)
+
+
+def _fault(error: Exception) -> str:
+    """Print what failed in one line; what a stranger may know of it."""
+    print(f"innerattn: error: {type(error).__name__}: {one_line(error)}", file=sys.stderr)
+    return "this page has a fault"
 
 
 def _nothing(path: str, body: bytes) -> Answer:
@@ -133,6 +183,7 @@ def _nothing(path: str, body: bytes) -> Answer:
 
 
 class _Handler(BaseHTTPRequestHandler):
+    server: _Server
     pages: Mapping[str, Callable[[], Answer]]
     word: str
     take: Take
@@ -145,6 +196,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer a request, or refuse it."""
+        self._is_whole()
         name, refusal = self._asked()
         if refusal is not None:
             self._send(Answer("text/plain", refusal, HTTPStatus.FORBIDDEN))
@@ -155,13 +207,15 @@ class _Handler(BaseHTTPRequestHandler):
                 answer = self.pages[name]()
             except (InnerattnError, OSError) as error:
                 answer = Answer("text/plain", one_line(error), HTTPStatus.NOT_FOUND)
+            except Exception as error:
+                answer = Answer("text/plain", _fault(error), HTTPStatus.INTERNAL_SERVER_ERROR)
             self._send(answer)
 
     def _asked(self) -> tuple[str, str | None]:
         """The name that is asked for, and why nothing is given; none: it may be given."""
-        path = urlsplit(self.path).path
-        _, word, name = [*path.split("/", 2), "", ""][:3]
-        if not self._is_local():
+        path = self.path.partition("?")[0].partition("#")[0]
+        first, word, name = [*path.split("/", 2), "", ""][:3]
+        if first or not self._is_local():  # an address with a host is of another server
             return name, "not from this page"
         if not secrets.compare_digest(word.encode(), self.word.encode()):
             return name, "not the address of this page"
@@ -169,12 +223,12 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _is_local(self) -> bool:
         """Whether host and origin are this server's own."""
-        port = self.server.server_address[1]  # type: ignore[index]
+        port = self.server.server_address[1]
         own = [f"{host}:{port}" for host in (HOST, "localhost")]
         origin = self.headers.get("Origin")
         site = self.headers.get("Sec-Fetch-Site", "same-origin")
         return (
-            self.headers.get("Host") in own
+            self.headers.get_all("Host", []) in [[host] for host in own]
             and (origin is None or origin in [f"http://{host}" for host in own])
             and site in ("same-origin", "none")
         )
@@ -189,7 +243,27 @@ class _Handler(BaseHTTPRequestHandler):
         if self.close_connection:
             self.send_header("Connection", "close")
         self.end_headers()
-        self.wfile.write(data)
+        if self.command != "HEAD":
+            self.wfile.write(data)
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Refuse what is no request that can be answered, with the headers of every page."""
+        del explain
+        self.close_connection, self.request_version = True, self.protocol_version
+        status = HTTPStatus(code)
+        self._send(Answer("text/plain", message or status.phrase, status))
+
+    def handle_one_request(self) -> None:
+        """Wait for a request, answer it, and let go of a client that takes too long to ask."""
+        self.server.waiting[self.connection] = time.monotonic()
+        try:
+            super().handle_one_request()
+        finally:
+            self._is_whole()
+
+    def _is_whole(self) -> None:
+        """The request was read."""
+        self.server.waiting.pop(self.connection, None)
 
     def log_message(self, format: str, *args: object) -> None:
         """Print nothing: the word in the address is a secret."""
@@ -210,10 +284,17 @@ class _TakingHandler(_Handler):
             text = f"a message must be at most {MOST_BODY_BYTES:,} bytes"
             self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, text)
         else:
+            body = self.rfile.read(int(length))
+            if len(body) < int(length):  # the connection ended in the middle
+                self.close_connection = True
+                return
+            self._is_whole()
             try:
-                answer = type(self).take(name, self.rfile.read(int(length)))
+                answer = type(self).take(name, body)
             except (InnerattnError, OSError) as error:
                 answer = problem(HTTPStatus.BAD_REQUEST, one_line(error))
+            except Exception as error:
+                answer = problem(HTTPStatus.INTERNAL_SERVER_ERROR, _fault(error))
             self._send(answer)
 
     def _refuse(self, status: HTTPStatus, text: str) -> None:

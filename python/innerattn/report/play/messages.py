@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from innerattn.config.untrusted import parse_json
 from innerattn.evaluate.interactive import InteractiveWorld
 
 Share = Annotated[float, Field(ge=-1.0, le=1.0)]
@@ -165,8 +166,10 @@ def read_message(body: bytes) -> Message:
         ValueError: it is no JSON, or no message; the text is one line that names the field.
     """
     try:
-        return _READER.validate_json(body)
-    except ValidationError as error:
+        return _READER.validate_python(parse_json(body))
+    except ValueError as error:
+        if not isinstance(error, ValidationError):
+            raise ValueError(f"message: Invalid JSON: {' '.join(str(error).split())}") from None
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(str(part) for part in first["loc"])
         text = " ".join(first["msg"].split())

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from http import HTTPStatus
 from typing import Any
 
+import numpy as np
+
 from innerattn.errors import InnerattnError, WorldError, one_line
 from innerattn.evaluate.interactive import InteractiveWorld
 from innerattn.report.local_server import Answer
@@ -100,7 +102,8 @@ class Sessions:
                 del self._open[key]
         with session.lock:
             try:
-                message.apply(session.world)
+                with np.errstate(over="ignore"):  # the world refuses what float32 cannot hold
+                    message.apply(session.world)
             except WorldError:
                 session.world.restart()
                 raise
