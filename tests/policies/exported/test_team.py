@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -233,3 +234,48 @@ def test_the_example_on_the_page_about_deployment_works(plain_export: Path) -> N
     assert known["velocity"].shape == (2,)
     keys = set(re.findall(r"`(\w+)`", page.read_text("utf-8")))
     assert {field.name for field in fields(Contract)} - {"about"} <= keys
+
+
+def damage_network(folder: Path, document: dict[str, Any]) -> None:
+    """NaN in the last layer of an ONNX file, whose digest somebody wrote into the contract."""
+    model = onnx.load(folder / "food_0.onnx")
+    for tensor in model.graph.initializer:
+        values = onnx.numpy_helper.to_array(tensor).copy()
+        if values.dtype == np.float32:
+            values.fill(np.nan)
+            tensor.CopyFrom(onnx.numpy_helper.from_array(values, tensor.name))
+    data = model.SerializeToString()
+    (folder / "food_0.onnx").write_bytes(data)
+    entry = {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
+    document["files"]["food_0.onnx"] = entry
+
+
+def test_networks_that_give_no_numbers_are_refused(plain_export: Path, tmp_path: Path) -> None:
+    folder = altered(plain_export, tmp_path, damage_network)
+    with pytest.raises(ExportError, match="food_0: gives numbers that are not finite"):
+        Exported(folder, backend="onnxruntime")
+
+
+@BOTH
+@pytest.mark.parametrize("backend", ["numpy", "onnxruntime"])
+@pytest.mark.parametrize("greedy", [True, False])
+def test_what_is_not_finite_is_never_an_action(
+    request: pytest.FixtureRequest, name: str, backend: Any, greedy: bool
+) -> None:
+    folder = request.getfixturevalue(name)
+    team = Exported(folder, backend=backend, greedy=greedy)
+    width = len(team.contract.observation)
+    huge = np.full((1, len(team.robot_names), width), 3e38, np.float32)
+    first: Any = Exported(folder, backend="numpy")._actors[0]
+    signs = first._layers["first"][0] if name == "plain_export" else -np.ones((width, 1))
+    weights = np.abs(signs).sum(axis=0).argmax()
+    huge *= np.where(signs[:, weights] < 0.0, -1.0, 1.0).astype(np.float32)
+    calls: list[Callable[[], object]] = [
+        lambda: team.decide("food_0", huge[0, 0]),
+        lambda: team.logits("food_0", huge[0, :1]),
+        lambda: team.act(PolicyInput(huge)),
+    ]
+    for call in calls:
+        with pytest.raises(ReadingError, match="row: is beyond what the policy of food_0 can act"):
+            call()
+    assert team.decide("food_0", np.zeros(width)).action in range(5)

@@ -59,10 +59,11 @@ class NumpyActor:
 
     def logits(self, rows: Array) -> Array:
         """Map observations (B, D) float32 to outputs (B, O) float32 for the world's actions."""
-        if self._frame is None:
-            return self._forward(rows)
-        elements = self._frame.elements(rows)
-        return self._frame.turn_back(self._forward(self._frame.turn(rows, elements)), elements)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
+            if self._frame is None:
+                return self._forward(rows)
+            elements = self._frame.elements(rows)
+            return self._frame.turn_back(self._forward(self._frame.turn(rows, elements)), elements)
 
     def _forward(self, rows: Array) -> Array:
         if self._entities is None:

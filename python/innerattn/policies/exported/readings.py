@@ -6,6 +6,7 @@ zeros, as under the fault `lost_communication`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
@@ -165,7 +166,9 @@ class RowBuilder:
         available = body.get("available", True)
         if available is not True:
             if not isinstance(available, bool | np.bool_):
-                raise ReadingError(f"{place}.available", f"is {available!r}: must be True or False")
+                raise ReadingError(
+                    f"{place}.available", f"is {_shown(available)}: must be True or False"
+                )
             block[self._available] = available
         faults = body.get("faults")
         if faults is None:
@@ -207,9 +210,9 @@ class RowBuilder:
             body = _mapping(victim, place)
             _refuse_unknown(body, _VICTIM_KEYS, f"{place}.")
             task = _given(body, "task", f"{place}.")
-            if task not in self._needs:
+            if not isinstance(task, str) or task not in self._needs:
                 known = ", ".join(self._needs)
-                raise ReadingError(f"{place}.task", f"is {task!r}: known are {known}")
+                raise ReadingError(f"{place}.task", f"is {_shown(task)}: known are {known}")
             places.append(_pair(body, "position", place, self._most_position_m))
             slots.append(slot)
             tasks.append(task)
@@ -229,6 +232,7 @@ class RowBuilder:
             blocks[slot, -2:] = relative[index]
 
 
+_MOST_SHOWN = 60
 _SHARES = frozenset({"motor_gain", "speed_limit"})
 """Kinds of faults whose healthy value is 1; that of the others is 0."""
 
@@ -269,14 +273,26 @@ def _pair(body: Mapping[str, Any], key: str, place: str, most: float) -> tuple[f
 
 
 def _refuse_pair(value: Any, place: str) -> NoReturn:
-    raise ReadingError(place, f"is {value!r}: must be two numbers") from None
+    raise ReadingError(place, f"is {_shown(value)}: must be two numbers") from None
+
+
+def _shown(value: Any) -> str:
+    """A value for a message, cut where it is long; a whole number can be too long to be shown."""
+    try:
+        text = repr(value)
+    except ValueError:
+        text = f"a number of type {type(value).__name__}"
+    return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}..."
 
 
 def _number(value: Any, place: str, most: float) -> float:
     if type(value) is not float:
         if isinstance(value, bool) or not isinstance(value, _NUMBERS):
-            raise ReadingError(place, f"is {value!r}: must be a number")
-        value = float(value)
+            raise ReadingError(place, f"is {_shown(value)}: must be a number")
+        try:
+            value = float(value)
+        except OverflowError:
+            value = math.inf if value > 0 else -math.inf
     if not (-most <= value <= most and abs(value) != np.inf):
         limit = "finite" if most == np.inf else f"within {most:g} of 0"
         raise ReadingError(place, f"is {value}: must be {limit}")

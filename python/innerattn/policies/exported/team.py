@@ -77,6 +77,7 @@ class Exported:
         try:
             _check_columns(self.contract)
             self._actors = _actors(found, self.backend)
+            _refuse_not_finite(self.contract, self._actors)
         except ValueError as error:
             raise ExportError(f"{found.path}: {error}") from error
         self._builders = [RowBuilder(self.contract, i, age) for i in range(len(self._numbers))]
@@ -104,7 +105,8 @@ class Exported:
                 ``time`` must be there. A message that is too old counts as not heard.
 
         Raises:
-            ReadingError: a reading is wrong, missing or not finite; `field` names it.
+            ReadingError: a reading is wrong, missing or not finite, or so large that the policy
+                gives no finite numbers; `field` names it.
             StaleReadingError: the robot's own reading or that of the victims is too old.
         """
         number = self._number(robot)
@@ -113,7 +115,7 @@ class Exported:
             row = builder.row(readings)
         else:
             row = builder.checked_row(readings)
-        logits = self._actors[number].logits(row[None])
+        logits = self._logits(number, row[None])
         if self._continuous:
             force = self._drawn(logits)[0]
             length = np.sqrt((force * force).sum())
@@ -168,7 +170,7 @@ class Exported:
         if not np.isfinite(view.obs).all():
             raise ReadingError("obs", "holds a number that is not finite")
         rows = np.ascontiguousarray(view.obs.transpose(1, 0, 2), np.float32)
-        logits = [actor.logits(row) for actor, row in zip(self._actors, rows, strict=True)]
+        logits = [self._logits(number, own) for number, own in enumerate(rows)]
         stacked = np.stack(logits, axis=1)
         return self._drawn(stacked) if self._continuous else self._chosen(stacked)
 
@@ -178,7 +180,15 @@ class Exported:
         (B, 4) where actions are continuous: means x and y, then log standard deviations of both,
         before tanh.
         """
-        return self._actors[self._number(robot)].logits(rows)
+        return self._logits(self._number(robot), rows)
+
+    def _logits(self, number: int, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What a policy gives; numbers that are not finite choose no action."""
+        found = self._actors[number].logits(rows)
+        if not np.isfinite(found).all():
+            robot = self.contract.robots[number].name
+            raise ReadingError("row", f"is beyond what the policy of {robot} can act on")
+        return found
 
     def reset(self, seed: int) -> None:
         """See `Policy.reset`."""
@@ -248,6 +258,14 @@ def _actors(found: ExportFolder, backend: Backend) -> list[Actor]:
             }
             made[name] = NumpyActor(contract.network, own, width, contract.outputs, frame)
     return [made[robot.actor] for robot in contract.robots]
+
+
+def _refuse_not_finite(contract: Contract, actors: list[Actor]) -> None:
+    """Refuse policies that give no finite numbers even where all that they see is 0."""
+    row = np.zeros((1, len(contract.observation)), np.float32)
+    for robot, actor in zip(contract.robots, actors, strict=True):
+        if not np.isfinite(actor.logits(row)).all():
+            raise ValueError(f"{robot.actor}: gives numbers that are not finite; it is damaged")
 
 
 def _frame_of(contract: Contract) -> Frame | None:
