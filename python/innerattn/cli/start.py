@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from innerattn.cli.streams import fill_missing_streams
 from innerattn.errors import missing_library
 from innerattn.signals import (
     end_at_once,
@@ -28,6 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit code, as of `innerattn.cli.main.main`; 1 if a library is missing.
     """
+    fill_missing_streams()
     handle_requests(leave)
     arguments = list(sys.argv[1:] if argv is None else argv)
     if arguments == ["--version"]:

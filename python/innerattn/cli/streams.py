@@ -42,6 +42,26 @@ class Droppable:
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
 
 
+def fill_missing_streams() -> None:
+    """Let what is written to a stream that was closed before the start be dropped.
+
+    The numbers 0 to 2 are taken, too: a file that was opened under one of them would get what
+    libraries print.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            opened = os.open(os.devnull, os.O_RDWR)  # the lowest free number: this one
+            if opened != number:
+                os.dup2(opened, number)
+                os.close(opened)
+        if getattr(sys, name) is None:
+            mode = "r" if name == "stdin" else "w"
+            stream = open(number, mode, encoding="utf-8", errors="replace", closefd=False)  # noqa: SIM115
+            setattr(sys, name, stream)
+
+
 @contextmanager
 def droppable_output() -> Iterator[None]:
     """Let nothing inside the block fail because its output cannot be written."""
