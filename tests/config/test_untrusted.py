@@ -57,6 +57,8 @@ JSON = {
     "deep lists that end": 100_000 * "[" + 100_000 * "]",
     "lists deeper than ours": 100 * "[" + 100 * "]",
     "deep objects": 100_000 * '{"a":',
+    "a key twice after 400,000": "{" + "".join(f'"{n}":1,' for n in range(400_000)) + '"1":1}',
+    "all of 400,000 keys twice": "{" + "".join(f'"{n}":1,' for n in range(200_000)) * 2 + '"":1}',
     "a long number": 1_000_000 * "9",
     "a number of 60 digits": 60 * "9",
     "a negative number of 60 digits": "[-" + 60 * "9" + "]",
