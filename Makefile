@@ -13,7 +13,7 @@ export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train robot test test-pool test-asan test-gpu test-slow examples reliability soak lint format bench lock docs site schemas dist smoke setup clean
+.PHONY: train robot test test-pool test-asan test-gpu test-slow examples reliability soak lint format bench lock docs site schemas dist smoke bounds setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -133,6 +133,10 @@ smoke: dist ## try wheel and source archive in fresh environments of all PYTHONS
 	tests/smoke.sh $$python dist/*.whl || exit 1; done
 	tests/smoke.sh $(PYTHON) dist/*.whl 'numpy<2' 'pyarrow<20'
 	tests/smoke.sh $(PYTHON) dist/*.tar.gz
+
+bounds: $(VENV)/.installed ## train, export and show a team with the oldest and with the newest packages that pyproject.toml allows
+	maturin build --release --quiet --locked --out build/wheel
+	tests/bounds.sh $(PYTHON) build/wheel/*.whl
 
 clean: ## remove everything that was built
 	rm -rf $(VENV) build target dist python/innerattn/_core*.so examples/libraries/.venvs

@@ -60,6 +60,7 @@ def the_command() -> None:
 
 def views() -> None:
     import gymnasium
+    from gymnasium.utils.env_checker import check_env
     from pettingzoo.test import api_test, parallel_api_test
 
     from innerattn.envs import env, parallel_env
@@ -69,6 +70,31 @@ def views() -> None:
     many = gymnasium.make_vec("innerattn/Rescue-v0", num_envs=3)
     many.reset(seed=0)
     many.step(many.action_space.sample())
+    check_env(gymnasium.make("innerattn/Rescue-v0").unwrapped)
+
+
+def a_team() -> None:
+    """Train, export, measure and show a team, each by the command."""
+    small = ("--train.env-steps", "1000", "--train.num-envs", "16", "--network.hidden-width", "16")
+    few = ("--evaluate.episodes", "4", "--evaluate.score-episodes", "8")
+    few += ("--evaluate.long-episodes", "4")
+    with TemporaryDirectory() as folder:
+        run = Path(folder) / "run"
+        calls = [("train", "--run-dir", run, "--method", "ppo-inner", *small, *few)]
+        if "deploy" in EXTRAS:
+            calls.append(("export", run))
+        if "report" in EXTRAS:
+            calls.append(("replay", run, "-o", run.with_suffix(".html")))
+            calls.append(("report", run, "-o", run.with_suffix(".report.html")))
+        for words in calls:
+            done = command(*map(str, words))
+            assert done.returncode == 0, done.stderr
+        if "deploy" in EXTRAS:
+            from innerattn.policies import Exported
+
+            for backend in ("numpy", "onnxruntime"):
+                team = Exported(run / "export", backend=backend)  # type: ignore[arg-type]
+                assert team.decide("food_0", [0.0] * 44).action in range(5)
 
 
 def missing_views() -> None:
@@ -89,4 +115,6 @@ if __name__ == "__main__":
     worlds_scripts_records_and_statistics()
     the_command()
     (views if "gym" in EXTRAS else missing_views)()
+    if "train" in EXTRAS:
+        a_team()
     print(f"command{', views' if 'gym' in EXTRAS else ''}; import innerattn.envs: {seconds:.3f} s")

@@ -69,6 +69,10 @@ EXTRA_OF = {
 """The extra of this package that brings a library, by the library's module."""
 
 
+_REQUIRED = frozenset({"numpy", "pyarrow", "pydantic", "scipy", "tomli_w"})
+"""Modules that come with the package, unless somebody took them away."""
+
+
 class MissingLibraryError(InnerattnError, ImportError):
     """A library that is no dependency is not installed; the message says how to install it."""
 
@@ -84,6 +88,8 @@ def missing_library(
         extra: the extra to install; none: the one that brings the module.
     """
     library = (error.name or "").partition(".")[0]
+    if library in _REQUIRED:
+        return MissingLibraryError(f"{what} needs {library}: pip install {library}")
     if library not in EXTRA_OF:
         return None
     extra = extra or EXTRA_OF[library]

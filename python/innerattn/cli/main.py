@@ -36,7 +36,13 @@ from innerattn.cli.usage import parse, refuse, words_of
 from innerattn.cli.watch import Watch
 from innerattn.config.near import did_you_mean
 from innerattn.cores import let_waiting_threads_sleep
-from innerattn.errors import UnsealedRunWarning, missing_library, needs_no_traceback, one_line
+from innerattn.errors import (
+    MissingLibraryError,
+    UnsealedRunWarning,
+    missing_library,
+    needs_no_traceback,
+    one_line,
+)
 from innerattn.signals import exit_code, interrupt, requests_handled_by
 
 _PROG = "innerattn"
@@ -118,6 +124,8 @@ def _plain_warnings() -> Iterator[None]:
 
 def _named_by_its_extra(error: Exception) -> Exception:
     """What says how to install a module that was not found; any other error as it is."""
+    if isinstance(error, ImportError) and str(error).startswith("pyarrow requires NumPy"):
+        return MissingLibraryError(f"{error}: pip install 'pyarrow<20', or a newer NumPy")
     if not isinstance(error, ModuleNotFoundError):
         return error
     return missing_library("the command", error) or error

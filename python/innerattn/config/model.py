@@ -117,7 +117,8 @@ def values_for_digest(model: BaseModel) -> dict[str, Any]:
 
 
 def _default(info: FieldInfo) -> object:
-    return info.get_default(call_default_factory=True)
+    make: Any = info.default_factory
+    return info.default if make is None else make()
 
 
 def _types(annotation: Any) -> Iterator[Any]:

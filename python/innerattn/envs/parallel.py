@@ -16,11 +16,19 @@ from pettingzoo import ParallelEnv
 from innerattn.config.scenario import Scenario
 from innerattn.envs.batch import BatchEnv
 from innerattn.envs.spaces import robot_action_spaces, robot_observation_spaces, state_space
-from innerattn.envs.view import STEPS_PER_SECOND, Screen, chosen_scenario, seed_or_random
+from innerattn.envs.view import (
+    STEPS_PER_SECOND,
+    Screen,
+    chosen_scenario,
+    seed_or_random,
+    usable_modes,
+)
 
 Obs: TypeAlias = NDArray[np.float32]
 Action: TypeAlias = Any  # an integer, or (2,) float32 where actions are continuous
 Info: TypeAlias = dict[str, Any]
+
+_MODES = ["human", "rgb_array"]
 
 
 def parallel_env(
@@ -62,7 +70,7 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
 
     metadata: ClassVar[dict[str, Any]] = {
         "name": "innerattn_v0",
-        "render_modes": ["human", "rgb_array"],
+        "render_modes": usable_modes(_MODES),
         "is_parallelizable": True,
         "render_fps": STEPS_PER_SECOND,
     }
@@ -72,7 +80,7 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         self.scenario = scenario
         self.render_mode = render_mode
         self.max_cycles = scenario.episode_steps
-        self._screen = Screen(render_mode, self.metadata["render_modes"])
+        self._screen = Screen(render_mode, _MODES)
         first_seed = seed_or_random(seed)
         self._env = BatchEnv(
             scenario,

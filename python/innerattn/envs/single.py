@@ -16,7 +16,15 @@ from innerattn.config.scenario import Scenario
 from innerattn.envs.batch import BatchEnv
 from innerattn.envs.spaces import state_space
 from innerattn.envs.team import Form, TeamForm, team_rewards
-from innerattn.envs.view import STEPS_PER_SECOND, Screen, chosen_scenario, seed_or_random
+from innerattn.envs.view import (
+    STEPS_PER_SECOND,
+    Screen,
+    chosen_scenario,
+    seed_or_random,
+    usable_modes,
+)
+
+_MODES = ["human", "rgb_array"]
 
 
 class RescueEnv(gymnasium.Env[Any, Any]):
@@ -41,7 +49,7 @@ class RescueEnv(gymnasium.Env[Any, Any]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012  (as the base has it)
-        "render_modes": ["human", "rgb_array"],
+        "render_modes": usable_modes(_MODES),
         "render_fps": STEPS_PER_SECOND,
     }
 
@@ -60,7 +68,7 @@ class RescueEnv(gymnasium.Env[Any, Any]):
         self.scenario = scenario
         self.render_mode = render_mode
         self._form = TeamForm(scenario, form)
-        self._screen = Screen(render_mode, self.metadata["render_modes"])
+        self._screen = Screen(render_mode, _MODES)
         self._env = BatchEnv(
             scenario,
             1,

@@ -15,7 +15,13 @@ from innerattn.config.scenario import Scenario
 from innerattn.envs.batch import MOST_SEED, Autoreset, BatchEnv, Step, whole_number
 from innerattn.envs.spaces import state_space
 from innerattn.envs.team import Form, TeamForm, team_rewards
-from innerattn.envs.view import STEPS_PER_SECOND, Screen, chosen_scenario, seed_or_random
+from innerattn.envs.view import (
+    STEPS_PER_SECOND,
+    Screen,
+    chosen_scenario,
+    seed_or_random,
+    usable_modes,
+)
 from innerattn.errors import ConfigError
 
 _AUTORESET: dict[AutoresetMode, Autoreset] = {
@@ -25,6 +31,8 @@ _AUTORESET: dict[AutoresetMode, Autoreset] = {
 }
 Flags = NDArray[np.bool_]
 Infos = dict[str, Any]
+
+_MODES = ["rgb_array"]
 
 
 class RescueVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
@@ -54,7 +62,7 @@ class RescueVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012  (as the base has it)
-        "render_modes": ["rgb_array"],
+        "render_modes": usable_modes(_MODES),
         "render_fps": STEPS_PER_SECOND,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -81,7 +89,7 @@ class RescueVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
         self.scenario = scenario
         self.render_mode = render_mode
-        self._screen = Screen(render_mode, self.metadata["render_modes"])
+        self._screen = Screen(render_mode, _MODES)
         self._form = TeamForm(scenario, form)
         self._env = BatchEnv(
             scenario,

@@ -51,6 +51,11 @@ def seed_or_random(seed: int | None) -> int:
     return int(np.random.default_rng().integers(2**63)) if seed is None else seed
 
 
+def usable_modes(modes: list[str]) -> list[str]:
+    """Those ways to show worlds that work here: all, or none without Matplotlib."""
+    return modes if find_spec("matplotlib") is not None else []
+
+
 class Screen:
     """Shows single worlds of a batch: as arrays, in a window, or not at all.
 
