@@ -1,5 +1,6 @@
 """Exceptions that a user of innerattn can catch; each message is one line."""
 
+import errno
 from collections.abc import Sequence
 
 
@@ -94,6 +95,14 @@ def missing_library(
         return None
     extra = extra or EXTRA_OF[library]
     return MissingLibraryError(f"{what} needs {library}: pip install 'innerattn[{extra}]'")
+
+
+def cannot_lock(error: OSError) -> bool:
+    """Whether an attempt to lock failed because the file system has no locks, as NFS without lockd.
+
+    Then nothing keeps others out, as on Windows.
+    """
+    return error.errno in (errno.ENOLCK, errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP)
 
 
 class UnsealedRunWarning(UserWarning):

@@ -61,6 +61,27 @@ def test_a_sealed_run_is_checked_from_then_on(
         load_policy(run)
 
 
+def test_a_run_that_was_changed_on_purpose_is_sealed_anew(run: Path) -> None:
+    """The remedy of the message: remove manifest.json, and seal."""
+    seal_run(run)
+    config = run / "config.toml"
+    whole = config.read_text()
+    config.write_text(f"{whole}# changed on purpose\n")
+    with pytest.raises(RunError, match="it was altered"):
+        load_policy(run)
+    (run / "manifest.json").unlink()
+    with pytest.raises(RunError, match=r"manifest\.json"):
+        load_policy(run)  # nobody but seal does without it
+    info = (run / "run.json").read_bytes()
+    config.write_text("[")
+    with pytest.raises(InnerattnError, match=r"config\.toml"):
+        seal_run(run)
+    assert (run / "run.json").read_bytes() == info
+    config.write_text(f"{whole}# changed on purpose\n")
+    assert main(["seal", str(run)]) == 0
+    load_policy(run)
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_a_damaged_run_is_not_sealed(run: Path, name: str) -> None:
     whole = (run / name).read_bytes()

@@ -114,7 +114,8 @@ def sync_folder(folder: Path) -> None:
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # not every file system can
+        unable = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EBADF)
+        if error.errno not in unable:  # not every file system can
             raise
     finally:
         os.close(descriptor)

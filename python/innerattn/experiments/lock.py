@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from multiprocessing import reduction
@@ -9,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from innerattn.errors import RunError
+from innerattn.errors import RunError, cannot_lock
 
 if sys.platform == "win32":
     import msvcrt
@@ -25,6 +26,7 @@ else:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
+_log = logging.getLogger(__name__)
 _NOFOLLOW = getattr(os, "O_NOFOLLOW", 0)
 
 
@@ -60,6 +62,12 @@ class StudyLock:
                 f"{out}: another study is at work here, or its last runs are still ending; "
                 "wait for it, or choose another folder"
             ) from error
+        except OSError as error:
+            if not cannot_lock(error):
+                os.close(file)
+                raise
+            text = "innerattn: warning: %s: its file system has no locks (%s); run one study in it"
+            _log.warning(text, out, error.strerror)
         return cls(file)
 
     def __enter__(self) -> Self:

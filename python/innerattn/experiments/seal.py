@@ -11,7 +11,7 @@ from innerattn.config.untrusted import parse_json, read_plain
 from innerattn.errors import RunError, UnsealedRunWarning
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import measured_run
-from innerattn.records.run_files import MANIFEST, RunFiles, seal
+from innerattn.records.run_files import MANIFEST, RunFiles, seal, unsealed
 from innerattn.records.run_folder import config_of
 from innerattn.train import load_policy
 from innerattn.train.resume import verify_checkpoints
@@ -49,7 +49,7 @@ def seal_run(run: Path) -> Sealed:
         ConfigError: its configuration is not valid.
         OSError: a file cannot be read, or the manifest cannot be written.
     """
-    with only_training_in(run), warnings.catch_warnings():
+    with only_training_in(run), unsealed(run), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnsealedRunWarning)
         files = RunFiles(run)
         if files.info.sealed:

@@ -12,7 +12,8 @@ import json
 import os
 import stat
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -103,6 +104,37 @@ class RunFiles:
         if self._entries is not None:
             _check(file, name, data, self._entries)
         return data
+
+
+@contextmanager
+def unsealed(run: Path) -> Iterator[None]:
+    """Inside the block, a run whose manifest was removed counts as one that never had any.
+
+    Where the block fails, ``run.json`` is as it was: it says that there must be a manifest.
+
+    Raises:
+        RunError: ``run.json`` is missing or damaged.
+        OSError: it cannot be written.
+    """
+    file = run / "run.json"
+    if (run / MANIFEST).exists() or not file.exists():
+        yield
+        return
+    data = _read(file, _MOST_INFO_BYTES)
+    try:
+        info = run_info(parse_json(data))
+    except ValueError:  # who reads it says what is wrong
+        yield
+        return
+    if not info.sealed:
+        yield
+        return
+    write_whole(file, info_text(replace(info, sealed=False)))
+    try:
+        yield
+    except BaseException:
+        write_whole(file, data)
+        raise
 
 
 def seal(run: Path, info: RunInfo) -> RunInfo:

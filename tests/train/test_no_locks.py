@@ -1,0 +1,70 @@
+"""On a file system without locks, trainings and studies go on, and say so."""
+
+import errno
+import fcntl
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from innerattn.config import RunConfig
+from innerattn.config.files import sync_folder
+from innerattn.experiments.lock import StudyLock
+from innerattn.records.run_folder import read_info
+from innerattn.train import Progress, resume, train
+
+Configure = Callable[..., RunConfig]
+
+
+@pytest.fixture(params=[errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+def no_locks(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(request.param, os.strerror(request.param))
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+
+
+@pytest.mark.usefixtures("no_locks")
+def test_a_training_begins_stops_and_goes_on(
+    small_config: Configure, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    def stop(now: Progress) -> None:
+        if now.env_steps >= 300:
+            raise KeyboardInterrupt
+
+    run = tmp_path / "run"
+    with pytest.raises(KeyboardInterrupt):
+        train(small_config(), run, progress=stop)
+    assert "its file system has no locks" in caplog.text
+    resume(run)
+    assert read_info(run).state == "done"
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+@pytest.mark.usefixtures("no_locks")
+def test_a_study_begins(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with StudyLock.take(tmp_path / "study"):
+        assert "its file system has no locks" in caplog.text
+
+
+def test_other_errors_of_a_lock_are_not_taken_for_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(fcntl, "flock", fail)
+    with pytest.raises(OSError, match="Input/output error"):
+        StudyLock.take(tmp_path / "study")
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EBADF])
+def test_a_folder_that_cannot_be_synced_is_left(
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_: int) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    sync_folder(tmp_path)
