@@ -4,9 +4,23 @@ import errno
 from collections.abc import Sequence
 
 
+def plain(text: str) -> str:
+    """A text without characters that a terminal obeys or that nobody sees; they are escaped.
+
+    Names of files and keys, and what files hold, may come from anybody: ESC moves the cursor, and
+    U+202E turns the direction of writing. Line ends and tabs stay.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        one if one.isprintable() or one in "\n\t" else one.encode("unicode_escape").decode("ascii")
+        for one in text
+    )
+
+
 def one_line(error: BaseException) -> str:
-    """What an error says, in one line; of one that lacked memory, first of all that."""
-    text = " ".join(str(error).split())
+    """What an error says, in one plain line; of one that lacked memory, first of all that."""
+    text = plain(" ".join(str(error).split()))
     return f"out of memory: {text}" if lacked_memory(error) else text
 
 

@@ -25,6 +25,7 @@ from innerattn.cli.export import Export
 from innerattn.cli.info import Info
 from innerattn.cli.new import New
 from innerattn.cli.options import UsageError
+from innerattn.cli.plain import escaped_output
 from innerattn.cli.play import Play
 from innerattn.cli.replay import Replay
 from innerattn.cli.report import Report
@@ -88,7 +89,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     let_waiting_threads_sleep()
     try:
         with requests_handled_by(interrupt), _plain_warnings():
-            return int(_parse(argv).run())
+            command = _parse(argv)
+            with escaped_output():
+                return int(command.run())
     except KeyboardInterrupt as request:
         with suppress(OSError):  # a lost terminal
             print("innerattn: interrupted", file=sys.stderr)

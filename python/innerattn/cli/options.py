@@ -17,6 +17,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from rich.console import Console
 
+from innerattn.cli.plain import PlainConsole
 from innerattn.config import RunConfig
 from innerattn.config.model import OneOf
 from innerattn.errors import ConfigError, InnerattnError, RunError
@@ -62,11 +63,11 @@ class LongCommand(Command):
 
     def console(self) -> Console:
         """Where tables and announcements go; with --quiet they go nowhere."""
-        return Console(markup=False, highlight=False, quiet=self.quiet)
+        return PlainConsole(markup=False, highlight=False, quiet=self.quiet)
 
     def progress_console(self) -> Console:
         """Where progress is shown: standard error, or nowhere."""
-        return Console(stderr=True, quiet=self.quiet)
+        return PlainConsole(stderr=True, quiet=self.quiet)
 
     def say_result(self, line: str) -> None:
         """Print the one line of --quiet."""

@@ -67,7 +67,7 @@ class Replay(Command):
         if self.output.suffix == ".html":
             from innerattn.report.replay import replay_page
 
-            write_whole(self.output, replay_page(records, names).encode())
+            write_whole(self.output, replay_page(records, names).encode(errors="backslashreplace"))
         else:
             from innerattn.report.replay.picture import moving_picture
 
@@ -134,7 +134,10 @@ def write_replay(run: Path) -> Path:
     from innerattn.report.replay import replay_page
 
     path = run / "replay.html"
-    write_whole(path, replay_page([recorded(str(run))], _names([str(run)])).encode())
+    write_whole(
+        path,
+        replay_page([recorded(str(run))], _names([str(run)])).encode(errors="backslashreplace"),
+    )
     return path
 
 

@@ -49,7 +49,7 @@ class Report(Command):
 
         document = None if self.robustness is None else read_robustness(self.robustness)
         page = runs_page(read_runs(folders), document)
-        write_whole(self.output, page.encode())
+        write_whole(self.output, page.encode(errors="backslashreplace"))
         count = "1 run" if len(self.runs) == 1 else f"{len(self.runs)} runs"
         print(f"{self.output}: {count}, {self.output.stat().st_size / 1e6:.1f} MB")
         return 0

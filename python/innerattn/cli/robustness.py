@@ -92,7 +92,9 @@ class Robustness(LongCommand):
             first = next(iter(found.retention))
             write_heatmap(self.plot, first, found.retention[first], found.grid)
         if self.report is not None:
-            write_whole(self.report, runs_page(runs, found.to_json()).encode())
+            write_whole(
+                self.report, runs_page(runs, found.to_json()).encode(errors="backslashreplace")
+            )
         if self.json != Path("-"):
             self.say_result(robustness_line(found.grid, found.retention))
         return 0

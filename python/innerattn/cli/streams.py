@@ -16,6 +16,8 @@ class Droppable:
         """Write to ``stream`` as long as that is possible."""
         self._stream = stream
         self.lost = False
+        drawn = getattr(stream, "rich_proxied_file", None)
+        self.rich_proxied_file: Droppable = self if drawn is None else Droppable(drawn)
 
     def write(self, text: str) -> int:
         """Write, or drop."""

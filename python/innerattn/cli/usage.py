@@ -16,6 +16,7 @@ import tyro
 
 from innerattn.cli.options import UsageError
 from innerattn.config.near import nearest
+from innerattn.errors import plain
 
 _HELP = ("-h", "--help", "--help-all")
 _KINDS_OF_VALUES = {"INT": "a whole number", "FLOAT": "a number", "PATH": "a path", "STR": "a word"}
@@ -48,7 +49,7 @@ def parse(command: Any, argv: Sequence[str], prog: str, *, all_known: bool = Tru
 
 def refuse(error: UsageError) -> NoReturn:
     """Say on standard error what is wrong, and end the process with code 2."""
-    print(f"innerattn: error: {error}", file=sys.stderr)
+    print(f"innerattn: error: {plain(str(error))}", file=sys.stderr)
     raise SystemExit(2) from error
 
 
