@@ -10,6 +10,9 @@ use crate::robot::Body;
 use crate::scenario::{Scenario, Situation};
 use crate::task::Victim;
 
+/// How often everything is drawn for one start. A scenario in which a draw fails more often than about once in
+/// twenty is refused, see [`Spawn::find_crowding`]; so 64 draws fail in none of 10^80 starts.
+const START_TRIES: usize = 64;
 /// Episodes that are tried before a scenario is found to have room for everything.
 const TRIALS: u64 = 64;
 
@@ -90,6 +93,15 @@ impl Spawn {
             }
         }
         clear
+    }
+
+    /// Writes the places of obstacles and robots when an episode starts. Where one finds no clear place,
+    /// because of where those before it are, all are drawn again. Returns whether nothing overlaps.
+    pub fn place_start(&self, stream: &mut Stream, obstacles: &mut [Vec2], robots: &mut [Vec2]) -> bool {
+        (0..START_TRIES).any(|_| {
+            let clear = self.place_obstacles(stream, obstacles);
+            self.place_robots(stream, obstacles, robots) && clear
+        })
     }
 
     /// Whether the situation wants victims to appear in these slots now.

@@ -110,8 +110,7 @@ impl World {
         self.victims.fill(None);
         self.velocities.fill(Vec2::zeros());
         let mut stream = Stream::new(self.seed, self.stream, episode, Purpose::Start);
-        rules.spawn.place_obstacles(&mut stream, &mut self.obstacles);
-        rules.spawn.place_robots(&mut stream, &self.obstacles, &mut self.positions);
+        rules.spawn.place_start(&mut stream, &mut self.obstacles, &mut self.positions);
         self.fill_slots(rules);
         let now = self.now();
         self.faults.begin(rules, now);
