@@ -16,6 +16,7 @@ pub mod rng;
 
 pub mod robot;
 
+pub mod meeting;
 pub mod place;
 pub mod task;
 

@@ -3,7 +3,8 @@
 
 use crate::error::{Error, Result};
 use crate::fault::{HEALTHY, Kind};
-use crate::geometry::Solid;
+use crate::geometry::{Solid, Vec2};
+use crate::meeting::{can_reach, least_rescue_radius};
 use crate::observe::Layout;
 use crate::physics::Physics;
 use crate::reward::Weights;
@@ -70,6 +71,7 @@ impl Rules {
         if let Some(crowded) = spawn.find_crowding() {
             return Err(too_crowded(&scenario, crowded));
         }
+        refuse_tasks_out_of_reach(&scenario, &team, &tasks)?;
         if let Some(index) = spawn.blocked_place() {
             return Err(Error::Scenario {
                 key: format!("scenario.victim_places_m[{index}]"),
@@ -97,6 +99,39 @@ impl Rules {
     pub fn from_json(text: &str) -> Result<Self> {
         Self::new(Scenario::from_json(text)?)
     }
+}
+
+/// Refuses what no team can do for want of room: helpers that cannot meet, places that they cannot reach.
+fn refuse_tasks_out_of_reach(scenario: &Scenario, team: &[Body], tasks: &[Needs]) -> Result<()> {
+    let (radius, arena) = (scenario.rescue_radius_m as f32, scenario.arena_half_width_m as f32);
+    for (task, needs) in scenario.tasks.iter().zip(tasks) {
+        let (apart, at_most) = least_rescue_radius(needs, team);
+        if radius < at_most {
+            return Err(Error::Scenario {
+                key: "scenario.rescue_radius_m".into(),
+                value: scenario.rescue_radius_m.to_string(),
+                rule: format!(
+                    "must be at least {:.3}, or the helpers of task {} cannot be so near to a victim together",
+                    (apart * 1e3).ceil() / 1e3,
+                    task.name
+                ),
+            });
+        }
+        let far =
+            |at: &[f64; 2]| !can_reach(needs, team, Vec2::new(at[0] as f32, at[1] as f32), radius, arena);
+        if let Some(index) = scenario.victim_places_m.iter().position(far) {
+            let at = scenario.victim_places_m[index];
+            return Err(Error::Scenario {
+                key: format!("scenario.victim_places_m[{index}]"),
+                value: format!("{at:?}"),
+                rule: format!(
+                    "is farther than rescue_radius_m from where helpers of task {} can be; walls keep them off",
+                    task.name
+                ),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// The error that names what does not fit into the arena.
@@ -209,5 +244,40 @@ mod tests {
             duration: u32::MAX,
         };
         assert_eq!(rules.map(|rules| rules.faults), Ok(vec![wanted]));
+    }
+
+    fn refused_team(robots: &str, more: &str) -> String {
+        let lifter = |name: &str, radius: f32| {
+            format!(
+                r#"{{"name": "{name}", "kind": "lifter", "abilities": ["lift"], "radius_m": {radius},
+                "max_speed_mps": 1.0, "mass_kg": 1.0}}"#
+            )
+        };
+        let team: Vec<String> = robots
+            .split(' ')
+            .map(|radius| lifter(&format!("r{}", radius.replace('.', "_")), radius.parse().unwrap()))
+            .collect();
+        let text = format!(
+            r#"{{"arena_half_width_m": 3.0, "robots": [{}], "tasks": [{{"name": "beam", "needs": ["lift", "lift"]}}]{more}}}"#,
+            team.join(", ")
+        );
+        Rules::from_json(&text).err().map(|error| error.to_string()).unwrap_or_default()
+    }
+
+    #[test]
+    fn helpers_that_cannot_meet_are_refused_with_the_radius_that_would_do() {
+        let narrow = r#", "rescue_radius_m": 0.15"#;
+        let refused = refused_team("0.3 0.301", narrow);
+        assert!(refused.starts_with("scenario.rescue_radius_m = 0.15: must be at least 0.301"), "{refused}");
+        assert_eq!(refused_team("0.3 0.301", r#", "rescue_radius_m": 0.301"#), "");
+        assert_eq!(refused_team("0.3 0.301 0.1 0.11", narrow), ""); // two others can
+        assert_ne!(refused_team("0.3 0.301 0.1", narrow), "");
+    }
+
+    #[test]
+    fn listed_places_that_no_helper_reaches_are_refused() {
+        let corner = r#", "rescue_radius_m": 0.35, "wall_clearance_m": 0.0, "victim_places_m": [[0.0, 0.0], [3.0, 3.0]]"#;
+        assert!(refused_team("0.3 0.301", corner).starts_with("scenario.victim_places_m[1] = [3.0, 3.0]: "));
+        assert_eq!(refused_team("0.2 0.201", corner), "");
     }
 }

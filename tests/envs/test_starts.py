@@ -8,7 +8,6 @@ import pytest
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 
-
 BODY = {"max_speed_mps": 1.0, "mass_kg": 1.0}
 
 

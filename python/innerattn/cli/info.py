@@ -44,10 +44,12 @@ class Info(Command):
             return 0
         if self.scenario is not None:
             from innerattn.report.scenario_map import scenario_map
+            from innerattn.report.scenario_words import scenario_words
 
             scenario = Scenario.from_toml(self.scenario)
             print(tomli_w.dumps(scenario.model_dump(exclude_none=True)))
-            print("\n".join(f"# {line}".rstrip() for line in scenario_map(scenario).splitlines()))
+            for text in (scenario_map(scenario), scenario_words(scenario)):
+                print("\n".join(f"# {line}".rstrip() for line in text.splitlines()))
             return 0
         rows = {"innerattn": _version("innerattn"), "python": platform.python_version()}
         rows |= {name: _version(name) for name in _PACKAGES}

@@ -1,0 +1,79 @@
+"""What a team can and cannot do in a scenario, and what its faults are, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from innerattn.config import Fault, Scenario
+
+_WHAT = {
+    "motor_gain": "has {percent} of its force",
+    "speed_limit": "reaches {percent} of its highest speed",
+    "heading_bias": "drives {degrees} beside its heading",
+    "position_noise": "sees places with an error of {value:g} m",
+    "velocity_noise": "sees velocities with an error of {value:g} m/s",
+    "frozen_sensor": "sees the same as before in {percent} of the steps",
+    "blackout": "sees nothing in {percent} of the steps",
+    "unavailable": "is out in {percent} of the steps",
+    "lost_communication": "hears nobody in {percent} of the steps",
+}
+
+
+def scenario_words(scenario: Scenario) -> str:
+    """Sentences, a line each: tasks and who can do them, what is doubtful, and the faults."""
+    return "\n".join([*_tasks(scenario), *_doubts(scenario), *map(_fault, scenario.faults)])
+
+
+def _tasks(scenario: Scenario) -> Iterator[str]:
+    for task in scenario.tasks:
+        helpers = []
+        for need in dict.fromkeys(task.needs):
+            able = [robot.name for robot in scenario.robots if need in robot.abilities]
+            count = task.needs.count(need)
+            some = " or ".join(able) if count == 1 else f"{count} of {', '.join(able)}"
+            helpers.append(f"{need} ({some})")
+        near = f"together within {scenario.rescue_radius_m:g} m"
+        yield f"{task.name}: {' and '.join(helpers)}, {near}"
+
+
+def _doubts(scenario: Scenario) -> Iterator[str]:
+    needed = {need for task in scenario.tasks for need in task.needs}
+    for robot in scenario.robots:
+        if not needed & set(robot.abilities):
+            yield f"{robot.name}: has no ability that a task needs"
+        if robot.drive_force_n == 0.0:
+            yield f"{robot.name}: cannot move, its drive_force_n is 0"
+    for task in scenario.tasks:
+        radii = sorted(
+            robot.radius_m for robot in scenario.robots if set(task.needs) & set(robot.abilities)
+        )
+        least = sum(radii[:2]) / 2.0
+        if len(task.needs) > 1 and scenario.rescue_radius_m < least:
+            yield (
+                f"{task.name}: helpers hardly meet; without overlap of bodies rescue_radius_m "
+                f"must be at least {least:g}"
+            )
+    largest = max(robot.radius_m for robot in scenario.robots)
+    beyond = math.sqrt(2.0) * max(0.0, largest - scenario.wall_clearance_m)
+    free = scenario.victim_area_m is None and not scenario.victim_places_m
+    if free and beyond > scenario.rescue_radius_m:
+        yield (
+            "victims in a corner: a robot as large as the largest cannot reach them; "
+            f"wall_clearance_m = {largest:g} would do"
+        )
+
+
+def _fault(fault: Fault) -> str:
+    what = _WHAT[fault.kind].format(
+        value=fault.value,
+        percent=f"{100.0 * fault.value:.3g} %",
+        degrees=f"{math.degrees(fault.value):.3g} degrees",
+    )
+    if fault.onset_rate_hz is not None:
+        when = f"from step {fault.onset_step} on at random, {fault.onset_rate_hz:g} times a second"
+    else:
+        when = f"from step {fault.onset_step} on"
+    if fault.duration_steps is not None:
+        when += f", for {fault.duration_steps} steps"
+    return f"{fault.robot}: {what} {when}"

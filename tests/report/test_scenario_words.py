@@ -1,0 +1,64 @@
+"""What a team can do, in words."""
+
+from typing import Any
+
+import pytest
+
+from innerattn.config import Scenario
+from innerattn.envs.batch import FAULT_KINDS
+from innerattn.errors import ConfigError
+from innerattn.report.scenario_words import _WHAT, scenario_words
+
+
+def robot(name: str, radius: float, *abilities: str, force: float = 5.0) -> dict[str, Any]:
+    body = {"radius_m": radius, "max_speed_mps": 1.0, "mass_kg": 1.0, "drive_force_n": force}
+    return {"name": name, "kind": name, "abilities": list(abilities), **body}
+
+
+def test_tasks_and_who_can_do_them() -> None:
+    lines = scenario_words(Scenario.preset("mixed")).splitlines()
+    assert lines == [
+        "task_1: food (food_0 or food_1) and medicine (medical_0), together within 0.15 m",
+        "task_2: food (food_0 or food_1) and information (navigation_0), together within 0.15 m",
+    ]
+
+
+def test_what_is_doubtful() -> None:
+    scenario = Scenario.model_validate(
+        {
+            "arena_half_width_m": 3.0,
+            "rescue_radius_m": 0.28,
+            "robots": [
+                robot("a", 0.3, "lift"),
+                robot("b", 0.3, "lift", force=0.0),
+                robot("c", 0.1),
+            ],
+            "tasks": [{"name": "beam", "needs": ["lift", "lift"]}],
+            "faults": [
+                {"robot": "a", "kind": "motor_gain", "value": 0.3, "onset_step": 20},
+                {"robot": "b", "kind": "heading_bias", "value": 1.5708, "duration_steps": 3},
+            ],
+        }
+    )
+    assert scenario_words(scenario).splitlines() == [
+        "beam: lift (2 of a, b), together within 0.28 m",
+        "b: cannot move, its drive_force_n is 0",
+        "c: has no ability that a task needs",
+        "beam: helpers hardly meet; without overlap of bodies rescue_radius_m must be at least 0.3",
+        "victims in a corner: a robot as large as the largest cannot reach them; "
+        "wall_clearance_m = 0.3 would do",
+        "a: has 30 % of its force from step 20 on",
+        "b: drives 90 degrees beside its heading from step 0 on, for 3 steps",
+    ]
+
+
+def test_every_kind_of_fault_has_words() -> None:
+    assert set(_WHAT) == set(FAULT_KINDS)
+
+
+def test_what_no_team_can_do_is_refused_with_the_value_that_would_do() -> None:
+    two = {"robots": [robot("a", 0.3, "lift"), robot("b", 0.3, "lift")]}
+    task = {"tasks": [{"name": "beam", "needs": ["lift", "lift"]}], "arena_half_width_m": 3.0}
+    with pytest.raises((ConfigError, ValueError), match=r"rescue_radius_m = 0\.15: .* 0\.3"):
+        Scenario.model_validate({**two, **task, "rescue_radius_m": 0.15})
+    Scenario.model_validate({**two, **task, "rescue_radius_m": 0.3})
