@@ -1,12 +1,13 @@
 """Rescues of a line of metrics, with and without episodes that rescues end."""
 
+import numpy as np
 import pytest
 
 from innerattn.config import load_run_config
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.training_score import training_rescues
 from innerattn.policies import scripted_policy
-from innerattn.records.logged import logged_rescues, unit_of_rescues
+from innerattn.records.logged import logged_rescues, still_rises, unit_of_rescues
 
 LINE = {"rescues_per_episode": 3.0, "rescues_per_env_step": 0.02}
 
@@ -34,3 +35,28 @@ def test_scripts_are_counted_in_the_same_way() -> None:
     assert record.lengths.min() < 25
     wanted = len(record.rescues) / record.lengths.sum() * 25
     assert training_rescues(config, "hungarian", 50, 1) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(
+    ("course", "rises"),
+    [
+        ([], False),
+        ([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0], False),  # too few
+        (list(range(8)), True),
+        ([0.1 * n for n in range(40)], True),
+        ([1.0] * 40, False),
+        ([0.0] * 40, False),
+        ([3.0 - 0.1 * n for n in range(40)], False),
+        ([2.0 * (1.0 - 0.5**n) for n in range(60)], False),  # it has come to its end
+        ([min(n, 20) / 20 for n in range(40)], False),
+        ([0.02 + 0.01 * (n % 3) for n in range(40)], False),  # noise
+    ],
+)
+def test_courses_that_rise_to_their_end(course: list[float], rises: bool) -> None:
+    assert still_rises(course) is rises
+
+
+def test_noise_hardly_passes_for_a_rise() -> None:
+    rng = np.random.default_rng(0)
+    share = np.mean([still_rises(list(rng.normal(1.0, 0.2, 40))) for _ in range(2_000)])
+    assert share < 0.05

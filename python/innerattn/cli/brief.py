@@ -76,6 +76,60 @@ BRIEF: Mapping[str, Brief] = {
         ),
         ("latest", "zoo:double", "hungarian --situation double", "runs/mine --json - > mine.json"),
     ),
+    "report": Brief(
+        "[OPTIONS] RUN ...",
+        (
+            ("RUN", "finished runs: folders, latest, or how a name begins"),
+            ("-o, --output FILE", "page to write: .html ({output})"),
+            ("--robustness FILE", "results of innerattn robustness as JSON, to show too"),
+        ),
+        ("latest", "runs/a-s0 runs/a-s1 runs/a-s2 -o a.html"),
+    ),
+    "watch": Brief(
+        "[OPTIONS] RUN ...",
+        (
+            ("RUN", "runs in training: folders, latest, or how a name begins"),
+            ("--port N", "port of 127.0.0.1; 0: any that is free ({port})"),
+            ("--episodes N", "episodes to play for each checkpoint ({episodes})"),
+        ),
+        ("latest", "runs/a-s0 runs/a-s1"),
+    ),
+    "play": Brief(
+        "[OPTIONS] RUN|POLICY",
+        (
+            ("RUN|POLICY", "a run (also zoo:NAME), or random, greedy, hungarian, oracle"),
+            ("--scenario FILE", "TOML file with the scenario to play in (that of the run)"),
+            ("--seed N", "seed of the world"),
+            ("--port N", "port of 127.0.0.1; 0: any that is free ({port})"),
+        ),
+        ("zoo:mixed", "latest --scenario flood.toml"),
+    ),
+    "export": Brief(
+        "[OPTIONS] RUN",
+        (
+            ("RUN", "a run with weights: folder, latest, zoo:NAME, or how a name begins"),
+            ("-o, --output FOLDER", "folder to make (export in the run's folder)"),
+        ),
+        ("latest", "zoo:mixed -o team"),
+    ),
+    "seal": Brief(
+        "RUN ...",
+        (("RUN", "folders of finished runs without a manifest, or archives (.parquet)"),),
+        ("runs/old",),
+    ),
+    "new": Brief(
+        "scenario NAME",
+        (("NAME", "the file is NAME.toml here"),),
+        ("scenario flood",),
+    ),
+    "info": Brief(
+        "[OPTIONS]",
+        (
+            ("--scenario FILE", "check a scenario, print it with all defaults, draw it"),
+            ("--schema NAME", "print the JSON Schema of a file: scenario or run"),
+        ),
+        ("", "--scenario flood.toml"),
+    ),
     "replay": Brief(
         "[OPTIONS] RUN|POLICY|FILE ...",
         (
@@ -145,12 +199,12 @@ def print_brief(name: str, command: Any) -> bool:
     brief = BRIEF[name]
     defaults = _Defaults(command)
     print(f"usage: innerattn {name} {brief.usage}\n")
-    print(f"{(command.__doc__ or '').split(chr(10))[0]}\n")
+    print(f"{textwrap.fill((command.__doc__ or '').split(chr(10))[0], _COLUMNS)}\n")
     for option, meaning in brief.rows:
         print(_row(option, meaning.format_map(defaults)))
     print("\nExamples:")
     for example in brief.examples:
-        print(f"  innerattn {name} {example}")
+        print(f"  innerattn {name} {example}".rstrip())
     print(f"`innerattn {name} --help-all` shows every option with its unit and default.")
     return True
 

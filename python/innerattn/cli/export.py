@@ -10,6 +10,7 @@ import tyro
 
 from innerattn.cli.options import Command, UsageError
 from innerattn.cli.runs import named_run
+from innerattn.policies import SCRIPTED
 from innerattn.zoo import in_zoo
 
 
@@ -33,6 +34,10 @@ class Export(Command):
                 is missing, or an exported policy that differs from the trained one.
             OSError: a file cannot be written.
         """
+        if self.run_folder in SCRIPTED:
+            raise UsageError(
+                f"{self.run_folder}: is a script; only trained teams have weights to export"
+            )
         run = named_run(self.run_folder)
         if self.output is None and in_zoo(run):
             raise UsageError(f"{self.run_folder}: -o FOLDER must say where to write")

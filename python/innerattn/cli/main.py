@@ -146,13 +146,9 @@ def _parse(argv: list[str]) -> Any:
     if name == "--completion":
         print(completion_script(_every_command(), rest))
         raise SystemExit(0)
-    if name in ("-h", "--help", "--help-all"):
+    if name in ("", "-h", "--help", "--help-all"):
         return tyro.cli(_every_command(), args=["--help"], prog=_PROG, description=_DESCRIPTION)
     known = ", ".join(COMMANDS)
-    if not name:
-        refuse(
-            UsageError(f"a command must be given: {known}; innerattn --help says what each does")
-        )
     if name.startswith("-"):
         refuse(UsageError(f"{name}: a command must come first: {known}"))
     near = did_you_mean(name, COMMANDS)

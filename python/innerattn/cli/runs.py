@@ -65,9 +65,17 @@ def named_policy(name: str, scripts: Collection[str]) -> str:
     if not found.exists():
         raise RunError(
             f"{name}: neither a run's folder nor one of {', '.join(scripts)}"
-            f"{did_you_mean(name, [*scripts, LATEST, *(run.name for run in _runs())])}"
+            f"{did_you_mean(name, [*scripts, LATEST, *_names_like(name)])}"
         )
     return str(found)
+
+
+def _names_like(name: str) -> list[str]:
+    """Names of runs, written as ``name`` is: with their folder, or as those in `runs`."""
+    folder = Path(name).parent
+    if folder == Path():
+        return [run.name for run in _runs()]
+    return [str(run) for run in _runs(folder)]
 
 
 def _zoo_team(name: str) -> Path:
@@ -79,10 +87,10 @@ def _zoo_team(name: str) -> Path:
         raise RunError(f"{error}{did_you_mean(name, known)}") from None
 
 
-def _runs() -> list[Path]:
-    """The run folders in `runs`, by name."""
+def _runs(folder: Path = RUNS) -> list[Path]:
+    """The run folders in `runs`, or in another folder, by name."""
     try:
-        return sorted(path for path in RUNS.iterdir() if (path / "run.json").is_file())
+        return sorted(path for path in folder.iterdir() if (path / "run.json").is_file())
     except OSError:
         return []
 

@@ -23,6 +23,7 @@ from innerattn.cli.usage import parse, words_of
 from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
 from innerattn.config.registry import methods
 from innerattn.config.sections import WarmStart
+from innerattn.config.untrusted import parse_json
 from innerattn.cores import usable_cores
 from innerattn.errors import ConfigError, RunError
 from innerattn.experiments.side_by_side import (
@@ -32,6 +33,7 @@ from innerattn.experiments.side_by_side import (
     train_side_by_side,
 )
 from innerattn.loggers import LOGGERS, Opened, RunLoggers
+from innerattn.records.logged import logged_rescues, still_rises
 from innerattn.report.tables.evaluation import (
     print_seeds,
     print_summary,
@@ -231,6 +233,10 @@ class _Train(_Sources):
         print_summary(console, evaluation.summary, config.scenario)
         console.print(f"Measure it again with: innerattn evaluate {run_dir}", soft_wrap=True)
         console.print(f"Watch it in a browser: {write_replay(run_dir)}", soft_wrap=True)
+        if _still_rises(run_dir, config):
+            more = f"--train.env-steps {2 * config.train.env_steps}"
+            console.print(f"Rescues still rose at the end: train longer with {more}")
+        console.print(result_line(evaluation.summary), style="bold", soft_wrap=True)
         self.say_result(f"{run_dir}: {result_line(evaluation.summary)}")
         return 0
 
@@ -314,6 +320,14 @@ def _say_what_is_kept(folders: Sequence[Path]) -> None:
                 f"innerattn train --resume {folder}",
                 file=sys.stderr,
             )
+
+
+def _still_rises(run_dir: Path, config: RunConfig) -> bool:
+    """Whether the course of a finished training has not come to its end."""
+    first = config.imitation.env_steps if config.train.warm_start != "none" else 0
+    lines = [parse_json(line) for line in (run_dir / "metrics.jsonl").read_bytes().splitlines()]
+    course = [logged_rescues(config, line) for line in lines if line["env_steps"] > first]
+    return still_rises([value for value in course if value is not None])
 
 
 def _say_if_nothing_was_learnt(folders: Sequence[Path]) -> None:

@@ -154,7 +154,7 @@ def config_error(
         elif item["type"] == "missing":
             lines.append(f"{place}: must be given")
         else:
-            rule = item["msg"].replace("Input should be", "must be")
+            rule = item["msg"].replace("Input should be", "must be").replace("tuple", "list")
             near = _meant_word(item["input"], rule) if item["type"] in _OF_WORDS else ""
             lines.append(f"{place} = {item['input']!r}: {rule}{near}")
     return ConfigError((f"{source}: " if source else "") + "; ".join(lines))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+import numpy as np
 
 from innerattn.config import RunConfig
 
@@ -27,6 +30,23 @@ def logged_rescues(config: RunConfig, line: Mapping[str, Any]) -> float | None:
         found = line["rescues_per_episode"]
         return None if found is None else float(found)
     return float(rate) * config.training_scenario.episode_steps
+
+
+def still_rises(rescues: Sequence[float]) -> bool:
+    """Whether a course of training has not come to its end.
+
+    The mean of its last quarter is above that of the quarter before by more than twice the standard
+    error of their difference. Lines of a log depend on each other, so this is a hint and no test.
+
+    Args:
+        rescues: as `logged_rescues` counts them, in order; of fewer than 8 nothing can be said.
+    """
+    size = len(rescues) // 4
+    if size < 2:
+        return False
+    before, last = np.array(rescues[-2 * size : -size]), np.array(rescues[-size:])
+    error = math.sqrt((before.var(ddof=1) + last.var(ddof=1)) / size)
+    return bool(last.mean() - before.mean() > 2.0 * error)
 
 
 def unit_of_rescues(config: RunConfig) -> str:
