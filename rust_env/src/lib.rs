@@ -16,9 +16,10 @@ pub mod rng;
 
 pub mod robot;
 
-pub mod meeting;
 pub mod place;
 pub mod task;
+
+pub mod meeting;
 
 pub mod spawn;
 
