@@ -46,7 +46,7 @@ BRIEF: Mapping[str, Brief] = {
             ("--seeds LIST", "one run for each seed: 0..4, or 0,3,7"),
             ("--device NAME", "where networks run: cpu, cuda, cuda:0 ({device})"),
             ("--train.env-steps N", "length of learning, summed over worlds ({train.env_steps:,})"),
-            ("--config FILE", "TOML file with any of all keys"),
+            ("--config FILE", "TOML file with configuration keys (docs/reference)"),
             ("--run-dir FOLDER", "folder to make for the run (under runs)"),
             ("--resume RUN", "go on with a run that was stopped"),
             _QUIET,

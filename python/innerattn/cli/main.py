@@ -48,7 +48,7 @@ from innerattn.signals import exit_code, interrupt, requests_handled_by
 
 _PROG = "innerattn"
 _DESCRIPTION = (
-    "Train teams of unlike robots to rescue together, and measure how they do it. "
+    "Train, evaluate and inspect teams of different robots that rescue victims together. "
     "`innerattn --version` prints the version, `innerattn --completion bash` a script that "
     "completes commands and options in a shell."
 )

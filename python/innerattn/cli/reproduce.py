@@ -41,14 +41,14 @@ _WHAT = "\n".join(("What to make.", *(f"- {one.name}: {one.shows}." for one in T
 
 @dataclass(kw_only=True)
 class Reproduce(LongCommand):
-    """Train the runs that a result needs, then write it with a report.
+    """Reproduce a table, figure or study: train missing runs, then write the report.
 
     Runs that are there already are kept; the same command goes on with what is missing.
     """
 
     target: Annotated[tyro.conf.Positional[TargetName], tyro.conf.arg(help=_WHAT)]
     budget: Budget = "quick"
-    """How long to train; quick gives no result; paper: its own numbers, for PPO the few printed."""
+    """Recipe of training; quick: a smoke test, not a result; paper: its settings (few for PPO)."""
     seeds: int = 5
     """How many seeds: 0, 1, ... up to one less."""
     out: Path | None = None

@@ -13,7 +13,7 @@ from innerattn.cli.options import Command, UsageError
 
 @dataclass(kw_only=True)
 class Seal(Command):
-    """Write the manifest of a run that has none, after reading and checking all its files."""
+    """Check an older run and add the missing manifest."""
 
     runs: Annotated[tyro.conf.Positional[list[Path]], tyro.conf.arg(metavar="RUN [RUN ...]")]
     """Folders of runs that are over, or archives of studies (.parquet)."""
