@@ -77,7 +77,6 @@ def test_debug_shows_the_traceback(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "arguments",
     [
-        [],
         ["frobnicate"],
         ["info", "--frob"],
         ["train", "--preset", "triple"],

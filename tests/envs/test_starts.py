@@ -21,7 +21,7 @@ def robots(*radii: float) -> list[dict[str, Any]]:
 
 NARROW = [
     {"arena_half_width_m": 0.2, "robots": robots(0.0535, 0.0999, 0.0535)},
-    {"arena_half_width_m": 1.0, "robots": robots(0.48, 0.391, 0.1)},
+    {"arena_half_width_m": 1.0, "robots": robots(0.48, 0.391, 0.1), "rescue_radius_m": 0.5},
 ]
 
 
