@@ -1,0 +1,314 @@
+"""Which runs of a study are done, claimed, free or failed; it knows no run and no launcher.
+
+The state follows from names of files alone, so workers on several machines need only a folder that
+all of them see: no server, no lock, no common clock.
+
+    runs/KEY            what a finished run left; it appears whole
+    claims/KEY.N        the Nth claim of a run; the claim with the highest number is in force
+    claims/KEY.N.beat   a number that its worker changes as long as it works
+    claims/KEY.N.free   the worker gave the claim back
+    claims/KEY.N.failed why the run failed
+    work/KEY.N          where the worker of that claim writes, and nobody else
+
+A claim is made by a hard link, which one of several workers gets. It is taken over by a claim with
+the next number once its beat has not changed for a while by the clock of the worker that looks. The
+new claim works in a copy of what the old one left, so a worker that was only slow can harm nothing.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import secrets
+import shutil
+import socket
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from innerattn.config.files import sync_folder, write_whole
+from innerattn.errors import RunError
+
+State = Literal["planned", "claimed", "done", "failed"]
+MOST_FAILURES = 3
+"""Failures after which a run is not tried again."""
+SILENT_AFTER_S = 60.0
+"""How long a claim's beat may stand still before others take the run over."""
+
+_KEY = re.compile(r"[A-Za-z0-9_-]{1,128}")
+_CLAIM = re.compile(r"([A-Za-z0-9_-]{1,128})\.([1-9][0-9]{0,8})(\.free|\.failed)?")
+_GROWING = "metrics.jsonl"
+_MOST_REASON_BYTES = 1 << 16
+_COPIES = 3
+
+
+class ClaimLostError(RunError):
+    """Another worker has taken the run over, or has finished it."""
+
+
+@dataclass
+class _Run:
+    """What the names of files say of a run: its last claim, and what became of its claims."""
+
+    number: int = 0
+    over: int = 0
+    """Number of the last claim that was given back or failed."""
+    failures: int = 0
+
+
+class Claim:
+    """The right to work on a run, until it is finished, has failed, is given back or is lost."""
+
+    def __init__(self, ledger: Ledger, key: str, number: int) -> None:
+        """See `Ledger.claim`."""
+        self._ledger = ledger
+        self.key = key
+        self.number = number
+        self.folder = ledger.folder / "work" / f"{key}.{number}"
+        """Where to work. It holds what earlier claims of the run left, if there were any."""
+        self._path = ledger.folder / "claims" / f"{key}.{number}"
+        self._beats = 0
+
+    def beat(self) -> None:
+        """Say that the worker is at work.
+
+        Raises:
+            ClaimLostError: the run is another worker's by now, or is finished.
+            OSError: the ledger cannot be written.
+        """
+        self._refuse_lost()
+        self._beats += 1
+        write_whole(self._path.with_name(f"{self._path.name}.beat"), b"%d\n" % self._beats)
+
+    def finish(self) -> Path:
+        """Put the folder among the finished runs.
+
+        Returns:
+            Where it is now.
+
+        Raises:
+            ClaimLostError: another worker was faster; the folder is removed.
+            OSError: the ledger cannot be written.
+        """
+        done = self._ledger.folder / "runs" / self.key
+        try:
+            os.rename(self.folder, done)
+        except OSError as error:
+            if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
+                raise
+            shutil.rmtree(self.folder, ignore_errors=True)
+            raise ClaimLostError(f"{done}: another worker has finished it") from error
+        sync_folder(done.parent)
+        for number in range(1, self.number):
+            shutil.rmtree(self.folder.with_name(f"{self.key}.{number}"), ignore_errors=True)
+        return done
+
+    def fail(self, reason: str) -> None:
+        """Give the run back because it failed.
+
+        Args:
+            reason: why; its end is kept where it is long.
+
+        Raises:
+            OSError: the ledger cannot be written.
+        """
+        text = reason.encode("utf-8", "backslashreplace")[-_MOST_REASON_BYTES:]
+        write_whole(self._path.with_name(f"{self._path.name}.failed"), text)
+
+    def free(self) -> None:
+        """Give the run back; the next worker goes on from what is in the folder.
+
+        Raises:
+            OSError: the ledger cannot be written.
+        """
+        write_whole(self._path.with_name(f"{self._path.name}.free"), b"")
+
+    def _refuse_lost(self) -> None:
+        newer = self._path.with_name(f"{self.key}.{self.number + 1}")
+        if os.path.lexists(newer):
+            raise ClaimLostError(f"{newer}: another worker has taken the run over")
+        done = self._ledger.folder / "runs" / self.key
+        if os.path.lexists(done):
+            raise ClaimLostError(f"{done}: another worker has finished it")
+
+
+class Ledger:
+    """The runs of a study in a folder.
+
+    Args:
+        folder: of the study; it is made if needed.
+        silent_after_s: how long a claim's beat may stand still before it is taken over [s]; some
+            times the interval of its beats.
+        clock: seconds that only grow; the worker's own, never compared with another machine's.
+
+    Raises:
+        OSError: the folder cannot be made.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        silent_after_s: float = SILENT_AFTER_S,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.folder = folder
+        self._silent_after_s = silent_after_s
+        self._clock = clock
+        self._beats: dict[tuple[str, int], tuple[bytes, float]] = {}
+        for name in ("runs", "claims", "work"):
+            (folder / name).mkdir(parents=True, exist_ok=True)
+
+    def states(self, keys: Iterable[str]) -> dict[str, State]:
+        """The state of each run, from two listings of folders.
+
+        Raises:
+            OSError: the ledger cannot be read.
+        """
+        done, runs = self._listed()
+        return {key: _state(key in done, runs.get(key)) for key in keys}
+
+    def failures(self, key: str) -> list[str]:
+        """Why the tries of a run failed, the last one last.
+
+        Raises:
+            OSError: the ledger cannot be read.
+        """
+        paths = self.folder.glob(f"claims/{key}.*.failed")
+        ordered = sorted(paths, key=lambda path: int(path.name.split(".")[1]))
+        return [path.read_text("utf-8", "replace") for path in ordered]
+
+    def claim(self, keys: Iterable[str]) -> Claim | None:
+        """Claim the first of some runs that nobody works on; none if there is none now.
+
+        A claim of a worker that fell silent is taken over, but only after this ledger has watched
+        it for a while: call again as long as some runs are neither done nor failed.
+
+        Args:
+            keys: names of runs in the order of preference: letters, digits, "-" and "_".
+
+        Raises:
+            ValueError: another name.
+            OSError: the ledger cannot be read or written.
+        """
+        done, runs = self._listed()
+        for key in keys:
+            if not _KEY.fullmatch(key):
+                raise ValueError(f"key = {key!r}: must be letters, digits, '-' and '_'")
+            run = runs.get(key, _Run())
+            if key in done or run.failures >= MOST_FAILURES:
+                continue
+            if run.number > run.over and not self._silent(key, run.number):
+                continue
+            claim = self._claimed(key, run.number + 1)
+            if claim is not None:
+                return claim
+        return None
+
+    def _claimed(self, key: str, number: int) -> Claim | None:
+        """The claim with that number, unless another worker gets it."""
+        claim = Claim(self, key, number)
+        if not _linked(self.folder / "claims" / f"{key}.{number}"):
+            return None
+        try:
+            claim.beat()
+            _copy_what_was_left(claim.folder, key, number)
+        except ClaimLostError:  # finished in between
+            return None
+        return claim
+
+    def _silent(self, key: str, number: int) -> bool:
+        """Whether the beat of a claim has not changed while this ledger watched."""
+        now = self._clock()
+        try:
+            beat = (self.folder / "claims" / f"{key}.{number}.beat").read_bytes()
+        except FileNotFoundError:
+            beat = b""
+        seen, since = self._beats.get((key, number), (None, now))
+        if seen != beat:
+            since = now
+        self._beats[key, number] = (beat, since)
+        return now - since >= self._silent_after_s
+
+    def _listed(self) -> tuple[set[str], dict[str, _Run]]:
+        """Finished runs, and what the names of claims say of each run."""
+        runs: dict[str, _Run] = {}
+        for name in os.listdir(self.folder / "claims"):
+            found = _CLAIM.fullmatch(name)
+            if found is None:
+                continue
+            run = runs.setdefault(found[1], _Run())
+            if found[3] is None:
+                run.number = max(run.number, int(found[2]))
+            else:
+                run.over = max(run.over, int(found[2]))
+                run.failures += found[3] == ".failed"
+        return set(os.listdir(self.folder / "runs")), runs
+
+
+def _state(done: bool, run: _Run | None) -> State:
+    if done:
+        return "done"
+    if run is None:
+        return "planned"
+    if run.failures >= MOST_FAILURES:
+        return "failed"
+    return "claimed" if run.number > run.over else "planned"
+
+
+def _linked(path: Path) -> bool:
+    """Make a file that nobody else has made; whether it was this call that made it."""
+    own = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
+    own.write_text(f"{socket.gethostname()} {os.getpid()}\n", "utf-8")
+    try:
+        os.link(own, path)
+    except FileExistsError:
+        # Over NFS a link may be made although its answer was lost and it was asked for again.
+        return os.stat(own).st_nlink == 2
+    except OSError as error:
+        if error.errno not in (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS):
+            raise
+        return _made_alone(path)  # a file system without hard links
+    finally:
+        with suppress(OSError):
+            own.unlink()
+    return True
+
+
+def _made_alone(path: Path) -> bool:
+    try:
+        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    except FileExistsError:
+        return False
+    return True
+
+
+def _copy_what_was_left(folder: Path, key: str, number: int) -> None:
+    """Begin with what the newest earlier claim left; empty where nothing can be copied whole."""
+    partial = folder.with_name(f".{folder.name}.{secrets.token_hex(8)}")
+    for earlier in range(number - 1, 0, -1):
+        left = folder.with_name(f"{key}.{earlier}")
+        for _ in range(_COPIES if left.is_dir() else 0):
+            try:
+                shutil.copytree(left, partial, symlinks=True, copy_function=_link_or_copy)
+            except (shutil.Error, OSError):  # its worker was only slow, and still writes
+                shutil.rmtree(partial, ignore_errors=True)
+            else:
+                os.rename(partial, folder)
+                return
+    folder.mkdir()
+
+
+def _link_or_copy(source: str, target: str) -> None:
+    """A hard link where the file is only ever replaced; a copy of one that grows."""
+    if os.path.basename(source) != _GROWING:
+        try:
+            os.link(source, target, follow_symlinks=False)
+            return
+        except OSError:
+            pass
+    shutil.copy2(source, target, follow_symlinks=False)
