@@ -33,6 +33,7 @@ class Clock:
 def claimed(ledger: Ledger, *keys: str) -> Claim:
     claim = ledger.claim(keys or KEYS)
     assert claim is not None
+    claim.folder.mkdir(exist_ok=True)  # the worker makes it
     return claim
 
 
@@ -180,6 +181,7 @@ def test_any_order_of_events(
                     claim.beat()
                     held[worker] = claim
                 elif action == "finish":
+                    claim.folder.mkdir(exist_ok=True)
                     assert claim.finish().is_dir()
                     finished[claim.key] += 1
                 elif action == "fail":
@@ -197,6 +199,7 @@ def test_any_order_of_events(
         claim = ledgers[1].claim(KEYS)
         clocks[1].now += SILENT
         if claim is not None:
+            claim.folder.mkdir(exist_ok=True)
             claim.finish()
     assert set(ledgers[2].states(KEYS).values()) <= {"done", "failed"}
 
@@ -214,6 +217,7 @@ while set(ledger.states(keys).values()) != {"done"}:
     if claim is None:
         time.sleep(0.02)
         continue
+    claim.folder.mkdir(exist_ok=True)
     try:
         while True:
             path = claim.folder / "progress"

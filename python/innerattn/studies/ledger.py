@@ -8,7 +8,7 @@ all of them see: no server, no lock, no common clock.
     claims/KEY.N.beat   a number that its worker changes as long as it works
     claims/KEY.N.free   the worker gave the claim back
     claims/KEY.N.failed why the run failed
-    work/KEY.N          where the worker of that claim writes, and nobody else
+    work/KEY.N/KEY      where the worker of that claim writes, and nobody else
 
 A claim is made by a hard link, which one of several workers gets. It is taken over by a claim with
 the next number once its beat has not changed for a while by the clock of the worker that looks. The
@@ -68,8 +68,8 @@ class Claim:
         self._ledger = ledger
         self.key = key
         self.number = number
-        self.folder = ledger.folder / "work" / f"{key}.{number}"
-        """Where to work. It holds what earlier claims of the run left, if there were any."""
+        self.folder = ledger.folder / "work" / f"{key}.{number}" / key
+        """Where to work: what earlier claims of the run left, or nothing yet."""
         self._path = ledger.folder / "claims" / f"{key}.{number}"
         self._beats = 0
 
@@ -100,11 +100,12 @@ class Claim:
         except OSError as error:
             if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
                 raise
-            shutil.rmtree(self.folder, ignore_errors=True)
+            shutil.rmtree(self.folder.parent, ignore_errors=True)
             raise ClaimLostError(f"{done}: another worker has finished it") from error
         sync_folder(done.parent)
-        for number in range(1, self.number):
-            shutil.rmtree(self.folder.with_name(f"{self.key}.{number}"), ignore_errors=True)
+        for number in range(1, self.number + 1):
+            left = self._ledger.folder / "work" / f"{self.key}.{number}"
+            shutil.rmtree(left, ignore_errors=True)
         return done
 
     def fail(self, reason: str) -> None:
@@ -216,10 +217,25 @@ class Ledger:
             return None
         try:
             claim.beat()
-            _copy_what_was_left(claim.folder, key, number)
+            self._copy_what_was_left(claim)
         except ClaimLostError:  # finished in between
             return None
         return claim
+
+    def _copy_what_was_left(self, claim: Claim) -> None:
+        """Begin with what the newest earlier claim left, if there is something to copy whole."""
+        claim.folder.parent.mkdir(exist_ok=True)
+        partial = claim.folder.with_name("partial")
+        for earlier in range(claim.number - 1, 0, -1):
+            left = self.folder / "work" / f"{claim.key}.{earlier}" / claim.key
+            for _ in range(_COPIES if left.is_dir() else 0):
+                try:
+                    shutil.copytree(left, partial, symlinks=True, copy_function=_link_or_copy)
+                except (shutil.Error, OSError):  # its worker was only slow, and still writes
+                    shutil.rmtree(partial, ignore_errors=True)
+                else:
+                    os.rename(partial, claim.folder)
+                    return
 
     def _silent(self, key: str, number: int) -> bool:
         """Whether the beat of a claim has not changed while this ledger watched."""
@@ -285,22 +301,6 @@ def _made_alone(path: Path) -> bool:
     except FileExistsError:
         return False
     return True
-
-
-def _copy_what_was_left(folder: Path, key: str, number: int) -> None:
-    """Begin with what the newest earlier claim left; empty where nothing can be copied whole."""
-    partial = folder.with_name(f".{folder.name}.{secrets.token_hex(8)}")
-    for earlier in range(number - 1, 0, -1):
-        left = folder.with_name(f"{key}.{earlier}")
-        for _ in range(_COPIES if left.is_dir() else 0):
-            try:
-                shutil.copytree(left, partial, symlinks=True, copy_function=_link_or_copy)
-            except (shutil.Error, OSError):  # its worker was only slow, and still writes
-                shutil.rmtree(partial, ignore_errors=True)
-            else:
-                os.rename(partial, folder)
-                return
-    folder.mkdir()
 
 
 def _link_or_copy(source: str, target: str) -> None:

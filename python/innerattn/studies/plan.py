@@ -1,0 +1,156 @@
+"""The runs that a study needs, each with its configuration; it looks at no folder of runs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from pathlib import Path
+
+from innerattn.config import SCENARIOS, RunConfig, load_run_config
+from innerattn.errors import ConfigError
+from innerattn.experiments.plan import of_seed
+from innerattn.measures.registry import MEASURES
+from innerattn.studies.study import Study, StudyContrast, Value
+
+MEASURES_OF_ALL = ("score", "rescues_per_episode")
+"""What every evaluation holds beside the registered measures."""
+_NAMED_BY_THE_GRID = {"train.seed": "seeds", "train.method": "methods"}
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """A run of a study.
+
+    Attributes:
+        place: its coordinates in the grid but the seed: scenario, method, budget, variant if the
+            study has variants, and each key that the grid varies.
+        seed: of training.
+        config: what it is trained and measured with.
+    """
+
+    place: Mapping[str, Value]
+    seed: int
+    config: RunConfig
+
+    @cached_property
+    def key(self) -> str:
+        """Its name in the ledger, which follows from its configuration alone."""
+        train = self.config.train
+        words = (self.config.scenario.situation, train.method, f"s{train.seed}")
+        name = re.sub(r"[^A-Za-z0-9_-]", "_", "-".join(words))
+        return f"{name}-{self.config.digest()[:16]}"
+
+    def __str__(self) -> str:
+        words = [str(value) for key, value in self.place.items() if key != "budget"]
+        return f"{' '.join(words)}, seed {self.seed}"
+
+
+def plan_study(study: Study, find: Callable[[str], Path]) -> list[PlannedRun]:
+    """The runs of a study, all of one seed before those of the next.
+
+    Args:
+        study: what is planned.
+        find: where a scenario's file is, by its name in the study.
+
+    Raises:
+        ConfigError: a combination cannot be run, two are the same run, or a contrast names runs
+            that are not in the grid.
+    """
+    variants = {one.name: one.changes for one in study.variants} or {"": {}}
+    keys = study.grid.keys
+    for key in (*keys, *(key for changes in variants.values() for key in changes)):
+        if key in _NAMED_BY_THE_GRID:
+            raise ConfigError(f"{key}: is set by grid.{_NAMED_BY_THE_GRID[key]}")
+    for scenario in study.grid.scenarios:
+        _refuse_unknown(scenario, find)
+    names = [Path(scenario).stem for scenario in study.grid.scenarios]
+    if len(set(names)) < len(names):
+        raise ConfigError("grid.scenarios: two files have the same name; rename one")
+    planned, known = [], dict[str, PlannedRun]()
+    for seed, scenario, method, budget, variant, *values in product(
+        study.grid.numbers,
+        study.grid.scenarios,
+        study.grid.methods,
+        study.grid.budgets,
+        variants,
+        *keys.values(),
+    ):
+        chosen = dict(zip(keys, values, strict=True))
+        place = {"scenario": Path(scenario).stem, "method": method, "budget": budget}
+        place |= ({"variant": variant} if variant else {}) | chosen
+        overrides = {**of_seed(seed), **chosen, **variants[variant]}
+        try:
+            config = _config(scenario, find, method, budget, overrides)
+        except ConfigError as error:
+            named = ", ".join(f"{key} = {value}" for key, value in place.items())
+            raise ConfigError(f"grid ({named}): {error}") from error
+        run = PlannedRun(place, seed, config)
+        if (other := known.setdefault(run.key, run)) is not run:
+            raise ConfigError(f"grid: {run} and {other} are the same run")
+        planned.append(run)
+    for contrast in study.contrasts:
+        pairs(contrast, [run.place for run in planned])
+    return planned
+
+
+def pairs(
+    contrast: StudyContrast, places: list[Mapping[str, Value]]
+) -> list[tuple[Mapping[str, Value], Mapping[str, Value]]]:
+    """The places of a contrast's two sides that are alike in all that neither side names.
+
+    Raises:
+        ConfigError: a side names what is not in the grid, or no two places belong together, or a
+            measure is not known.
+    """
+    where = f"contrasts, {contrast.name!r}"
+    if contrast.measure not in (*MEASURES_OF_ALL, *MEASURES):
+        known = ", ".join((*MEASURES_OF_ALL, *MEASURES))
+        raise ConfigError(f"{where}: measure = {contrast.measure!r}: must be one of {known}")
+    distinct = list({tuple(place.items()): place for place in places}.values())
+    sides = []
+    for name, side in zip("ab", contrast.sides, strict=True):
+        for key, value in side.items():
+            values = list(dict.fromkeys(place[key] for place in distinct if key in place))
+            if value not in values:
+                of = f"must be one of {', '.join(map(repr, values))}" if values else "is no key"
+                raise ConfigError(f"{where}: {name}.{key} = {value!r}: {of} of the grid")
+        sides.append([one for one in distinct if side.items() <= one.items()])
+    free = set().union(*contrast.sides)
+    others = {_rest(place, free): place for place in sides[1]}
+    if len({_rest(place, free) for place in sides[0]}) < len(sides[0]):
+        raise ConfigError(f"{where}: b names a key that a leaves open; name it in a, too")
+    if len(others) < len(sides[1]):
+        raise ConfigError(f"{where}: a names a key that b leaves open; name it in b, too")
+    found = [(place, others[rest]) for place in sides[0] if (rest := _rest(place, free)) in others]
+    if not found or any(a == b for a, b in found):
+        raise ConfigError(f"{where}: a and b must be different runs of the grid")
+    return found
+
+
+def _rest(place: Mapping[str, Value], free: set[str]) -> tuple[tuple[str, Value], ...]:
+    return tuple((key, value) for key, value in place.items() if key not in free)
+
+
+def _refuse_unknown(scenario: str, find: Callable[[str], Path]) -> None:
+    if scenario not in SCENARIOS and not scenario.endswith(".toml"):
+        raise ConfigError(
+            f"grid.scenarios: {scenario!r}: must be a TOML file or one of {', '.join(SCENARIOS)}"
+        )
+    if scenario.endswith(".toml") and not find(scenario).exists():
+        raise ConfigError(f"grid.scenarios: cannot read {find(scenario)}: No such file")
+
+
+def _config(
+    scenario: str,
+    find: Callable[[str], Path],
+    method: str,
+    budget: str,
+    overrides: Mapping[str, object],
+) -> RunConfig:
+    if scenario in SCENARIOS:
+        return load_run_config(scenario, method, budget, overrides=overrides)
+    path = find(scenario)
+    return load_run_config("mixed", method, budget, overrides=overrides, scenario_file=path)

@@ -1,0 +1,134 @@
+"""A worker: claims runs of a study, trains and measures them, until none is left to do."""
+
+from __future__ import annotations
+
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+
+from innerattn.errors import needs_no_traceback, one_line
+from innerattn.experiments.side_by_side import Run
+from innerattn.studies.ledger import Claim, ClaimLostError, Ledger
+from innerattn.studies.plan import PlannedRun
+
+BEAT_EVERY_S = 10.0
+"""How often a worker says that it is at work; a sixth of what makes others take its run over."""
+_LOOK_EVERY_S = 2.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one claim of a run.
+
+    Attributes:
+        run: the run.
+        state: done; failed; given back, because the worker's time was up; or lost to another
+            worker, which has it now.
+        reason: why, if it failed.
+    """
+
+    run: PlannedRun
+    state: str
+    reason: str = ""
+
+
+def work(
+    ledger: Ledger,
+    planned: Sequence[PlannedRun],
+    *,
+    until: float | None = None,
+    wait: bool = True,
+    begins: Callable[[PlannedRun], None] = lambda _: None,
+    ended: Callable[[Outcome], None] = lambda _: None,
+    clock: Callable[[], float] = time.monotonic,
+) -> None:
+    """Work through a study beside any other workers, until nothing is left to do.
+
+    A run that fails is noted in the ledger and stops no other. A run that a worker left is gone on
+    with from its newest checkpoint.
+
+    Args:
+        ledger: of the study.
+        planned: its runs in the order in which they are to be done.
+        until: when to stop, as ``clock`` has it; the run at hand is saved and given back.
+        wait: whether to stay while others work on the last runs, in case they fall silent.
+        begins: called with each run that is claimed.
+        ended: called with what became of it.
+        clock: seconds.
+
+    Raises:
+        OSError: the ledger cannot be read or written.
+        KeyboardInterrupt: the worker was asked to end; the run at hand is saved and given back.
+    """
+    by_key = {run.key: run for run in planned}
+    while until is None or clock() < until:
+        claim = ledger.claim(by_key)
+        if claim is not None:
+            begins(by_key[claim.key])
+            ended(_worked(claim, by_key[claim.key], until, clock))
+            continue
+        states = ledger.states(by_key).values()
+        if not wait or "claimed" not in states:
+            return
+        time.sleep(_LOOK_EVERY_S)
+
+
+def _worked(
+    claim: Claim, run: PlannedRun, until: float | None, clock: Callable[[], float]
+) -> Outcome:
+    """Train and measure one run."""
+    times_up = False
+    with _beating(claim) as lost:
+
+        def report(_: float) -> None:
+            nonlocal times_up
+            times_up = until is not None and clock() >= until
+            if times_up or lost.is_set():
+                raise KeyboardInterrupt  # as a user's: training saves what it has
+
+        try:
+            Run(run.config, claim.folder, begun=claim.folder.exists()).do(report)
+            claim.finish()
+        except ClaimLostError:
+            return Outcome(run, "lost")
+        except KeyboardInterrupt:
+            if lost.is_set():
+                return Outcome(run, "lost")
+            claim.free()
+            if times_up:
+                return Outcome(run, "given back")
+            raise
+        except Exception as error:
+            known = needs_no_traceback(error)
+            reason = one_line(error) if known else traceback.format_exc()
+            claim.fail(reason)
+            return Outcome(run, "failed", one_line(error))
+    return Outcome(run, "done")
+
+
+@contextmanager
+def _beating(claim: Claim) -> Iterator[threading.Event]:
+    """Beat beside the work; the event says that the claim is another worker's by now."""
+    lost, over = threading.Event(), threading.Event()
+
+    def beat() -> None:
+        while not over.wait(BEAT_EVERY_S):
+            try:
+                claim.beat()
+            except ClaimLostError:
+                lost.set()
+                return
+            except OSError:  # a full disk, or a file system that does not answer: try again
+                continue
+
+    thread = threading.Thread(target=beat, name="beat", daemon=True)
+    thread.start()
+    try:
+        yield lost
+    finally:
+        over.set()
+        with suppress(RuntimeError):
+            thread.join()
