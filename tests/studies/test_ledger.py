@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from innerattn.studies.ledger import MOST_FAILURES, Claim, ClaimLostError, Ledger
+from innerattn.studies.owner import is_gone, this_process
 
 KEYS = [f"run-{number}" for number in range(4)]
 SILENT = 60.0
@@ -155,6 +156,29 @@ def test_a_link_whose_answer_was_lost_counts(
     assert claimed(Ledger(tmp_path), "run-0").number == 1
 
 
+def test_a_process_that_is_gone_is_seen_at_once(tmp_path: Path) -> None:
+    words = "import sys; from pathlib import Path; from innerattn.studies.ledger import Ledger; "
+    words += "Ledger(Path(sys.argv[1])).claim(['run-0']); print(flush=True); sys.stdin.read()"
+    with subprocess.Popen(
+        [sys.executable, "-c", words, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as worker:
+        assert worker.stdout is not None
+        worker.stdout.readline()
+        ledger = Ledger(tmp_path)
+        assert ledger.claim(["run-0"]) is None
+        worker.kill()
+    assert claimed(ledger, "run-0").number == 2
+
+
+@pytest.mark.parametrize(
+    "owner",
+    ["", "x", "boot pid:[1] 1 1", f"{this_process()} more", this_process().replace("pid", "pip")],
+)
+def test_other_owners_are_not_taken_for_gone(owner: str) -> None:
+    assert not is_gone(owner)
+    assert not is_gone(this_process())
+
+
 ACTIONS = st.sampled_from(["claim", "beat", "finish", "fail", "free", "wait", "die"])
 
 
@@ -211,7 +235,7 @@ from innerattn.studies.ledger import ClaimLostError, Ledger
 
 folder, runs, steps = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
 keys = [f"run-{number}" for number in range(runs)]
-ledger = Ledger(folder, silent_after_s=0.3)
+ledger = Ledger(folder)
 while set(ledger.states(keys).values()) != {"done"}:
     claim = ledger.claim(keys)
     if claim is None:

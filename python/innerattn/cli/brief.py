@@ -76,6 +76,23 @@ BRIEF: Mapping[str, Brief] = {
         ),
         ("latest", "zoo:double", "hungarian --situation double", "runs/mine --json - > mine.json"),
     ),
+    "study": Brief(
+        "[OPTIONS] run|work|status|report|slurm STUDY",
+        (
+            ("run", "begin or continue a study, with a worker for each core"),
+            ("work", "be one worker, here or on another machine"),
+            ("status", "how many runs are done"),
+            ("report", "write report.md and report.json again"),
+            ("slurm", "print a script for sbatch whose jobs are workers"),
+            ("STUDY", "the study's file (.toml), or its folder"),
+            ("--out FOLDER", "folder of the study (studies/NAME)"),
+            ("--workers N", "workers, or jobs of slurm"),
+            ("--until TIME", "when a worker saves its run and ends: 90s, 55m, 2h"),
+            ("--minutes N", "time limit of a job of slurm ({minutes})"),
+            _QUIET,
+        ),
+        ("run sharing.toml", "status studies/sharing", "work studies/sharing --until 55m"),
+    ),
     "report": Brief(
         "[OPTIONS] RUN ...",
         (

@@ -32,6 +32,7 @@ from innerattn.cli.report import Report
 from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
 from innerattn.cli.seal import Seal
+from innerattn.cli.study import Study
 from innerattn.cli.train import command_type
 from innerattn.cli.usage import parse, refuse, words_of
 from innerattn.cli.watch import Watch
@@ -62,6 +63,7 @@ COMMANDS: Mapping[str, Any] = {
     "play": Play,
     "robustness": Robustness,
     "reproduce": Reproduce,
+    "study": Study,
     "export": Export,
     "seal": Seal,
     "new": New,

@@ -11,8 +11,9 @@ all of them see: no server, no lock, no common clock.
     work/KEY.N/KEY      where the worker of that claim writes, and nobody else
 
 A claim is made by a hard link, which one of several workers gets. It is taken over by a claim with
-the next number once its beat has not changed for a while by the clock of the worker that looks. The
-new claim works in a copy of what the old one left, so a worker that was only slow can harm nothing.
+the next number once its beat has not changed for a while by the clock of the worker that looks, or
+at once where that worker sees that the process is gone. The new claim works in a copy of what the
+old one left, so a worker that was only slow can harm nothing.
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ import os
 import re
 import secrets
 import shutil
-import socket
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -32,6 +32,7 @@ from typing import Literal
 
 from innerattn.config.files import sync_folder, write_whole
 from innerattn.errors import RunError
+from innerattn.studies.owner import is_gone, this_process
 
 State = Literal["planned", "claimed", "done", "failed"]
 MOST_FAILURES = 3
@@ -44,6 +45,7 @@ _CLAIM = re.compile(r"([A-Za-z0-9_-]{1,128})\.([1-9][0-9]{0,8})(\.free|\.failed)
 _GROWING = "metrics.jsonl"
 _MOST_REASON_BYTES = 1 << 16
 _COPIES = 3
+_MOST_OWNER_BYTES = 1 << 10
 
 
 class ClaimLostError(RunError):
@@ -160,7 +162,7 @@ class Ledger:
         self.folder = folder
         self._silent_after_s = silent_after_s
         self._clock = clock
-        self._beats: dict[tuple[str, int], tuple[bytes, float]] = {}
+        self._beats: dict[tuple[str, int], tuple[str, float]] = {}
         for name in ("runs", "claims", "work"):
             (folder / name).mkdir(parents=True, exist_ok=True)
 
@@ -239,11 +241,10 @@ class Ledger:
 
     def _silent(self, key: str, number: int) -> bool:
         """Whether the beat of a claim has not changed while this ledger watched."""
+        if is_gone(_read(self.folder / "claims" / f"{key}.{number}")):
+            return True
         now = self._clock()
-        try:
-            beat = (self.folder / "claims" / f"{key}.{number}.beat").read_bytes()
-        except FileNotFoundError:
-            beat = b""
+        beat = _read(self.folder / "claims" / f"{key}.{number}.beat")
         seen, since = self._beats.get((key, number), (None, now))
         if seen != beat:
             since = now
@@ -276,10 +277,19 @@ def _state(done: bool, run: _Run | None) -> State:
     return "claimed" if run.number > run.over else "planned"
 
 
+def _read(path: Path) -> str:
+    """The text of a small file, empty where there is none."""
+    try:
+        with path.open("rb") as file:
+            return file.read(_MOST_OWNER_BYTES).decode("utf-8", "replace")
+    except FileNotFoundError:
+        return ""
+
+
 def _linked(path: Path) -> bool:
     """Make a file that nobody else has made; whether it was this call that made it."""
     own = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
-    own.write_text(f"{socket.gethostname()} {os.getpid()}\n", "utf-8")
+    own.write_text(this_process(), "utf-8")
     try:
         os.link(own, path)
     except FileExistsError:
@@ -297,7 +307,8 @@ def _linked(path: Path) -> bool:
 
 def _made_alone(path: Path) -> bool:
     try:
-        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        with path.open("x", encoding="utf-8") as file:
+            file.write(this_process())
     except FileExistsError:
         return False
     return True

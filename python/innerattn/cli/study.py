@@ -1,0 +1,192 @@
+"""`innerattn study`: runs, measures and compares what a file lists."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import time
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from innerattn.cli.options import LongCommand, UsageError
+from innerattn.cli.progress import Work
+from innerattn.config.files import write_whole
+
+if TYPE_CHECKING:
+    from innerattn.studies.folder import StudyFolder
+    from innerattn.studies.ledger import State
+    from innerattn.studies.work import Outcome
+
+_TIME = re.compile(r"([0-9]{1,6})([smh])")
+_UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
+Action = Literal["run", "work", "status", "report", "slurm"]
+_WHAT = """What to do.
+- run: begin or go on with the study in a file, with a worker for each core.
+- work: be one worker for a study that has begun.
+- status: how many runs are done, and what they found so far.
+- report: write report.md and report.json again.
+- slurm: print a script for sbatch whose jobs are workers."""
+
+
+@dataclass(kw_only=True)
+class Study(LongCommand):
+    """Train, measure and compare the runs that a file lists, on one machine or several."""
+
+    action: Annotated[tyro.conf.Positional[Action], tyro.conf.arg(help=_WHAT)]
+    study: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STUDY")]
+    """The study's file (.toml), or its folder once it has begun."""
+    out: Path | None = None
+    """Folder of the study in a file; None: studies/NAME for NAME.toml."""
+    workers: int | None = None
+    """How many workers (run) or jobs (slurm); None: one for each core, or 10 jobs."""
+    until: str | None = None
+    """Time after which a worker saves its run and ends: 90s, 55m, 2h."""
+    minutes: int = 60
+    """Time limit of a job (slurm) [min]."""
+
+    def run(self) -> int:
+        """Do it.
+
+        Returns:
+            The exit code: 0, or 1 where a run has failed.
+
+        Raises:
+            InnerattnError: the file is not valid, there is no study, or workers cannot run.
+            OSError: a file cannot be read or written.
+            KeyboardInterrupt: the user stopped it; every worker has saved its run.
+        """
+        return getattr(self, f"_{self.action}")()  # type: ignore[no-any-return]
+
+    def _run(self) -> int:
+        from innerattn.studies.launch.local import as_many_as_cores, run_workers
+
+        if self.workers is not None and not 1 <= self.workers <= 256:
+            raise UsageError(f"--workers = {self.workers}: must be 1 to 256")
+        study = self._opened()
+        ledger, keys = study.ledger(), [run.key for run in study.planned]
+        over = Counter(ledger.states(keys).values())
+        left = len(keys) - over["done"] - over["failed"]
+        workers = self.workers or as_many_as_cores(left)
+        console = self.console()
+        console.print(
+            f"{study.path}: {len(keys)} runs, {over['done']} done, {over['failed']} failed, "
+            f"{left} to do" + (f" by {workers} workers" if left else ""),
+            soft_wrap=True,
+        )
+        if left:
+            with _Progress(self.progress_console()) as progress:
+                run_workers(study.path, workers, looked=lambda: progress(ledger.states(keys)))
+        return self._report(study)
+
+    def _work(self) -> int:
+        from innerattn.studies.work import work
+
+        until = None if self.until is None else time.monotonic() + _seconds(self.until)
+        study = self._opened()
+        console = self.console()
+
+        def ended(outcome: Outcome) -> None:
+            if outcome.state == "failed":
+                print(f"innerattn: error: {outcome.run}: {outcome.reason}", file=sys.stderr)
+            console.print(f"{outcome.run}: {outcome.state}", soft_wrap=True)
+
+        work(study.ledger(), study.planned, until=until, ended=ended)
+        return 0
+
+    def _status(self) -> int:
+        study = self._opened()
+        states = study.ledger().states(run.key for run in study.planned)
+        counts = Counter(states.values())
+        names: tuple[State, ...] = ("done", "claimed", "planned", "failed")
+        words = {"claimed": "running", "planned": "waiting"}
+        told = ", ".join(f"{counts[name]} {words.get(name, name)}" for name in names)
+        print(f"{study.path}: {len(states)} runs: {told}")
+        self._print_failures(study, states)
+        return int(counts["failed"] > 0)
+
+    def _report(self, study: StudyFolder | None = None) -> int:
+        from innerattn.report.study.page import means_table, sentence, study_document, study_page
+        from innerattn.report.table import print_table
+        from innerattn.studies.results import compare, means, read_results
+
+        study = study or self._opened()
+        ledger = study.ledger()
+        states = ledger.states(run.key for run in study.planned)
+        results = read_results(study.runs, study.planned)
+        found, compared = means(results), compare(study.study, study.planned, results)
+        failures = {
+            key: ledger.failures(key)[-1].strip().splitlines()[-1]
+            for key, state in states.items()
+            if state == "failed"
+        }
+        page = study_page(study, states, found, compared, failures)
+        write_whole(study.path / "report.md", page.encode())
+        document = json.dumps(study_document(study, states, found, compared), allow_nan=False)
+        write_whole(study.path / "report.json", f"{document}\n".encode())
+        console = self.console()
+        if found:
+            print_table(console, means_table(found))
+        for one in compared:
+            console.print(sentence(one).replace("**", ""), soft_wrap=True)
+        self._print_failures(study, states)
+        console.print(f"Written: {study.path / 'report.md'}, report.json", soft_wrap=True)
+        done = sum(state == "done" for state in states.values())
+        self.say_result(f"{study.path}: {done} of {len(states)} runs done")
+        return int("failed" in states.values())
+
+    def _slurm(self) -> int:
+        from innerattn.studies.launch.slurm import slurm_script
+
+        if self.minutes <= 5:
+            raise UsageError(f"--minutes = {self.minutes}: must be above 5")
+        jobs = 10 if self.workers is None else self.workers
+        if not 1 <= jobs <= 10_000:
+            raise UsageError(f"--workers = {jobs}: must be 1 to 10,000 jobs")
+        print(slurm_script(self._opened().path, jobs, self.minutes), end="")
+        return 0
+
+    def _opened(self) -> StudyFolder:
+        """The study in a folder, or that of a file, which begins here where it has not begun."""
+        from innerattn.studies.folder import begin_study, open_study
+
+        if self.study.is_dir():
+            return open_study(self.study)
+        if self.study.suffix != ".toml":
+            raise UsageError(f"{self.study}: must be a TOML file, or the folder of a study")
+        return begin_study(self.study, self.out or Path("studies") / self.study.stem)
+
+    def _print_failures(self, study: StudyFolder, states: Mapping[str, State]) -> None:
+        ledger = study.ledger()
+        for run in study.planned:
+            if states[run.key] == "failed":
+                reason = ledger.failures(run.key)[-1].strip().splitlines()[-1]
+                print(f"innerattn: failed: {run}: {reason}", file=sys.stderr)
+
+
+class _Progress(Work):
+    """Shows how many runs are done."""
+
+    title = "study"
+
+    def __call__(self, states: Mapping[str, State]) -> int:
+        """Show states; gives how many runs are over."""
+        counts = Counter(states.values())
+        over = counts["done"] + counts["failed"]
+        note = f"{counts['done']} of {len(states)} runs done, {counts['claimed']} running"
+        note += f", {counts['failed']} failed" if counts["failed"] else ""
+        if over:
+            self.show(over, len(states), note)
+        return over
+
+
+def _seconds(text: str) -> float:
+    match = _TIME.fullmatch(text)
+    if match is None:
+        raise UsageError(f"--until = {text!r}: must be a time such as 90s, 55m or 2h")
+    return float(match[1]) * _UNITS[match[2]]

@@ -1,0 +1,1 @@
+"""The report of a study: its answer, its rules, its numbers."""

@@ -1,0 +1,1 @@
+"""Ways to start workers of a study; each starts the command `innerattn study work`."""

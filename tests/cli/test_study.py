@@ -1,0 +1,98 @@
+"""Studies by the command: begun, stopped, killed, gone on with, reported."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from tiny_study import TINY
+
+from innerattn.cli.main import main
+
+
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "tiny.toml"
+    path.write_text(TINY)
+    return path
+
+
+def test_a_study_from_file_to_report(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", "run", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert "studies/tiny: 6 runs, 0 done, 0 failed, 6 to do by" in said
+    assert "inner attention, ppo-inner - ppo-uniform" in said
+    folder = Path("studies/tiny")
+    found = json.loads((folder / "report.json").read_text())
+    assert set(found["runs"].values()) == {"done"}
+    assert [one["seeds"] for one in found["means"]] == [[0, 1, 2], [0, 1, 2]]
+    assert found["contrasts"][0]["seeds"] == [0, 1, 2]
+    page = (folder / "report.md").read_text()
+    assert page.startswith("# Does inner attention matter?\n")
+    assert "given before the first run" in page
+    before = (folder / "report.json").read_bytes()
+    assert main(["study", "run", str(folder), "-q"]) == 0
+    assert (folder / "report.json").read_bytes() == before  # nothing was repeated
+    assert main(["study", "status", str(folder)]) == 0
+    assert "6 runs: 6 done, 0 running, 0 waiting, 0 failed" in capsys.readouterr().out
+
+
+def test_everything_is_killed_and_goes_on(file: Path) -> None:
+    words = [sys.executable, "-m", "innerattn", "study", "run", str(file), "--workers", "2", "-q"]
+    first = subprocess.Popen(words, start_new_session=True)
+    work = Path("studies/tiny/work")
+    deadline = time.monotonic() + 60
+    while not (work.exists() and any(work.iterdir())) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.killpg(first.pid, signal.SIGKILL)
+    first.wait()
+    assert main(["study", "run", str(file), "-q"]) == 0
+    found = json.loads(Path("studies/tiny/report.json").read_text())
+    assert set(found["runs"].values()) == {"done"}
+    assert sorted(os.listdir("studies/tiny/runs")) == sorted(found["runs"])
+
+
+def test_slurm_runs_workers(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With a stand-in for srun, which just runs the command."""
+    assert main(["study", "slurm", str(file), "--workers", "2", "--minutes", "30"]) == 0
+    script = capsys.readouterr().out
+    assert "#SBATCH --array=1-2\n" in script
+    assert "--until 27m\n" in script
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    (tools / "srun").write_text('#!/bin/sh\nexec "$@"\n')
+    (tools / "srun").chmod(0o755)
+    env = {**os.environ, "PATH": f"{tools}:{os.environ['PATH']}"}
+    jobs = [
+        subprocess.Popen(["bash", "-c", script], env=env, stdout=subprocess.DEVNULL)
+        for _ in range(2)
+    ]
+    assert [job.wait() for job in jobs] == [0, 0]
+    assert main(["study", "status", str(file)]) == 0
+    assert "6 done" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "text"),
+    [
+        (["run", "nothing.toml"], 1, "nothing.toml"),
+        (["run", "tiny.txt"], 2, "must be a TOML file, or the folder of a study"),
+        (["run", "tiny.toml", "--workers", "0"], 2, "--workers = 0: must be 1 to 256"),
+        (["work", "."], 1, "holds no study"),
+        (["work", "tiny.toml", "--until", "soon"], 2, "--until = 'soon': must be a time such as"),
+        (["slurm", "tiny.toml", "--minutes", "3"], 2, "--minutes = 3: must be above 5"),
+    ],
+)
+@pytest.mark.usefixtures("file")
+def test_wrong_usage(
+    words: list[str], code: int, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["study", *words]) == code
+    err = capsys.readouterr().err
+    assert text in err
+    assert err.count("\n") == 1
