@@ -16,6 +16,8 @@ from innerattn.cli.main import COMMANDS, _parse, main
 from innerattn.config import Scenario, load_run_config
 from innerattn.envs import BatchEnv
 from innerattn.policies import Exported
+from innerattn.studies.plan import plan_study
+from innerattn.studies.study import study_in
 from innerattn.zoo import run_path
 
 ROOT = Path(__file__).parents[2]
@@ -124,6 +126,8 @@ def test_toml_blocks(tmp_path: Path) -> None:
             keys = set(tomllib.loads(code))
             if keys <= set(Scenario.model_fields):
                 Scenario.from_toml(file)
+            elif "grid" in keys:
+                plan_study(study_in(code.encode(), file), tmp_path.joinpath)
             else:
                 load_run_config("mixed", "ppo-inner", config_file=file)
 
