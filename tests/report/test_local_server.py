@@ -7,6 +7,7 @@ import signal
 import socket
 import struct
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from http.server import ThreadingHTTPServer
@@ -40,9 +41,11 @@ def echo(path: str, body: bytes) -> Answer:
 def served(server: LocalServer) -> Iterator[LocalServer]:
     thread = threading.Thread(target=server.serve)
     thread.start()
-    yield server
-    server.close()
-    thread.join()
+    try:
+        yield server
+    finally:  # a thread that goes on would keep the process from its end
+        server.close()
+        thread.join()
 
 
 @pytest.fixture
@@ -227,6 +230,11 @@ def get(server: LocalServer, path: str, *more: str) -> bytes:
         (lambda s: get(s, f"//evil.example/{s.word}/"), 403),
         (lambda s: get(s, f"/{s.word}/", "Host: evil.example"), 403),
         (lambda s: get(s, f"/{s.word}/", f"Host: {HOST}:{s.port}"), 403),
+        (lambda s: get(s, f"/{s.word}/", *2 * [f"Origin: http://{HOST}:{s.port}"]), 403),
+        (lambda s: get(s, f"/{s.word}/", *2 * ["Sec-Fetch-Site: none"]), 403),
+        (lambda s: get(s, f"/{s.word}/", *2 * ["Content-Type: application/json"]), 403),
+        (lambda s: get(s, f"/{s.word}/", *2 * ["Content-Length: 0"]), 403),
+        (lambda _: b"GET /\r\n\r\n", 403),  # HTTP/0.9 knows no headers
         (lambda s: get(s, "x" * 70_000), 414),
         (lambda s: get(s, f"/{s.word}/", "a: " + "x" * 70_000), 431),
         (lambda s: get(s, f"/{s.word}/", *[f"a{n}: 1" for n in range(200)]), 431),
@@ -324,3 +332,40 @@ def test_connections_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
                     break
         else:
             raise AssertionError("places are not given back")
+
+
+def test_threads_that_cannot_start_keep_no_place(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(local_server, "MOST_CONNECTIONS", 3)
+    with served(LocalServer(PAGES)) as server:
+        with monkeypatch.context() as without:
+            without.setattr(threading.Thread, "start", no_thread)
+            for _ in range(4):
+                assert raw(server, get(server, f"/{server.word}/")) == b""
+        assert asked(server, f"/{server.word}/")[2] == "first"
+    assert capfd.readouterr() == ("", "")
+
+
+def no_thread(_: threading.Thread) -> None:
+    raise RuntimeError("can't start new thread")
+
+
+def test_clients_that_do_not_take_their_answer_are_dropped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(local_server, "TAKEN_WITHIN_S", 0.3)
+    size = 50_000_000
+    pages = {"": lambda: Answer("text/plain", "x" * size), "small": PAGES[""]}
+    with served(LocalServer(pages)) as server:
+        with socket.create_connection((HOST, server.port), timeout=10) as connection:
+            connection.sendall(get(server, f"/{server.word}/"))
+            read = 0
+            for _ in range(20):  # slowly, at first
+                read += len(connection.recv(1000))
+                time.sleep(0.05)
+            with suppress(ConnectionError):
+                while got := connection.recv(1_000_000):
+                    read += len(got)
+            assert read < size
+        assert asked(server, f"/{server.word}/small")[2] == "first"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, TextIO, cast
+from typing import IO, Any, TextIO, cast
 
 from rich.console import Console
+from rich.segment import Segment
 from rich.text import Text
 
 from innerattn.errors import plain
@@ -34,8 +35,25 @@ class Escaping:
 class PlainConsole(Console):
     """Rich's console; of what it is given as text, nothing moves the cursor or sets a colour."""
 
+    @property
+    def file(self) -> IO[str]:
+        """The stream below everything that escapes; a bar puts a proxy of its own on top."""
+        file = super().file
+        while (below := getattr(file, "rich_proxied_file", file)) is not file:
+            file = below
+        return file
+
+    @file.setter
+    def file(self, new_file: IO[str]) -> None:
+        self._file = new_file
+
+    def render(self, *args: Any, **named: Any) -> Iterable[Segment]:
+        """See `rich.console.Console.render`; texts that came with a style are escaped here."""
+        for one in super().render(*args, **named):
+            yield one if one.control else Segment(plain(one.text), one.style)
+
     def render_str(self, text: str, *args: Any, **named: Any) -> Text:
-        """See `rich.console.Console.render_str`."""
+        """See `rich.console.Console.render_str`; escaped before it is measured and wrapped."""
         return super().render_str(plain(text), *args, **named)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from functools import cache
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
+from innerattn.cli.plain import PlainConsole, escaped_output
 from innerattn.records.logged import logged_rescues, unit_of_rescues
 
 if TYPE_CHECKING:
@@ -37,10 +39,11 @@ class Work:
         self, console: Console | None = None, clock: Callable[[], float] = time.monotonic
     ) -> None:
         """Show on ``console``; none: standard error. ``clock`` gives seconds."""
-        self._console = console or Console(stderr=True)
+        self._console = console or PlainConsole(stderr=True)
         self._clock = clock
         self._start = self._last_line = clock()
         self._bar: Progress | None = None
+        self._shown = ExitStack()
         drawn = self._console.is_terminal and not self._console.is_dumb_terminal
         if drawn and not self._console.quiet:
             self._bar = Progress(
@@ -54,7 +57,8 @@ class Work:
     def __enter__(self) -> Self:
         """Show the bar, if there is one."""
         if self._bar is not None:
-            self._bar.start()
+            self._shown.enter_context(self._bar)
+            self._shown.enter_context(escaped_output())  # the bar reads colours in what is printed
         return self
 
     def __exit__(
@@ -64,8 +68,7 @@ class Work:
         traceback: TracebackType | None,
     ) -> None:
         """Put the bar away."""
-        if self._bar is not None:
-            self._bar.stop()
+        self._shown.close()
 
     def show(self, done: float, total: float, note: str, worked_s: float = 0.0) -> None:
         """Show that ``done`` of ``total`` units are done, and a note.

@@ -28,6 +28,8 @@ MOST_BODY_BYTES = 4096
 """Longest message that a page may send."""
 REQUEST_WITHIN_S = 30.0
 """How long a client may take to send a request, from its connection or its last answer on."""
+TAKEN_WITHIN_S = 300.0
+"""How long a client may take to read an answer."""
 MOST_CONNECTIONS = 64
 """As many connections are served at a time; others are closed at once."""
 
@@ -43,6 +45,8 @@ _HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
+_ONCE = ("Host", "Origin", "Sec-Fetch-Site", "Content-Type", "Content-Length")
+"""Headers that a request may have once: of two, one would be checked and the other one obeyed."""
 
 
 class Answer(NamedTuple):
@@ -126,8 +130,8 @@ class _Server(ThreadingHTTPServer):
 
     def __init__(self, address: tuple[str, int], handler: type[_Handler]) -> None:
         super().__init__(address, handler)
-        self.waiting: dict[socket.socket, float] = {}
-        """Connections whose next request is not read yet, and since when [s]."""
+        self.until: dict[socket.socket, float] = {}
+        """When connections that send a request or read an answer are ended; `time.monotonic`."""
         self._open = 0
         self._count = threading.Lock()
 
@@ -140,8 +144,8 @@ class _Server(ThreadingHTTPServer):
         """Raise what was noted, and end what takes too long; called ten times a second."""
         if self.noted is not None:
             raise Interrupted(self.noted)
-        last = time.monotonic() - REQUEST_WITHIN_S
-        for connection in [one for one, since in self.waiting.copy().items() if since < last]:
+        now = time.monotonic()
+        for connection in [one for one, until in self.until.copy().items() if until < now]:
             with suppress(OSError):
                 connection.shutdown(socket.SHUT_RDWR)
 
@@ -152,16 +156,23 @@ class _Server(ThreadingHTTPServer):
             self._open += not full
         if full:
             self.shutdown_request(request)
-        else:
+            return
+        try:
             super().process_request(request, client_address)
+        except RuntimeError:  # no thread could be started
+            self._let_go()
+            self.shutdown_request(request)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         """Serve a connection to its end."""
         try:
             super().process_request_thread(request, client_address)
         finally:
-            with self._count:
-                self._open -= 1
+            self._let_go()
+
+    def _let_go(self) -> None:
+        with self._count:
+            self._open -= 1
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Print nothing of a connection that breaks, and one line of a fault of ours."""
@@ -228,13 +239,16 @@ class _Handler(BaseHTTPRequestHandler):
         origin = self.headers.get("Origin")
         site = self.headers.get("Sec-Fetch-Site", "same-origin")
         return (
-            self.headers.get_all("Host", []) in [[host] for host in own]
+            all(len(self.headers.get_all(name, [])) <= 1 for name in _ONCE)
+            and self.headers.get("Host") in own
             and (origin is None or origin in [f"http://{host}" for host in own])
             and site in ("same-origin", "none")
         )
 
     def _send(self, answer: Answer) -> None:
         data = answer.text.encode(errors="backslashreplace")
+        self.request_version = self.protocol_version  # an older one would be sent no headers
+        self._has(TAKEN_WITHIN_S)
         self.send_response(answer.status)
         self.send_header("Content-Type", f"{answer.kind}; charset=utf-8")
         self.send_header("Content-Length", str(len(data)))
@@ -249,21 +263,25 @@ class _Handler(BaseHTTPRequestHandler):
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
         """Refuse what is no request that can be answered, with the headers of every page."""
         del explain
-        self.close_connection, self.request_version = True, self.protocol_version
+        self.close_connection = True
         status = HTTPStatus(code)
         self._send(Answer("text/plain", message or status.phrase, status))
 
     def handle_one_request(self) -> None:
         """Wait for a request, answer it, and let go of a client that takes too long to ask."""
-        self.server.waiting[self.connection] = time.monotonic()
+        self._has(REQUEST_WITHIN_S)
         try:
             super().handle_one_request()
         finally:
             self._is_whole()
 
+    def _has(self, seconds: float) -> None:
+        """The client has this long, however it takes or sends bytes."""
+        self.server.until[self.connection] = time.monotonic() + seconds
+
     def _is_whole(self) -> None:
-        """The request was read."""
-        self.server.waiting.pop(self.connection, None)
+        """The request was read, or its answer was taken."""
+        self.server.until.pop(self.connection, None)
 
     def log_message(self, format: str, *args: object) -> None:
         """Print nothing: the word in the address is a secret."""
