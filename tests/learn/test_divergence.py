@@ -120,7 +120,6 @@ def test_an_actor_that_fails_undoes_the_step_of_the_critic(
         name for name, value in learner.state().items() if not torch.equal(value, before[name])
     }
     assert any(name.startswith("critic.") for name in stepped)  # else nothing is shown below
-    assert not any(name.startswith("actor") for name in stepped)
     learner.load(before)
     with pytest.raises(DivergenceError) as caught:
         learner.update(batch)

@@ -18,7 +18,7 @@ from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
 from innerattn.learn.afterstate import AfterstateCritic
-from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot, finite
+from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
 from innerattn.learn.networks import draw_networks
 from innerattn.learn.resume import (
     State,
@@ -208,7 +208,7 @@ class PPO(ActorCritic):
     ) -> Tensor:
         critic_metrics = self._update_critic(nets, obs, actions, value, target, rate)
         actor_metrics = self._update_actor(
-            nets, obs, actions, log_prob, advantage, entropy_weight, rate, finite(*critic_metrics)
+            nets, obs, actions, log_prob, advantage, entropy_weight, rate
         )
         return torch.stack([*critic_metrics, *actor_metrics])
 
@@ -239,7 +239,7 @@ class PPO(ActorCritic):
         gradients, (loss, mean) = nets.critic.gradients(loss_of)
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norm = clip_norm(gradients, config.critic_grad_clip)
-        nets.critic.step(gradients, rate, finite(loss, norm))
+        nets.critic.step(gradients, rate)
         return loss, mean, norm
 
     def _update_actor(
@@ -251,7 +251,6 @@ class PPO(ActorCritic):
         advantage: Tensor,
         entropy_weight: Tensor,
         rate: Tensor,
-        critic_is_sound: Tensor,
     ) -> tuple[Tensor, ...]:
         """One step of the policies: loss, entropy, mean gradient norm, KL, clipped share."""
         config = self._config
@@ -267,7 +266,7 @@ class PPO(ActorCritic):
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norms = clip_norm_by_robot(gradients, config.actor_grad_clip)
         if not self.actor_frozen:
-            nets.actor.step(gradients, rate, critic_is_sound & finite(loss, norms))
+            nets.actor.step(gradients, rate)
         ratio = change.exp()
         kl = (ratio - 1.0 - change).mean()
         clipped = ((ratio - 1.0).abs() > config.clip).to(kl.dtype).mean()
