@@ -47,7 +47,7 @@ def transitions(size: int = 8) -> Transitions:
 
 def rollout() -> Rollout:
     source = torch.Generator().manual_seed(1)
-    rows = [torch.randn(3, 16, generator=source) for _ in range(3)]
+    rows = [torch.randn(3, 16, generator=source) for _ in range(2)]
     actions = torch.randint(5, (3, 16), generator=source)
     log_prob = torch.full((3, 16), -math.log(5.0))
     return Rollout(torch.randn(3, 16, 4, generator=source), actions, log_prob, *rows)

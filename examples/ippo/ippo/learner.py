@@ -128,7 +128,6 @@ class IPPO(ActorCritic):
             obs=steps.obs,
             actions=steps.actions,
             log_prob=losses.gather_actions(log_prob, steps.actions),
-            value=rows,
             advantage=standardised(rows_of(advantage)),
             target=rows_of(advantage + value),
         )
