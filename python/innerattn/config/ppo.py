@@ -72,6 +72,11 @@ class PPOConfig(AlgorithmConfig):
     )
 
     @property
+    def needs_afterstates(self) -> bool:
+        """Whether values after a step are those of afterstates."""
+        return self.bootstrap == "afterstate"
+
+    @property
     def rows_per_update(self) -> int:
         """Rows of a minibatch."""
         return self.minibatch_size
