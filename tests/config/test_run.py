@@ -3,6 +3,7 @@
 import hashlib
 import json
 import re
+from pathlib import Path
 from typing import Annotated
 
 import pytest
@@ -17,6 +18,7 @@ from innerattn.config import (
     TrainConfig,
     load_run_config,
 )
+from innerattn.config.load import read_toml
 from innerattn.config.model import ADDED_LATER, Model, values_for_digest
 from innerattn.errors import ConfigError
 
@@ -317,6 +319,40 @@ def test_a_key_added_later_changes_the_digest_of_a_run_that_uses_it() -> None:
     config = RunConfig(network=NetworkConfig(shared_gradients="mean"))
     assert config.digest() != RunConfig().digest()
     assert "shared_gradients" in RunConfig().in_use()["network"]
+
+
+def with_value_clip(method: str, value: object) -> dict[str, object]:
+    return {"train": {"method": method}, "ppo": {"epochs": 3, "value_clip": value}}
+
+
+@pytest.mark.parametrize(
+    ("method", "value"), [("ppo-inner", None), ("mappo", None), ("td-inner", None), ("td-inner", 1)]
+)
+def test_a_removed_key_that_changed_nothing_is_passed_over(method: str, value: object) -> None:
+    config = RunConfig.model_validate(with_value_clip(method, value))
+    assert config == RunConfig.model_validate({"train": {"method": method}, "ppo": {"epochs": 3}})
+    assert "value_clip" not in config.model_dump()["ppo"]
+
+
+def test_a_removed_key_that_a_run_used_is_refused(tmp_path: Path) -> None:
+    message = "ppo.value_clip = 0.5: must be left out, because it was removed; a run that used it "
+    with pytest.raises(ValidationError, match=re.escape(message)):
+        RunConfig.model_validate(with_value_clip("ppo-inner", 0.5))
+    stored = tmp_path / "config.toml"
+    stored.write_text('[train]\nmethod = "mappo"\n[ppo]\nadvantage = "value"\nvalue_clip = 0.5\n')
+    with pytest.raises(ConfigError) as caught:
+        read_toml(stored)
+    assert str(caught.value).startswith(f"{stored}: {message}needs an earlier version")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_removed_key_stays_in_digests() -> None:
+    values = values_for_digest(PPOConfig())
+    assert values["value_clip"] is None
+    assert set(values) == {*PPOConfig.model_fields, "value_clip"} - {
+        "bootstrap",
+        "afterstate_epochs",
+    }
 
 
 CONTINUOUS = {"actions": "continuous"}

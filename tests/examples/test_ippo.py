@@ -13,6 +13,7 @@ from torch import Tensor
 from innerattn.config import NetworkConfig, load_run_config
 from innerattn.learn import Team, Transitions
 from innerattn.learn.actor_critic import ActorCritic
+from innerattn.learn.divergence import DivergenceError
 from innerattn.train import load_policy
 
 TEAM = Team(3, 6, 5)
@@ -91,6 +92,25 @@ def test_a_compiled_update_agrees(ippo: ModuleType) -> None:
     found = trained(compiled)
     for name, tensor in trained(make(ippo)).items():
         torch.testing.assert_close(found[name], tensor, rtol=1e-4, atol=1e-5)
+
+
+def test_updates_that_are_not_finite_are_left_out_where_asked_for(ippo: ModuleType) -> None:
+    learner = make(ippo)
+    before = trained(learner)
+    for skips in (False, True):
+        learner.skips_divergence = skips
+        for step in range(STEPS):
+            batch, truncated = transitions(step)
+            batch.obs[:] = torch.inf
+            learner.observe(batch, truncated)
+        if skips:
+            assert learner.learn() == {"skipped_updates": 4.0}
+        else:
+            with pytest.raises(DivergenceError, match=r"losses\.critic_loss = nan"):
+                learner.learn()
+        after = learner.state()
+        weights = [name for name in before if not name.startswith("scale.")]
+        assert all(torch.equal(before[name], after[name]) for name in weights)
 
 
 def test_it_learns_to_rescue_from_the_command_line(

@@ -67,7 +67,7 @@ def test_the_value_of_the_afterstate_takes_the_place_of_the_next_states() -> Non
     rollout: Rollout = learner._rollout()
     found = learner._afterstates
     assert found is not None
-    value = by_step(rollout.value)
+    value = by_step(learner.critic(rollout.obs, rollout.actions).q[:, 0])
     seen = last.double().transpose(0, 1)
     end = learner.critic(seen, torch.zeros(ROBOTS, ENVS, dtype=torch.int64)).q[:, 0].t()
     scale = learner.scale.std(0.01)

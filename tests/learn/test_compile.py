@@ -99,7 +99,7 @@ def test_the_traced_update_agrees(algorithm: str, robots: int, attention: str) -
     ("algorithm", "numbers"),
     [
         ("td", {"policy_gradient": "sampled", "entropy_target": "maac"}),
-        ("ppo", {"advantage": "value", "value_clip": 0.1}),
+        ("ppo", {"advantage": "value"}),
     ],
 )
 def test_the_traced_update_agrees_masked_and_clipped(algorithm: str, numbers: dict) -> None:

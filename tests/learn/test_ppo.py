@@ -10,6 +10,7 @@ from torch import Tensor
 
 from innerattn.config import NetworkConfig, PPOConfig
 from innerattn.learn import PPO, Team, Transitions, ppo
+from innerattn.learn.interruptions import NoInterruptions
 from innerattn.learn.types import Scheduled
 from innerattn.nn import actions
 
@@ -160,10 +161,6 @@ class PlainPPO:
         loss = numbers.attention_logit_penalty * penalty
         for robot, fitted in enumerate(value):
             errors = (fitted - rows.target[robot]) ** 2
-            if numbers.value_clip is not None:
-                move = (fitted - rows.value[robot]).clamp(-numbers.value_clip, numbers.value_clip)
-                held = (rows.value[robot] + move - rows.target[robot]) ** 2
-                errors = torch.where(held > errors, held, errors)
             loss = loss + errors.mean()
         gradients = PlainTD._backward(self.critic, loss)
         for key, part in gradients:
@@ -212,7 +209,6 @@ class PlainPPO:
         }
 
 
-@pytest.mark.parametrize("value_clip", [None, 0.01])
 @pytest.mark.parametrize(
     ("attention", "advantage"),
     [
@@ -228,12 +224,9 @@ def test_rollouts_and_updates_agree_with_the_plain_form(
     robots: int,
     attention: str,
     advantage: str,
-    value_clip: float | None,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    learner = make(
-        robots, {"attention": attention}, {"advantage": advantage, "value_clip": value_clip}
-    )
+    learner = make(robots, {"attention": attention}, {"advantage": advantage})
     network = NetworkConfig(**NETWORK, attention=attention)
     plain = PlainPPO(learner.state(), network, learner._config)
     drawn: list[Tensor] = []
@@ -280,6 +273,32 @@ def test_learning_waits_for_a_full_rollout_and_then_uses_every_row() -> None:
     assert found.keys() == set(ppo._METRICS)
     assert learner.updates == 2 * 3, "two epochs of 12 rows in minibatches of 5"
     assert learner.learn() is None
+
+
+class StopAfter(NoInterruptions):
+    """Asks to stop after some updates."""
+
+    def __init__(self, updates: int) -> None:
+        self.left = updates
+
+    def check(self) -> None:
+        self.left -= 1
+        if self.left < 0:
+            raise KeyboardInterrupt
+
+
+def test_passes_go_on_from_a_state_that_has_values_of_the_rollout_too() -> None:
+    whole, first, second = make(2), make(2), make(2)
+    for learner in (whole, first):
+        collect(learner, 2, 0)
+    first.interruptions = StopAfter(4)
+    with pytest.raises(KeyboardInterrupt):
+        first.learn()
+    state = first.resume_state()
+    state["rollout.value"] = torch.zeros_like(state["rollout.target"])  # as states once had
+    second.load(first.state())
+    second.load_resume_state(state)
+    assert second.learn() == whole.learn()
 
 
 def test_a_large_divergence_ends_the_epochs() -> None:
@@ -333,7 +352,7 @@ def test_without_attention_values_heed_no_action_and_nothing_is_attended_to() ->
         other.observe(batch._replace(actions=(batch.actions + 1) % NUM_ACTIONS), truncated)
     assert first.attention(batch.obs, batch.actions) is None
     one, two = first._rollout(), other._rollout()
-    assert torch.equal(one.value, two.value)
+    assert torch.equal(one.target, two.target)
     assert torch.equal(one.advantage, two.advantage)
     assert not torch.equal(one.log_prob, two.log_prob)
 

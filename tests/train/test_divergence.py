@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,16 @@ import torch
 from torch import Tensor
 
 from innerattn.config import RunConfig
-from innerattn.errors import RunError
+from innerattn.envs import BatchEnv
+from innerattn.errors import ConfigError, RunError
 from innerattn.learn import PPO, TD
 from innerattn.learn.actor_critic import ActorCritic
 from innerattn.learn.divergence import DivergenceError
+from innerattn.learn.framed import unframed
 from innerattn.records.run_folder import newest_weights, read_info
 from innerattn.train import resume, train
+from innerattn.train.build import build_learner
+from innerattn.train.parts import Parts
 from innerattn.train.resume import read_saved
 from innerattn.train.weights import digest_of
 
@@ -75,6 +80,25 @@ def test_a_run_that_stops_goes_on_from_before_the_update(
     resume(run)
     whole = train(config, tmp_path / "whole")
     assert digest_of(newest_weights(run)) == digest_of(newest_weights(whole))
+
+
+@pytest.mark.parametrize("symmetry", ["none", "canonical"])
+def test_a_learner_that_cannot_skip_updates_is_refused(
+    small_config: Configure, monkeypatch: pytest.MonkeyPatch, symmetry: str
+) -> None:
+    def without_skipping(*args: Any, **more: Any) -> Any:
+        learner = build_learner(*args, **more)
+        del unframed(learner).skips_divergence  # type: ignore[attr-defined]
+        return learner
+
+    monkeypatch.setattr("innerattn.train.parts.build_learner", without_skipping)
+    given = {**SMALL, "train.method": "mappo", "network.symmetry": symmetry}
+    stops, skips = (small_config(**given, **{"train.on_divergence": x}) for x in ("stop", "skip"))
+    with closing(BatchEnv(stops.scenario, 2, num_threads=1)) as env:
+        Parts(stops, env, "training")
+        message = r"on_divergence = 'skip': method 'mappo' cannot skip updates; its learner has no "
+        with pytest.raises(ConfigError, match=message):
+            Parts(skips, env, "training")
 
 
 @pytest.mark.parametrize(("method", "kind"), CASES)

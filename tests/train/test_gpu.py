@@ -76,7 +76,6 @@ def update(learner: TD | PPO, seed: int, device: str) -> Tensor:
         drawn(seed + 1, ROBOTS, ROWS, COLUMNS.width),
         actions,
         -drawn(seed + 2, ROBOTS, ROWS).abs(),
-        drawn(seed + 3, ROBOTS, ROWS),
         drawn(seed + 4, ROBOTS, ROWS),
         drawn(seed + 5, ROBOTS, ROWS),
     )

@@ -4,6 +4,8 @@ Source: de Witt et al. 2020, "Is Independent Learning All You Need in the StarCr
 Challenge?".
 """
 
+from functools import partial
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -50,6 +52,8 @@ def draw_networks(
 class IPPO(ActorCritic):
     """The learner. `ActorCritic` acts, imitates, saves, loads and compiles."""
 
+    _metric_names = METRICS
+
     def __init__(
         self,
         team: Team,
@@ -89,13 +93,12 @@ class IPPO(ActorCritic):
             return None
         rollout = self._rollout()
         self._buffer.clear()
-        found = []
         for _ in range(config.epochs):
             order = torch.randperm(rollout.obs.shape[1], generator=self._shuffle)
             for chosen in torch.split(order, config.minibatch_size):
                 rows = rollout.take(chosen.to(self._device))
-                found.append(self.update(rows))
-        return dict(zip(METRICS, torch.stack(found).mean(dim=0).tolist(), strict=True))
+                self._do_update(len(chosen), partial(self.update, rows))
+        return self._take_metrics()
 
     @torch.no_grad()
     def update(self, rows: Rollout) -> Tensor:
@@ -128,7 +131,6 @@ class IPPO(ActorCritic):
             obs=steps.obs,
             actions=steps.actions,
             log_prob=losses.gather_actions(log_prob, steps.actions),
-            value=rows,
             advantage=standardised(rows_of(advantage)),
             target=rows_of(advantage + value),
         )

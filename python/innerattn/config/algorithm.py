@@ -33,6 +33,11 @@ class AlgorithmConfig(Model, ABC):
         Decides whether compiling the update pays.
         """
 
+    @property
+    def needs_afterstates(self) -> bool:
+        """Whether the learner asks for `innerattn.learn.types.Transitions.afterstates`."""
+        return False
+
 
 @dataclass(frozen=True)
 class Algorithm:

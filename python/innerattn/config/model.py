@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self, get_args
 
@@ -15,6 +15,7 @@ from pydantic import (
     ValidationError,
     ValidationInfo,
     field_validator,
+    model_validator,
 )
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
@@ -72,6 +73,22 @@ class Model(BaseModel):
 
     place: ClassVar[str] = ""
     """What errors call an object of this class."""
+    removed: ClassVar[Mapping[str, object]] = {}
+    """Keys that runs had before they were removed, with the value that changed nothing. Such values
+    are passed over, and stay in digests; others are refused."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _pass_over_removed(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping) or not cls.removed.keys() & data.keys():
+            return data
+        for key, idle in cls.removed.items():
+            if data.get(key, idle) != idle:
+                raise ValueError(
+                    f"{cls.place}.{key} = {data[key]!r}: must be left out, because it was removed; "
+                    "a run that used it needs an earlier version of innerattn"
+                )
+        return {key: value for key, value in data.items() if key not in cls.removed}
 
     @field_validator("*", mode="before")
     @classmethod
@@ -100,8 +117,12 @@ class Model(BaseModel):
 
 
 def values_for_digest(model: BaseModel) -> dict[str, Any]:
-    """JSON values of a model by key, without keys `ADDED_LATER` that have their default."""
+    """JSON values of a model by key, without keys `ADDED_LATER` that have their default.
+
+    Keys that a `Model` has `removed` are among them.
+    """
     known, values = type(model).model_fields, model.model_dump(mode="json")
+    values |= model.removed if isinstance(model, Model) else {}
     for name, value in model:
         info = known.get(name)
         if info is not None and ADDED_LATER in info.metadata and value == _default(info):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
@@ -15,6 +16,7 @@ class PPOConfig(AlgorithmConfig):
     """On-policy learning by proximal policy optimisation."""
 
     place: ClassVar[str] = "ppo"
+    removed: ClassVar[Mapping[str, object]] = {"value_clip": None}
 
     gae_lambda: float = Field(
         0.9, ge=0.0, le=1.0, description="horizon of advantages: 0 is one step, 1 the whole episode"
@@ -33,9 +35,6 @@ class PPOConfig(AlgorithmConfig):
     minibatch_size: int = Field(400, ge=1, le=MOST_ROWS, description="rows of a rollout per update")
     clip: float = Field(
         0.2, gt=0.0, lt=1.0, description="largest change of a probability ratio that counts"
-    )
-    value_clip: float | None = Field(
-        None, gt=0.0, description="largest change of a value per rollout that counts; None: any"
     )
     entropy_weight: float = Field(0.01, ge=0.0, description="weight of the policy's entropy")
     stop_at_kl: float | None = Field(
@@ -71,6 +70,11 @@ class PPOConfig(AlgorithmConfig):
     return_deviation_floor: float = Field(
         1e-2, gt=0.0, description="least standard deviation of returns that rewards are divided by"
     )
+
+    @property
+    def needs_afterstates(self) -> bool:
+        """Whether values after a step are those of afterstates."""
+        return self.bootstrap == "afterstate"
 
     @property
     def rows_per_update(self) -> int:

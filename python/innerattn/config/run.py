@@ -114,6 +114,11 @@ class RunConfig(Model):
         if not isinstance(data, Mapping):
             return data
         method = methods().get(str(_given(data.get("train")).get("method")))
+        for section, one in algorithms().items():
+            given = data.get(section)
+            if method is not None and one != method.algorithm and isinstance(given, Mapping):
+                kept = {key: given[key] for key in given if key not in one.config.removed}
+                data = {**data, section: kept}
         if method is not None:
             needs = {method.algorithm.name: {}, **method.needs}
             if _given(data.get("scenario")).get("actions") == "continuous":

@@ -236,14 +236,14 @@ class ActorCritic:
         """Do `_update_networks` with matrix products in `network.precision`, and count it.
 
         Raises:
-            DivergenceError: A metric is not finite; no network and no moment has changed, though
-                the critic may have stepped before the actor failed.
+            DivergenceError: A metric is not finite; no network and no moment has changed.
         """
         with torch.autocast(self._device.type, torch.bfloat16, enabled=self._bfloat16):
             undo = self._kept_for_undoing()
             metrics = self._update_networks(self._networks, *tensors, _as_tensor(self._rate))
             if not bool(metrics.isfinite().all()):
-                try:  # by the new critic, as the actor that failed has met it
+                undo.restore()
+                try:
                     self._refuse(metrics, tensors)
                 finally:
                     undo.restore()
@@ -263,7 +263,7 @@ class ActorCritic:
         return self._undo
 
     def _refuse(self, metrics: Tensor, tensors: Sequence[Tensor]) -> NoReturn:
-        """Find out which gradient of an update is not finite, by its plain form; learn nothing.
+        """Find out which gradient of an update is not finite, by its plain form done once more.
 
         Raises:
             DivergenceError: Always.
@@ -307,7 +307,7 @@ class ActorCritic:
             self._rows.append(update())
             return
         # The compiler works now, for up to a minute. Who asks it to stop shall not wait.
-        weights = self.state()
+        undo, updates = self._kept_for_undoing(), self._updates
         draws = [generator.get_state() for generator in self._generators()]
         try:
             with self.interruptions.at_once(), warnings.catch_warnings():
@@ -315,7 +315,8 @@ class ActorCritic:
                 warnings.filterwarnings("ignore", category=UserWarning, module=r"torch\._inductor")
                 self._rows.append(update())
         except BaseException as error:
-            self.load(weights)
+            undo.restore()
+            self._updates = updates
             for generator, draw in zip(self._generators(), draws, strict=True):
                 generator.set_state(draw)
             self.interruptions.check()  # the compiler may have made another error of it

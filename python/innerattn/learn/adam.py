@@ -55,16 +55,13 @@ class Stepper(Protocol):
             Gradients of the trained parameters, and what else ``loss_of`` gave.
         """
 
-    def step(
-        self, gradients: Gradients, learning_rate: Tensor, sound: Tensor | None = None
-    ) -> None:
+    def step(self, gradients: Gradients, learning_rate: Tensor) -> None:
         """Do one step of Adam.
 
         Args:
             gradients: Those of `gradients`, changed or not.
             learning_rate: () float64 on the CPU, the step size. It is a tensor because a graph
                 would be compiled anew for every other number.
-            sound: () bool; where it is false, nothing changes. None: it is true.
         """
 
 
@@ -75,7 +72,7 @@ class AdamStepper(Network):
         trained: The parameters that are trained, by name.
         moments: Adam's tensors by name of the parameter, then by Adam's own names.
         weight_decay: Weight of the L2 penalty.
-        watch: While set, is called with all gradients, and no step is done.
+        watch: While set, is called with all gradients.
     """
 
     def __init__(self, module: nn.Module, weight_decay: float = 0.0) -> None:
@@ -111,12 +108,8 @@ class AdamStepper(Network):
             self.watch(gradients)
         return gradients, aux
 
-    def step(
-        self, gradients: Gradients, learning_rate: Tensor, sound: Tensor | None = None
-    ) -> None:
+    def step(self, gradients: Gradients, learning_rate: Tensor) -> None:
         """Do one step of Adam; see `Stepper.step`."""
-        if self.watch is not None or (sound is not None and not bool(sound)):
-            return
         for name, parameter in self.trained.items():
             parameter.grad = gradients[name]
         for group in self._adam.param_groups:

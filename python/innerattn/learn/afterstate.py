@@ -87,7 +87,8 @@ class AfterstateCritic:
                 loss_of = partial(self._loss, states[chosen], wanted[:, chosen])
                 gradients, _ = self._adam.gradients(loss_of)
                 norm = clip_norm(gradients, config.critic_grad_clip)
-                self._adam.step(gradients, step_size, norm.isfinite())
+                if bool(norm.isfinite()):
+                    self._adam.step(gradients, step_size)
 
     def resume_state(self) -> dict[str, Tensor]:
         """The fit, and what it goes on with; see `Resumable`."""

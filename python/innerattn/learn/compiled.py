@@ -87,13 +87,10 @@ class TracedStepper(TracedNetwork):
         found: tuple[Gradients, Aux] = grad(loss_at, has_aux=True)(values)
         return found
 
-    def step(
-        self, gradients: Gradients, learning_rate: Tensor, sound: Tensor | None = None
-    ) -> None:
+    def step(self, gradients: Gradients, learning_rate: Tensor) -> None:
         """Do one step of Adam; see `Stepper.step`."""
         for name in self._trained:
             value, moments = self.values[name], self._moments[name]
-            before = {key: tensor.clone() for key, tensor in (*moments.items(), ("value", value))}
             gradient = gradients[name] + self._weight_decay * value
             step = moments["step"].add_(1.0)
             mean = moments["exp_avg"].lerp_(gradient, 1.0 - _BETA_1)
@@ -103,9 +100,6 @@ class TracedStepper(TracedNetwork):
             square_share = (1.0 - _BETA_2 ** step.double()).sqrt().to(value.dtype)
             denominator = square.sqrt() / square_share + _EPSILON
             value.sub_(learning_rate / mean_share * mean / denominator)
-            if sound is not None:
-                for key, tensor in (*moments.items(), ("value", value)):
-                    tensor.copy_(torch.where(sound, tensor, before[key]))
 
 
 def traced(network: Network) -> TracedNetwork:

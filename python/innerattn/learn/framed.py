@@ -17,6 +17,11 @@ from innerattn.learn.types import Afterstates, Learner, ResumableLearner, Transi
 from innerattn.nn import NUM_ELEMENTS, SquareSymmetry
 
 
+def unframed(learner: Learner) -> Learner:
+    """The learner inside its frames, if it has any."""
+    return learner.learner if isinstance(learner, FramedLearner) else learner
+
+
 class FramedLearner:
     """A learner in frames that observations choose themselves, or that are drawn.
 
@@ -157,7 +162,7 @@ class FramedLearner:
 
     @property
     def _resumable(self) -> ResumableLearner:
-        assert isinstance(self.learner, ResumableLearner)  # as `resumable` finds out
+        assert isinstance(self.learner, ResumableLearner)  # as `Parts.resumable` finds out
         return self.learner
 
     def _look(self, obs: Tensor) -> tuple[Tensor, Tensor]:

@@ -74,11 +74,3 @@ def clip_norm_by_robot(gradients: Gradients, limit: float) -> Tensor:
         [factors.view(-1, *[1] * (gradient.dim() - 1)) for gradient in gradients.values()],
     )
     return norms
-
-
-def finite(*values: Tensor) -> Tensor:
-    """() bool, whether all of some losses and norms are finite, so that a step may follow."""
-    found = values[0].isfinite().all()
-    for value in values[1:]:
-        found = found & value.isfinite().all()
-    return found

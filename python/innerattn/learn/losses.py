@@ -105,20 +105,6 @@ def clipped_policy_loss(log_prob: Tensor, before: Tensor, advantage: Tensor, cli
     return -torch.minimum(ratio * advantage, bounded * advantage).mean(dim=1).sum()
 
 
-def clipped_value_loss(value: Tensor, before: Tensor, target: Tensor, clip: float) -> Tensor:
-    """Squared error of the value, or of the value clipped around the one before, if that is larger.
-
-    Args:
-        value: (R, B).
-        before: (R, B) the value at the start of the rollout's epochs.
-        target: (R, B).
-        clip: Largest difference from the value before.
-    """
-    clipped = before + (value - before).clamp(-clip, clip)
-    errors = torch.maximum((value - target).square(), (clipped - target).square())
-    return errors.mean(dim=1).sum()
-
-
 def entropy(log_prob: Tensor) -> Tensor:
     """(R, B) entropies, nats, of policies with log-probabilities (R, A, B)."""
     return -(log_prob.exp() * log_prob).sum(dim=1)

@@ -18,7 +18,7 @@ from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
 from innerattn.learn.afterstate import AfterstateCritic
-from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot, finite
+from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
 from innerattn.learn.networks import draw_networks
 from innerattn.learn.resume import (
     State,
@@ -200,26 +200,19 @@ class PPO(ActorCritic):
         obs: Tensor,
         actions: Tensor,
         log_prob: Tensor,
-        value: Tensor,
         advantage: Tensor,
         target: Tensor,
         entropy_weight: Tensor,
         rate: Tensor,
     ) -> Tensor:
-        critic_metrics = self._update_critic(nets, obs, actions, value, target, rate)
+        critic_metrics = self._update_critic(nets, obs, actions, target, rate)
         actor_metrics = self._update_actor(
-            nets, obs, actions, log_prob, advantage, entropy_weight, rate, finite(*critic_metrics)
+            nets, obs, actions, log_prob, advantage, entropy_weight, rate
         )
         return torch.stack([*critic_metrics, *actor_metrics])
 
     def _update_critic(
-        self,
-        nets: Networks,
-        obs: Tensor,
-        actions: Tensor,
-        before: Tensor,
-        target: Tensor,
-        rate: Tensor,
+        self, nets: Networks, obs: Tensor, actions: Tensor, target: Tensor, rate: Tensor
     ) -> tuple[Tensor, ...]:
         """One step of the critic towards the targets: loss, mean value, gradient norm."""
         config = self._config
@@ -227,10 +220,7 @@ class PPO(ActorCritic):
         def loss_of(critic: Forward) -> tuple[Tensor, tuple[Tensor, Tensor]]:
             output = critic(obs, actions, self._available(obs))
             value = self._fitted(output.q, actions)
-            if config.value_clip is None:
-                loss = losses.critic_loss(value, target)
-            else:
-                loss = losses.clipped_value_loss(value, before, target, config.value_clip)
+            loss = losses.critic_loss(value, target)
             loss = loss + losses.attention_logit_regularisation(
                 output.attended, config.attention_logit_penalty
             )
@@ -239,7 +229,7 @@ class PPO(ActorCritic):
         gradients, (loss, mean) = nets.critic.gradients(loss_of)
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norm = clip_norm(gradients, config.critic_grad_clip)
-        nets.critic.step(gradients, rate, finite(loss, norm))
+        nets.critic.step(gradients, rate)
         return loss, mean, norm
 
     def _update_actor(
@@ -251,7 +241,6 @@ class PPO(ActorCritic):
         advantage: Tensor,
         entropy_weight: Tensor,
         rate: Tensor,
-        critic_is_sound: Tensor,
     ) -> tuple[Tensor, ...]:
         """One step of the policies: loss, entropy, mean gradient norm, KL, clipped share."""
         config = self._config
@@ -267,7 +256,7 @@ class PPO(ActorCritic):
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norms = clip_norm_by_robot(gradients, config.actor_grad_clip)
         if not self.actor_frozen:
-            nets.actor.step(gradients, rate, critic_is_sound & finite(loss, norms))
+            nets.actor.step(gradients, rate)
         ratio = change.exp()
         kl = (ratio - 1.0 - change).mean()
         clipped = ((ratio - 1.0).abs() > config.clip).to(kl.dtype).mean()
@@ -282,14 +271,14 @@ class PPO(ActorCritic):
         scale = self.scale.std(config.return_deviation_floor).unsqueeze(1)
         reward = (steps.reward / scale).to(self._dtype)
 
-        log_prob, fitted, baseline = self._evaluate(steps.obs, steps.actions, steps.log_probs)
+        log_prob, baseline = self._evaluate(steps.obs, steps.actions, steps.log_probs)
         value = steps_of(baseline, len(reward))
         # Within an episode, the value of the next state is that of the next step. After its last
         # step, and after the last of the rollout, it takes actions drawn for that state.
         next_value = torch.cat([value[1:], torch.zeros_like(value[:1])])
         step, env = steps.cut.nonzero(as_tuple=True)
         next_actions = self._actions.draw(self.actor(steps.after), self._noise)
-        next_value[step, :, env] = self._evaluate(steps.after, next_actions)[2].t()
+        next_value[step, :, env] = self._evaluate(steps.after, next_actions)[1].t()
         if self._afterstates is not None and steps.arrivals is not None:
             next_value = self._afterstates.replaced(steps.arrivals, next_value, self._rate)
         advantage = generalised_advantage(
@@ -305,7 +294,6 @@ class PPO(ActorCritic):
             obs=steps.obs,
             actions=steps.actions,
             log_prob=log_prob,
-            value=fitted,
             # Rewards that never differ say nothing: advantages are then errors of the critic.
             advantage=standardised(rows_of(advantage)) * self.scale.has_spread().unsqueeze(1),
             target=rows_of(advantage + value),
@@ -313,8 +301,8 @@ class PPO(ActorCritic):
 
     def _evaluate(
         self, obs: Tensor, actions: Tensor, log_probs: Tensor | None = None
-    ) -> tuple[Tensor, Tensor, Tensor]:
-        """Log-probabilities of the actions, fitted values and baselines of rows, (R, B) each.
+    ) -> tuple[Tensor, Tensor]:
+        """Log-probabilities of the actions and baselines of rows, (R, B) each.
 
         Args:
             obs: (R, B, D).
@@ -339,9 +327,9 @@ class PPO(ActorCritic):
                     baseline = (log_prob.exp() * q).sum(dim=1)
                 else:
                     baseline = q.squeeze(1)
-            parts.append((taken, self._fitted(q, some_actions), baseline))
-        taken, values, baselines = (torch.cat(found, dim=1) for found in zip(*parts, strict=True))
-        return taken, values, baselines
+            parts.append((taken, baseline))
+        taken, baselines = (torch.cat(found, dim=1) for found in zip(*parts, strict=True))
+        return taken, baselines
 
     def _fitted(self, q: Tensor, actions: Tensor) -> Tensor:
         """(R, B) the values that are fitted to targets: of the actions taken, or of the state."""

@@ -211,7 +211,6 @@ class Rollout(NamedTuple):
         obs: (R, B, D).
         actions: (R, B) int64, or (R, B, W) float32.
         log_prob: (R, B) of the actions, under the policy that acted.
-        value: (R, B) the critic's, when the steps were collected.
         advantage: (R, B).
         target: (R, B) for the critic's values.
     """
@@ -219,7 +218,6 @@ class Rollout(NamedTuple):
     obs: Tensor
     actions: Tensor
     log_prob: Tensor
-    value: Tensor
     advantage: Tensor
     target: Tensor
 
@@ -244,7 +242,7 @@ class Rollout(NamedTuple):
         shape = (robots, obs.shape[1])
         found: dict[str, Any] = {"obs": obs}
         found["actions"] = _take_actions(state, team, shape[1])
-        for name in ("log_prob", "value", "advantage", "target"):
+        for name in ("log_prob", "advantage", "target"):
             found[name] = take(state, name, like.dtype, *shape)
         return cls(**{name: tensor.to(like.device) for name, tensor in found.items()})
 

@@ -17,7 +17,7 @@ from innerattn.config import NetworkConfig, TDConfig
 from innerattn.learn import losses
 from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward, Network
-from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot, finite
+from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
 from innerattn.learn.replay import Replay
 from innerattn.learn.resume import State, inside, take_whole, under, whole
 from innerattn.learn.ring import Ring
@@ -228,8 +228,7 @@ class TD(ActorCritic):
     ) -> Tensor:
         target = self._targets(nets, reward, next_obs, discount, next_noise, temperature)
         critic_metrics = self._update_critic(nets, obs, actions, target, rate)
-        sound = finite(*critic_metrics)
-        actor_metrics = self._update_actor(nets, obs, noise, temperature, rate, sound)
+        actor_metrics = self._update_actor(nets, obs, noise, temperature, rate)
         for slow, fast in ((nets.target_actor, nets.actor), (nets.target_critic, nets.critic)):
             torch._foreach_lerp_(
                 list(slow.values.values()), list(fast.values.values()), self._config.polyak
@@ -271,17 +270,11 @@ class TD(ActorCritic):
         gradients, (loss, q_mean) = nets.critic.gradients(loss_of)
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norm = clip_norm(gradients, config.critic_grad_clip)
-        nets.critic.step(gradients, rate, finite(loss, norm))
+        nets.critic.step(gradients, rate)
         return loss, q_mean, norm
 
     def _update_actor(
-        self,
-        nets: TDNetworks,
-        obs: Tensor,
-        noise: Tensor,
-        temperature: Tensor,
-        rate: Tensor,
-        critic_is_sound: Tensor,
+        self, nets: TDNetworks, obs: Tensor, noise: Tensor, temperature: Tensor, rate: Tensor
     ) -> tuple[Tensor, ...]:
         """One step of the policies by the new critic: loss, entropy, mean gradient norm."""
 
@@ -298,7 +291,7 @@ class TD(ActorCritic):
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norms = clip_norm_by_robot(gradients, self._config.actor_grad_clip)
         if not self.actor_frozen:
-            nets.actor.step(gradients, rate, critic_is_sound & finite(loss, norms))
+            nets.actor.step(gradients, rate)
         return loss, entropy, norms.mean()
 
     def _modules(self) -> dict[str, nn.Module]:

@@ -213,6 +213,18 @@ class ScheduledLearner(Protocol):
 
 
 @runtime_checkable
+class SkippingLearner(Protocol):
+    """A learner that can leave out updates that are not finite (`train.on_divergence`).
+
+    Attributes:
+        skips_divergence: Leave them out, and count them as "skipped_updates" among what `learn`
+            returns, instead of raising a `DivergenceError`.
+    """
+
+    skips_divergence: bool
+
+
+@runtime_checkable
 class ResumableLearner(Protocol):
     """A learner whose training can go on in another process, to the bit.
 

@@ -10,7 +10,7 @@ from pkgutil import resolve_name
 
 import torch
 
-from innerattn.config import PPOConfig, RunConfig, Scenario
+from innerattn.config import RunConfig, Scenario
 from innerattn.config.registry import methods
 from innerattn.cores import usable_cores
 from innerattn.envs import BatchEnv
@@ -47,7 +47,7 @@ def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -
     symmetry = SquareSymmetry(_turning_columns(config.scenario, names), device)
     if config.network.symmetry == "canonical":
         states = None
-        if needs_afterstates(config):
+        if config.algorithm.needs_afterstates:
             states = SquareSymmetry(state_columns(env.state_names()), device)
         return FramedLearner(learner, symmetry, None, states)
     return FramedLearner(learner, symmetry, config.train.seed) if training else learner
@@ -65,16 +65,10 @@ def team_of(config: RunConfig, env: BatchEnv) -> Team:
         entities=entity_columns(names) if config.network.encoder == "entities" else None,
         partners=partner_columns(names) if config.network.attention == "oracle" else None,
         action_width=2 if env.continuous else 0,
-        state_width=len(env.state_names()) if needs_afterstates(config) else 0,
+        state_width=len(env.state_names()) if config.algorithm.needs_afterstates else 0,
         swapped=_swapped(config),
         terminates=env.scenario.end_when_rescued is not None,
     )
-
-
-def needs_afterstates(config: RunConfig) -> bool:
-    """Whether the learner asks for `Transitions.afterstates`."""
-    algorithm = config.algorithm
-    return isinstance(algorithm, PPOConfig) and algorithm.bootstrap == "afterstate"
 
 
 def _swapped(config: RunConfig) -> tuple[int, int] | None:

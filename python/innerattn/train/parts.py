@@ -8,13 +8,13 @@ from torch import Tensor
 
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
-from innerattn.learn.actor_critic import ActorCritic
-from innerattn.learn.framed import FramedLearner
+from innerattn.errors import ConfigError
+from innerattn.learn.framed import unframed
 from innerattn.learn.resume import Resumable, State, inside, take, under
 from innerattn.learn.ring import Ring
-from innerattn.learn.types import Learner, ResumableLearner
+from innerattn.learn.types import Learner, ResumableLearner, SkippingLearner
 from innerattn.train.attention_log import AttentionLog
-from innerattn.train.build import build_learner, needs_afterstates, team_of
+from innerattn.train.build import build_learner, team_of
 from innerattn.train.checkpoint_info import Stage
 from innerattn.train.collect import Collector
 from innerattn.train.imitate import Imitation
@@ -50,9 +50,8 @@ class Parts:
         self.schedule = Schedule(config, env, self.learner)
         device = torch.device(config.train.device)
         stagger = config.train.stagger_starts
-        self.collector = Collector(
-            env, self.learner, device, self.schedule, stagger, needs_afterstates(config)
-        )
+        afterstates = config.algorithm.needs_afterstates
+        self.collector = Collector(env, self.learner, device, self.schedule, stagger, afterstates)
         warm = stage == "imitating" and config.train.warm_start != "none"
         self.imitation = Imitation(config, env, self.learner, self.collector) if warm else None
         refuse_what_does_not_fit(self.rings(stage), config)
@@ -61,14 +60,20 @@ class Parts:
             env.robot_names, env.scenario.episode_steps, actions, config.train.device
         )
         self.interval = Interval()
-        within = self.learner.learner if isinstance(self.learner, FramedLearner) else self.learner
-        if isinstance(within, ActorCritic):
-            within.skips_divergence = config.train.on_divergence == "skip"
+        if config.train.on_divergence == "skip":
+            within = unframed(self.learner)
+            if not isinstance(within, SkippingLearner):
+                raise ConfigError(
+                    f"train.on_divergence = 'skip': method {config.train.method!r} cannot skip "
+                    "updates; its learner has no attribute `skips_divergence`"
+                )
+            within.skips_divergence = True
 
     @property
     def resumable(self) -> ResumableLearner | None:
         """The learner, if its training can go on in another process."""
-        return resumable(self.learner)
+        able = isinstance(unframed(self.learner), ResumableLearner)
+        return self.learner if able and isinstance(self.learner, ResumableLearner) else None
 
     def rings(self, stage: Stage) -> dict[str, Ring]:
         """The large memories that are needed from ``stage`` on, by name."""
@@ -117,14 +122,6 @@ class Parts:
         if stage == "imitating" and self.imitation is not None:
             parts["imitation"] = self.imitation
         return parts
-
-
-def resumable(learner: Learner) -> ResumableLearner | None:
-    """A learner, if its training can go on in another process."""
-    within = learner.learner if isinstance(learner, FramedLearner) else learner
-    if not isinstance(within, ResumableLearner):
-        return None
-    return learner if isinstance(learner, FramedLearner) else within
 
 
 def under_rings(name: str, rings: dict[str, Ring]) -> dict[str, Ring]:

@@ -10,7 +10,7 @@ from torch import Tensor
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv, Step
 from innerattn.errors import ConfigError
-from innerattn.learn.framed import FramedLearner
+from innerattn.learn.framed import unframed
 from innerattn.learn.types import Learner, Scheduled, ScheduledLearner, Transitions
 from innerattn.train.potential import Potential
 
@@ -34,7 +34,7 @@ class Schedule:
         self._potential: Potential | None = None
         self._learner: ScheduledLearner | None = None
         if self._shaped or self._ramps != type(self._ramps)():
-            inner = learner.learner if isinstance(learner, FramedLearner) else learner
+            inner = unframed(learner)
             if not isinstance(inner, ScheduledLearner):
                 key = "train.potential" if self._shaped else "train.schedule"
                 raise ConfigError(

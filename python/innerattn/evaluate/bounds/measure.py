@@ -26,7 +26,7 @@ from innerattn.evaluate.bounds.results import Attention, Bounds, Level, level_of
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import TrainedPolicy
 from innerattn.learn.actor_critic import ActorCritic
-from innerattn.learn.framed import FramedLearner
+from innerattn.learn.framed import FramedLearner, unframed
 from innerattn.learn.types import Learner
 from innerattn.nn import Actor, CentralCritic, Critic, InnerAttention, JointCritic
 from innerattn.train import load_policy
@@ -149,7 +149,7 @@ def bounds_of_run(
             f"{run}: scenario.actions = 'continuous': bounds count changes of the likeliest of "
             "'discrete' actions"
         )
-    inner = learner.learner if isinstance(learner, FramedLearner) else learner
+    inner = unframed(learner)
     if (
         config.network.attention not in _CHANGES
         or not isinstance(inner, ActorCritic)

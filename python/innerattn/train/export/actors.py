@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from innerattn.config import RunConfig
 from innerattn.errors import ExportError
-from innerattn.learn.framed import FramedLearner
+from innerattn.learn.framed import unframed
 from innerattn.learn.types import Learner
 from innerattn.nn import Actor, EntityColumns, PerRobotLinear
 from innerattn.nn.actions import mean_and_log_std
@@ -48,8 +48,7 @@ def inner_actor(learner: Learner, run: Path) -> Actor:
     Raises:
         ExportError: the learner has others than those of this package.
     """
-    inside = learner.learner if isinstance(learner, FramedLearner) else learner
-    actor = getattr(inside, "actor", None)
+    actor = getattr(unframed(learner), "actor", None)
     if type(actor) is not Actor:
         raise ExportError(
             f"{run}: its policy is a {type(actor).__name__}: must be an innerattn.nn.Actor, as of "
