@@ -53,6 +53,11 @@ def named_run(name: str) -> Path:
     return fitting[0] if fitting else path
 
 
+def runs_within(folder: Path) -> list[Path]:
+    """The run folders in a folder that holds runs and is none itself, by name; else none."""
+    return [] if (folder / "run.json").exists() else _runs(folder)
+
+
 def named_policy(name: str, scripts: Collection[str]) -> str:
     """The script or the path of the run that ``name`` means; see `named_run`.
 
