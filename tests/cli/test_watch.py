@@ -61,7 +61,7 @@ def test_a_training_goes_on_under_the_eyes_of_its_reader(run_dir: Path, tmp_path
             replay.get_by_role("heading", level=1).get_by_text("after 400 env-steps").wait_for()
             replay.get_by_role("button", name="Next event").click()
             assert replay.locator("#episode option").count() == 2
-            until(page, "document.querySelectorAll('.plot .main-svg').length >= 4")
+            until(page, "document.querySelectorAll('.plot .picture').length === 2")
             assert not Visit(page).serious_faults()
             page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
             until(page, f"document.documentElement.scrollWidth <= {PHONE[0]}")
@@ -110,7 +110,7 @@ def test_a_folder_of_runs_stands_for_its_runs(
     shutil.rmtree(runs / "b")
     with pytest.raises(RunError, match="no run in it can be read"):
         Watch(runs=[str(runs)])._folders()
-    with pytest.raises(RunError, match="run.json: missing"):
+    with pytest.raises(RunError, match=r"run\.json: missing"):
         Watch(runs=[str(runs / "notes")])._folders()
 
 

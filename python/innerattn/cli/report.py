@@ -20,7 +20,7 @@ class Report(Command):
     """Write one page about finished runs: training, scores, attention, sharing and a replay."""
 
     runs: Annotated[tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN [RUN ...]")]
-    """Folders of finished runs; those of one method must differ by their seed alone."""
+    """Folders of finished runs, of any scenarios and methods."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("report.html")
     """File to write, .html."""
     robustness: Path | None = None
@@ -33,7 +33,7 @@ class Report(Command):
             The exit code, 0.
 
         Raises:
-            InnerattnError: a run is not finished, or runs cannot be compared.
+            InnerattnError: a run is not finished, or two runs differ by nothing.
             OSError: the page cannot be written.
         """
         if not self.runs:
