@@ -264,7 +264,14 @@ class _Train(_Sources):
         console.print("Run folders", style="bold")
         for run in runs:
             console.print(f"  {run.folder} ({run.state})", soft_wrap=True)
+        done = [run for run in runs if run.state == "done"]
+        rising = sum(_still_rises(run.folder, run.config) for run in done)
+        if rising:
+            more = f"--train.env-steps {2 * configs[0].train.env_steps}"
+            count = f"{rising} of {len(done)} runs"
+            console.print(f"Rescues still rose in {count}: train longer with {more}")
         if scores is not None:
+            console.print(seeds_line(scores), style="bold", soft_wrap=True)
             folders = f"{runs[0].folder} to {runs[-1].folder}"
             self.say_result(f"{folders}: {seeds_line(scores)}")
         return int(any(run.failure for run in runs))
