@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from innerattn.cli.options import Command, UsageError, check_target
-from innerattn.cli.runs import named_run
+from innerattn.cli.runs import existing_run
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
 from innerattn.zoo import in_zoo
@@ -41,7 +41,7 @@ class Report(Command):
         if self.output.suffix != ".html":
             raise UsageError(f"-o {self.output}: must end in .html")
         check_target(self.output)
-        folders = [named_run(run) for run in self.runs]
+        folders = [existing_run(run) for run in self.runs]
         for run, folder in zip(self.runs, folders, strict=True):
             if in_zoo(folder):
                 raise RunError(f"{run}: a team of the package has no metrics for a report")

@@ -16,7 +16,7 @@ from rich.console import Console
 from innerattn.cli.options import LongCommand, UsageError, changed, run_options
 from innerattn.cli.progress import Evaluating, SeveralRuns, Training
 from innerattn.cli.replay import write_replay
-from innerattn.cli.runs import named_run
+from innerattn.cli.runs import existing_run
 from innerattn.cli.seeds import parse_seeds
 from innerattn.cli.streams import droppable_output
 from innerattn.cli.usage import parse, words_of
@@ -155,7 +155,7 @@ class _Train(_Sources):
                     f"--resume {self.resume}: the run has its own configuration; leave out "
                     f"{others[0]}"
                 )
-            return self._resume(self.console(), named_run(self.resume))
+            return self._resume(self.console(), existing_run(self.resume))
         train = self.defaults.train
         chosen: dict[str, object] = {
             "train.method": train.method,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from innerattn.cli.options import Command, UsageError
-from innerattn.cli.runs import named_run, runs_within
+from innerattn.cli.runs import existing_run, runs_within
 from innerattn.errors import InnerattnError, RunError
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Watch(Command):
 
         found: dict[Path, Path] = {}
         for name in self.runs:
-            folder = named_run(name)
+            folder = existing_run(name)
             for run in runs_within(folder) or [folder]:
                 try:
                     read_live(run)
