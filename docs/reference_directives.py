@@ -16,7 +16,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 BEYOND_ALL = 2**32
-"""The range of the core's integers, which says nothing to a reader."""
+"""The range of the core's counts, which says nothing to a reader."""
 HEAD = ("key", "value", "default", "meaning")
 
 
@@ -33,15 +33,38 @@ def value_of(key: dict[str, Any], kinds: dict[str, Any]) -> str:
         return str(key["const"])
     if key.get("type") == "array":
         of = key.get("items") or next(iter(key.get("prefixItems", [])), {})
-        return f"list of {value_of(of, kinds)}"
+        return f"list of {value_of(of, kinds)}{length_of(key)}"
     name = {"null": "none", "boolean": "true or false"}.get(key.get("type", ""), key.get("type"))
-    signs = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
-    ends = [
-        f"{sign} {key[word]:,}"
-        for word, sign in signs.items()
-        if word in key and key[word] != BEYOND_ALL
-    ]
-    return " ".join([str(name), ", ".join(ends)]).strip()
+    return ", ".join(filter(None, (str(name), range_of(key))))
+
+
+def range_of(key: dict[str, Any]) -> str:
+    """The range of a number: "0 to 1", "above 0 to 1", "0 to below 1", "at least 0", "above 0"."""
+    low, high = key.get("minimum"), key.get("maximum")
+    above, below = key.get("exclusiveMinimum"), key.get("exclusiveMaximum")
+    below = None if below == BEYOND_ALL else below
+    least = f"above {shown(above)}" if low is None and above is not None else shown(low)
+    most = f"below {shown(below)}" if high is None and below is not None else shown(high)
+    if least and most:
+        return f"{least} to {most}"
+    if least:
+        return least if least.startswith("above") else f"at least {least}"
+    return "" if not most else most if most.startswith("below") else f"at most {most}"
+
+
+def length_of(key: dict[str, Any]) -> str:
+    """How long a list may be, where readers choose its length."""
+    low, high = key.get("minItems"), key.get("maxItems")
+    return "" if high is None or low == high else f" ({low:g} to {high:g})"
+
+
+def shown(value: float | None) -> str:
+    """A number without needless zeros."""
+    if value is None:
+        return ""
+    if value == 2**63:
+        return "2**63"
+    return f"{value:,.0f}" if value == int(value) else f"{value:.15f}".rstrip("0")
 
 
 def default_of(name: str, key: dict[str, Any], required: list[str]) -> str:

@@ -73,7 +73,6 @@ EXTRA_OF = {
     "onnxruntime": "deploy",
     "onnxscript": "deploy",
     "pettingzoo": "gym",
-    "plotly": "report",
     "rich": "train",
     "safetensors": "train",
     "tensordict": "torchrl",

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from innerattn.cli.main import main
-from innerattn.cli.runs import named_policy, named_run
+from innerattn.cli.runs import existing_run, named_policy, named_run
 from innerattn.errors import RunError
 from innerattn.zoo import run_path
 
@@ -80,6 +80,24 @@ def test_a_misspelt_run_is_asked_for(runs: Path, wrong: str, meant: str) -> None
     assert (runs / "a-1").is_dir()
     with pytest.raises(RunError, match=f", did you mean {meant}\\?$"):
         named_policy(wrong, ("random", "greedy"))
+
+
+@pytest.mark.parametrize(
+    "command", ["evaluate", "export", "play", "replay", "report", "robustness", "train", "watch"]
+)
+def test_every_command_asks_for_a_misspelt_run(
+    runs: Path, command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(runs.parent)
+    words = ["--resume"] if command == "train" else []
+    assert main([command, *words, os.path.join("runs", "a-1x")]) == 1
+    meant = os.path.join("runs", "a-1")
+    assert capsys.readouterr().err.endswith(f", did you mean {meant}?\n")
+
+
+def test_a_long_path_makes_no_names_alike(runs: Path) -> None:
+    with pytest.raises(RunError, match=r"quite-another: no such run folder$"):
+        existing_run(str(runs / "quite-another"))
 
 
 def test_without_runs_there_is_no_latest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from in_turn import do_in_turn
 
 from innerattn.cli.main import main
 from innerattn.config import RunConfig, Scenario, load_run_config, read_toml
@@ -303,3 +304,27 @@ def test_existing_folder_is_refused(
     assert main(["train", "--run-dir", str(run_dir), *tiny]) == 1
     assert f"innerattn: error: {run_dir}: exists already" in capsys.readouterr().err
     assert {file: file.stat().st_mtime_ns for file in run_dir.rglob("*")} == before
+
+
+@pytest.mark.parametrize("rises", [False, True])
+def test_the_score_is_the_last_thing_on_the_screen(
+    rises: bool,
+    tiny: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("innerattn.cli.train.still_rises", lambda _: rises)
+    more = "train longer with --train.env-steps 800"
+    assert main(["train", "--run-dir", str(tmp_path / "one"), *tiny]) == 0
+    *_, before, last = capsys.readouterr().out.splitlines()
+    score = r"\S+ (± \S+ )?rescues per episode of 25 steps, score \S+"
+    assert re.match(score, last)
+    hint = f"Rescues still rose at the end: {more}"
+    assert before == hint if rises else before.startswith("Watch it in a browser: ")
+    monkeypatch.setattr("innerattn.cli.train.train_side_by_side", do_in_turn)
+    assert main(["train", "--seeds", "0..1", "--run-dir", str(tmp_path / "two"), *tiny]) == 0
+    *_, before, last = capsys.readouterr().out.splitlines()
+    assert re.match(f"{score}.*, mean of 2 of 2 seeds", last)
+    hint = f"Rescues still rose in 2 of 2 runs: {more}"
+    assert before == hint if rises else before.endswith("two-s1 (done)")

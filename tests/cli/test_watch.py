@@ -12,8 +12,11 @@ from typing import Any
 
 import pytest
 from browser import PHONE, WIDE, Visit, opened_browser, until
+from reseal import reseal
 
 from innerattn.cli.main import main
+from innerattn.cli.watch import Watch, _scripts_beside
+from innerattn.errors import RunError
 from innerattn.records.run_files import seal
 from innerattn.records.run_folder import run_info
 
@@ -58,7 +61,7 @@ def test_a_training_goes_on_under_the_eyes_of_its_reader(run_dir: Path, tmp_path
             replay.get_by_role("heading", level=1).get_by_text("after 400 env-steps").wait_for()
             replay.get_by_role("button", name="Next event").click()
             assert replay.locator("#episode option").count() == 2
-            until(page, "document.querySelectorAll('.plot .main-svg').length >= 4")
+            until(page, "document.querySelectorAll('.plot .picture').length === 2")
             assert not Visit(page).serious_faults()
             page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
             until(page, f"document.documentElement.scrollWidth <= {PHONE[0]}")
@@ -87,3 +90,34 @@ def test_wrong_use(run_dir: Path, capsys: pytest.CaptureFixture[str]) -> None:
             assert message in captured.err
             assert captured.err.count(os.linesep) == 1
             assert not captured.out
+
+
+def test_a_folder_of_runs_stands_for_its_runs(
+    run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = tmp_path / "runs"
+    for name in ("b", "a", "damaged"):
+        shutil.copytree(run_dir, runs / name)
+    (runs / "notes").mkdir()
+    (runs / "damaged" / "metrics.jsonl").write_text("[")
+    assert Watch(runs=[str(runs), str(runs / "a")])._folders() == [runs / "a", runs / "b"]
+    said = capsys.readouterr().err
+    assert said.startswith(f"innerattn: left out: {runs / 'damaged'}")
+    assert said.count("\n") == 1
+    with pytest.raises(RunError, match="not the metrics of a run"):
+        Watch(runs=[str(runs / "damaged")])._folders()
+    shutil.rmtree(runs / "a")
+    shutil.rmtree(runs / "b")
+    with pytest.raises(RunError, match="no run in it can be read"):
+        Watch(runs=[str(runs)])._folders()
+    with pytest.raises(RunError, match=r"run\.json: missing"):
+        Watch(runs=[str(runs / "notes")])._folders()
+
+
+def test_scripts_stand_beside_runs_of_the_same_worlds_only(run_dir: Path, tmp_path: Path) -> None:
+    other = Path(shutil.copytree(run_dir, tmp_path / "other"))
+    assert _scripts_beside([run_dir, other]).keys() == {"hungarian", "greedy"}
+    config = other / "config.toml"
+    config.write_text(config.read_text().replace('"mixed"', '"double"'))
+    reseal(other)
+    assert _scripts_beside([run_dir, other]) == {}

@@ -1,6 +1,8 @@
 """The JSON Schemas: the copies are those of the models, and take what the models take."""
 
 import json
+import re
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -8,9 +10,13 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from innerattn.config import Scenario, load_run_config, write_toml
+from innerattn.config import Fault, Obstacle, Robot, Scenario, Task, load_run_config, write_toml
 from innerattn.config.files import PRESETS
+from innerattn.config.model import Told
 from innerattn.config.schema import COPIES, SCHEMAS, schema_text, write_copies
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
+from reference_directives import value_of
 
 SCENARIO_FILES = sorted(Path(str(PRESETS)).glob("scenarios/*.toml"))
 BUDGET_FILES = sorted(Path(str(PRESETS)).glob("budgets/**/*.toml"))
@@ -67,6 +73,85 @@ def test_a_whole_run_is_valid(tmp_path: Path) -> None:
 )
 def test_what_is_wrong_is_refused(name: str, document: dict[str, Any]) -> None:
     assert not validator(name).is_valid(document)
+
+
+# A key of each part of a scenario whose range the compiled module checks, with what it stands in.
+TOLD = [
+    (part, name)
+    for part, model in (("", Scenario), ("robots", Robot), ("tasks", Task), ("faults", Fault))
+    for name, field in model.model_fields.items()
+    if any(isinstance(one, Told) for one in field.metadata)
+    and name != "victim_places_m"  # at least as many as there may be victims
+]
+
+
+@pytest.mark.parametrize(("part", "name"), TOLD)
+def test_ranges_are_those_that_the_compiled_module_checks(part: str, name: str) -> None:
+    scenario = Scenario.preset("mixed-faults").model_dump(mode="json")
+    model = {"": Scenario, "robots": Robot, "tasks": Task, "faults": Fault}[part]
+    key = model.model_json_schema()["properties"][name]
+    (key,) = (one for one in key.get("anyOf", [key]) if one["type"] != "null")
+    of_list = key["type"] == "array"
+    low, high = (
+        key[end] for end in (("minItems", "maxItems") if of_list else ("minimum", "maximum"))
+    )
+    holder = scenario[part][0] if part else scenario
+    some = [*(holder[name] or [{"shape": "disc", "radius_m": 0.05}])][:1] if of_list else []
+    beyond = [high + 1, low - 1] if of_list or key["type"] == "integer" else [1.1 * high, low - 1.0]
+    for value in beyond:
+        if value < 0 and (of_list or key["type"] == "integer"):
+            continue  # no such length, and no such count
+        holder[name] = some * int(value) if of_list else value
+        with pytest.raises(ValueError, match=r"must be in \S+\.\.=\S+") as refusal:
+            Scenario.model_validate_json(json.dumps(scenario))
+        (ends,) = re.findall(r"must be in (\S+?)\.\.=([\d.e]+)", str(refusal.value))
+        assert tuple(map(float, ends)) == (low, high)
+
+
+def test_every_number_of_a_scenario_has_a_range() -> None:
+    """None is left out of the reference; places and sizes depend on the arena."""
+    free = {
+        "start_m",
+        "half_extents_m",
+        "position_m",
+        "victim_area_m",
+        "radius_m",
+        "onset_step",
+        "value",
+    }
+    for model in (Scenario, Robot, Task, Obstacle, Fault):
+        for name, key in model.model_json_schema()["properties"].items():
+            kinds = [
+                one for one in key.get("anyOf", [key]) if one.get("type") in ("number", "integer")
+            ]
+            assert all("maximum" in one for one in kinds) or name in free, (model, name)
+
+
+@pytest.mark.parametrize(
+    ("key", "text"),
+    [
+        ({"type": "number", "minimum": 0.0, "maximum": 1.0}, "number, 0 to 1"),
+        ({"type": "number", "exclusiveMinimum": 0.0, "maximum": 1.0}, "number, above 0 to 1"),
+        ({"type": "number", "minimum": 0.0, "exclusiveMaximum": 1.0}, "number, 0 to below 1"),
+        ({"type": "integer", "minimum": 1, "maximum": 1_000_000}, "integer, 1 to 1,000,000"),
+        ({"type": "integer", "minimum": 0, "exclusiveMaximum": 2**32}, "integer, at least 0"),
+        ({"type": "integer", "minimum": 0, "exclusiveMaximum": 2**63}, "integer, 0 to below 2**63"),
+        ({"type": "number", "minimum": 0.001, "maximum": 1e5}, "number, 0.001 to 100,000"),
+        ({"type": "number", "minimum": 1e-6}, "number, at least 0.000001"),
+        ({"type": "number", "exclusiveMinimum": 0}, "number, above 0"),
+        ({"type": "number"}, "number"),
+        (
+            {"type": "array", "items": {"type": "string"}, "minItems": 1, "maxItems": 8},
+            "list of string (1 to 8)",
+        ),
+        (
+            {"anyOf": [{"type": "number", "minimum": 1}, {"type": "null"}]},
+            "number, at least 1 or none",
+        ),
+    ],
+)
+def test_the_reference_writes_ranges_in_one_way(key: dict[str, Any], text: str) -> None:
+    assert value_of(key, {}) == text
 
 
 def test_words_are_offered_and_other_words_are_not_refused() -> None:

@@ -1,6 +1,7 @@
 """Run folders as training and evaluation leave them, with scripted motion and made attention."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,11 +25,17 @@ FIELDS = ("actions", "rewards", "positions", "velocities", "victims", "faults")
 
 
 def made_run(
-    folder: Path, situation: str, method: str, seed: int, chance: int | None = None
+    folder: Path,
+    situation: str,
+    method: str,
+    seed: int,
+    chance: int | None = None,
+    keys: Mapping[str, object] | None = None,
 ) -> FinishedRun:
     """Robots go as the greedy dispatch sends them; attention and entropy are random.
 
-    Worlds and what is random are those of ``chance``; None: of ``seed``.
+    Worlds and what is random are those of ``chance``; None: of ``seed``. ``keys`` are further
+    values of the configuration.
     """
     chance = seed if chance is None else chance
     config = load_run_config(
@@ -43,6 +50,7 @@ def made_run(
             "evaluate.long_episodes": LONG,
             "evaluate.long_episode_steps": LONG_STEPS,
             "evaluate.seed": chance,
+            **(keys or {}),
         },
     )
     path = make_run(folder / f"{situation}-{method}-s{seed}", config)

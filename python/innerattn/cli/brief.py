@@ -105,11 +105,14 @@ BRIEF: Mapping[str, Brief] = {
     "watch": Brief(
         "[OPTIONS] RUN ...",
         (
-            ("RUN", "runs in training: folders, latest, or how a name begins"),
+            (
+                "RUN",
+                "runs in training: folders, latest, how a name begins, or a folder that holds runs",
+            ),
             ("--port N", "port of 127.0.0.1; 0: any that is free ({port})"),
             ("--episodes N", "episodes to play for each checkpoint ({episodes})"),
         ),
-        ("latest", "runs/a-s0 runs/a-s1"),
+        ("latest", "runs", "runs/a-s0 runs/a-s1"),
     ),
     "play": Brief(
         "[OPTIONS] RUN|POLICY",

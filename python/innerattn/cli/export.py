@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from innerattn.cli.options import Command, UsageError
-from innerattn.cli.runs import named_run
+from innerattn.cli.runs import existing_run
 from innerattn.policies import SCRIPTED
 from innerattn.zoo import in_zoo
 
@@ -38,7 +38,7 @@ class Export(Command):
             raise UsageError(
                 f"{self.run_folder}: is a script; only trained teams have weights to export"
             )
-        run = named_run(self.run_folder)
+        run = existing_run(self.run_folder)
         if self.output is None and in_zoo(run):
             raise UsageError(f"{self.run_folder}: -o FOLDER must say where to write")
         from innerattn.train.export import export_run

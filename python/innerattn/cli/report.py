@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from innerattn.cli.options import Command, UsageError, check_target
-from innerattn.cli.runs import named_run
+from innerattn.cli.runs import existing_run
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
 from innerattn.zoo import in_zoo
@@ -20,7 +20,7 @@ class Report(Command):
     """Write one page about finished runs: training, scores, attention, sharing and a replay."""
 
     runs: Annotated[tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN [RUN ...]")]
-    """Folders of finished runs; those of one method must differ by their seed alone."""
+    """Folders of finished runs, of any scenarios and methods."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("report.html")
     """File to write, .html."""
     robustness: Path | None = None
@@ -33,7 +33,7 @@ class Report(Command):
             The exit code, 0.
 
         Raises:
-            InnerattnError: a run is not finished, or runs cannot be compared.
+            InnerattnError: a run is not finished, or two runs differ by nothing.
             OSError: the page cannot be written.
         """
         if not self.runs:
@@ -41,7 +41,7 @@ class Report(Command):
         if self.output.suffix != ".html":
             raise UsageError(f"-o {self.output}: must end in .html")
         check_target(self.output)
-        folders = [named_run(run) for run in self.runs]
+        folders = [existing_run(run) for run in self.runs]
         for run, folder in zip(self.runs, folders, strict=True):
             if in_zoo(folder):
                 raise RunError(f"{run}: a team of the package has no metrics for a report")

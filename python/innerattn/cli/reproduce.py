@@ -143,9 +143,6 @@ class Reproduce(LongCommand):
         if len(cases) < len(planned):
             raise UsageError(f"--page: runs of {self.target} differ by more than a page tells")
         check_target(self.page)
-        from innerattn.report.plotly import plotly_script
-
-        plotly_script()
 
     def _write_page(self, runs: Sequence[FinishedRun], notes: Sequence[str]) -> list[Path]:
         if self.page is None or not runs:

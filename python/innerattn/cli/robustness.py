@@ -12,7 +12,7 @@ import tyro
 
 from innerattn.cli.options import LongCommand, UsageError, check_seed, check_target
 from innerattn.cli.progress import MeasuringRobustness
-from innerattn.cli.runs import named_run
+from innerattn.cli.runs import existing_run
 from innerattn.config.files import write_whole
 from innerattn.config.near import did_you_mean
 from innerattn.envs.batch import FAULT_KINDS
@@ -63,7 +63,7 @@ class Robustness(LongCommand):
             from innerattn.report.plots.drawing import check_format
 
             check_format(self.plot)
-        self.runs = tuple(str(named_run(run)) for run in self.runs)
+        self.runs = tuple(str(existing_run(run)) for run in self.runs)
         self._check_once()
         runs = []
         if self.report is not None:

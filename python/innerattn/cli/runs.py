@@ -53,6 +53,23 @@ def named_run(name: str) -> Path:
     return fitting[0] if fitting else path
 
 
+def existing_run(name: str) -> Path:
+    """The run folder that ``name`` means; see `named_run`.
+
+    Raises:
+        RunError: there is nothing; the message asks for the nearest name.
+    """
+    found = named_run(name)
+    if not os.path.lexists(found):
+        raise RunError(f"{found}: no such run folder{_meant(name, [LATEST])}")
+    return found
+
+
+def runs_within(folder: Path) -> list[Path]:
+    """The run folders in a folder that holds runs and is none itself, by name; else none."""
+    return [] if (folder / "run.json").exists() else _runs(folder)
+
+
 def named_policy(name: str, scripts: Collection[str]) -> str:
     """The script or the path of the run that ``name`` means; see `named_run`.
 
@@ -65,17 +82,21 @@ def named_policy(name: str, scripts: Collection[str]) -> str:
     if not found.exists():
         raise RunError(
             f"{name}: neither a run's folder nor one of {', '.join(scripts)}"
-            f"{did_you_mean(name, [*scripts, LATEST, *_names_like(name)])}"
+            f"{_meant(name, [*scripts, LATEST])}"
         )
     return str(found)
 
 
-def _names_like(name: str) -> list[str]:
-    """Names of runs, written as ``name`` is: with their folder, or as those in `runs`."""
-    folder = Path(name).parent
-    if folder == Path():
-        return [run.name for run in _runs()]
-    return [str(run) for run in _runs(folder)]
+def _meant(name: str, words: Collection[str]) -> str:
+    """The end of a message: the nearest run in the same folder, or of the words and runs.
+
+    Names alone are compared: two names in one long path are no more alike than elsewhere.
+    """
+    path = Path(name)
+    if path.parent == Path():
+        return did_you_mean(name, [*words, *(run.name for run in _runs())])
+    known = [run.name for run in _runs(path.parent)]
+    return did_you_mean(path.name, known, lambda found: str(path.parent / found))
 
 
 def _zoo_team(name: str) -> Path:

@@ -16,7 +16,7 @@ from rich.console import Console
 from innerattn.cli.options import LongCommand, UsageError, changed, run_options
 from innerattn.cli.progress import Evaluating, SeveralRuns, Training
 from innerattn.cli.replay import write_replay
-from innerattn.cli.runs import named_run
+from innerattn.cli.runs import existing_run
 from innerattn.cli.seeds import parse_seeds
 from innerattn.cli.streams import droppable_output
 from innerattn.cli.usage import parse, words_of
@@ -155,7 +155,7 @@ class _Train(_Sources):
                     f"--resume {self.resume}: the run has its own configuration; leave out "
                     f"{others[0]}"
                 )
-            return self._resume(self.console(), named_run(self.resume))
+            return self._resume(self.console(), existing_run(self.resume))
         train = self.defaults.train
         chosen: dict[str, object] = {
             "train.method": train.method,
@@ -264,7 +264,14 @@ class _Train(_Sources):
         console.print("Run folders", style="bold")
         for run in runs:
             console.print(f"  {run.folder} ({run.state})", soft_wrap=True)
+        done = [run for run in runs if run.state == "done"]
+        rising = sum(_still_rises(run.folder, run.config) for run in done)
+        if rising:
+            more = f"--train.env-steps {2 * configs[0].train.env_steps}"
+            count = f"{rising} of {len(done)} runs"
+            console.print(f"Rescues still rose in {count}: train longer with {more}")
         if scores is not None:
+            console.print(seeds_line(scores), style="bold", soft_wrap=True)
             folders = f"{runs[0].folder} to {runs[-1].folder}"
             self.say_result(f"{folders}: {seeds_line(scores)}")
         return int(any(run.failure for run in runs))

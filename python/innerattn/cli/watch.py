@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from innerattn.cli.options import Command, UsageError
-from innerattn.cli.runs import named_run
+from innerattn.cli.runs import existing_run, runs_within
+from innerattn.errors import InnerattnError, RunError
 
 if TYPE_CHECKING:
     from innerattn.records import Record
@@ -24,7 +27,7 @@ class Watch(Command):
     """Watch trainings in a browser on this machine while they go on; Ctrl-C ends it."""
 
     runs: Annotated[tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN [RUN ...]")]
-    """Folders of runs, such as those that --seeds makes."""
+    """Folders of runs, such as those that --seeds makes, or a folder that holds runs."""
     port: int = 0
     """Port of 127.0.0.1; 0: any that is free."""
     episodes: int = 4
@@ -37,17 +40,14 @@ class Watch(Command):
             The exit code, 0.
 
         Raises:
-            InnerattnError: no such run, the port is taken, or plotly is not installed.
+            InnerattnError: no such run, or the port is taken.
         """
         self._check()
-        from innerattn.experiments.live import read_live
         from innerattn.report.local_server import LocalServer
         from innerattn.report.watch.pages import watch_pages
 
-        folders = [named_run(run) for run in self.runs]
-        for folder in folders:
-            read_live(folder)
-        pages = watch_pages(folders, _scripts_beside(folders[0]), self._play)
+        folders = self._folders()
+        pages = watch_pages(folders, _scripts_beside(folders), self._play)
         server = LocalServer(pages, self.port)
         greeting = f"Watch at {server.address}\nCtrl-C ends it."
         try:
@@ -64,6 +64,26 @@ class Watch(Command):
         if not 1 <= self.episodes <= 100:
             raise UsageError(f"--episodes {self.episodes}: must be 1 to 100")
 
+    def _folders(self) -> list[Path]:
+        """The runs that were named, and those in folders that were; each once."""
+        from innerattn.experiments.live import read_live
+
+        found: dict[Path, Path] = {}
+        for name in self.runs:
+            folder = existing_run(name)
+            for run in runs_within(folder) or [folder]:
+                try:
+                    read_live(run)
+                except InnerattnError as error:
+                    if run == folder:
+                        raise
+                    print(f"innerattn: left out: {error}", file=sys.stderr)
+                else:
+                    found.setdefault(run.resolve(), run)
+        if not found:
+            raise RunError(f"{', '.join(self.runs)}: no run in it can be read")
+        return list(found.values())
+
     def _play(self, folder: Path) -> Record:
         from innerattn.evaluate import load_trained, run_episodes
         from innerattn.records import FIELDS
@@ -75,10 +95,12 @@ class Watch(Command):
             return run_episodes(policy, worlds, self.episodes, seed, record=FIELDS, num_threads=1)
 
 
-def _scripts_beside(folder: Path) -> dict[str, float]:
-    """Rescues per episode of scripts in the worlds that a run trains in."""
+def _scripts_beside(folders: Sequence[Path]) -> dict[str, float]:
+    """Rescues per episode of scripts in the worlds of training; none where these differ."""
     from innerattn.evaluate.training_score import training_rescues
     from innerattn.records.run_folder import read_config
 
-    config = read_config(folder)
-    return {name: training_rescues(config, name, SCRIPT_EPISODES, 1) for name in SCRIPTS}
+    configs = [read_config(folder) for folder in folders]
+    if any(one.training_scenario != configs[0].training_scenario for one in configs):
+        return {}
+    return {name: training_rescues(configs[0], name, SCRIPT_EPISODES, 1) for name in SCRIPTS}

@@ -66,6 +66,34 @@ class OneOf:
         return value
 
 
+@dataclass(frozen=True)
+class Told:
+    """The range of a number, or of the length of a list, that the compiled module checks.
+
+    It tells readers and editors, and checks nothing itself.
+
+    Attributes:
+        low: the least value that is allowed.
+        high: the largest.
+    """
+
+    low: float
+    high: float
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Give the range to a number or a list, or to that of several types."""
+        found = handler(schema)
+        for one in found.get("anyOf", [found]):
+            if one["type"] == "array":
+                one |= {"minItems": self.low, "maxItems": self.high}
+            elif one["type"] != "null":
+                one.pop("exclusiveMaximum", None)
+                one |= {"minimum": self.low, "maximum": self.high}
+        return found
+
+
 class Model(BaseModel):
     """A frozen model that refuses unknown keys, infinities, NaN and values of another type."""
 

@@ -15,7 +15,7 @@ from pydantic import Field, PrivateAttr, ValidationError
 
 from innerattn import _core
 from innerattn.config.files import preset_names, preset_table, toml_table
-from innerattn.config.model import ADDED_LATER, Model, config_error
+from innerattn.config.model import ADDED_LATER, Model, Told, config_error
 from innerattn.config.near import did_you_mean
 from innerattn.errors import ConfigError
 from innerattn.shown import Shown
@@ -30,35 +30,46 @@ Count = Annotated[int, Field(ge=0, lt=2**32)]
 class Robot(Model):
     """One robot of the team."""
 
-    name: str = Field(description="unique name")
+    name: str = Field(description="unique name; 1 to 64 letters, digits, '_' or '-'")
     kind: str = Field(description="kind, shared by robots that are alike")
     abilities: tuple[str, ...] = Field(description="what it can do for a victim")
-    max_speed_mps: float = Field(description="speed limit [m/s]")
-    mass_kg: float = Field(description="mass [kg]")
-    radius_m: float = Field(0.05, description="radius of the disc [m]")
-    drive_force_n: float = Field(5.0, description="force of a full command [N]")
+    max_speed_mps: Annotated[float, Told(0.01, 100.0)] = Field(description="speed limit [m/s]")
+    mass_kg: Annotated[float, Told(0.01, 1_000.0)] = Field(description="mass [kg]")
+    radius_m: Annotated[float, Told(0.005, 10.0)] = Field(
+        0.05, description="radius of the disc [m]"
+    )
+    drive_force_n: Annotated[float, Told(0.0, 1e5)] = Field(
+        5.0, description="force of a full command [N]"
+    )
     start_m: Annotated[tuple[float, float] | None, ADDED_LATER] = Field(
-        None, description="place when an episode starts [m]; None: a new random place each episode"
+        None,
+        description="place when an episode starts, inside the walls [m]; "
+        "None: a new random place each episode",
     )
 
 
 class Task(Model):
     """One kind of emergency: the abilities a victim needs, each from a robot of its own."""
 
-    name: str = Field(description="unique name")
-    needs: tuple[str, ...] = Field(description="needed abilities; the same may stand twice")
+    name: str = Field(description="unique name; 1 to 64 letters, digits, '_' or '-'")
+    needs: Annotated[tuple[str, ...], Told(1, 8)] = Field(
+        description="needed abilities; the same may stand twice"
+    )
 
 
 class Obstacle(Model):
     """A fixed body in the way."""
 
     shape: Literal["disc", "box"] = Field(description="outline")
-    radius_m: float | None = Field(None, description="radius of a disc [m]")
+    radius_m: float | None = Field(
+        None, description="radius of a disc, 0.005 to arena_half_width_m [m]"
+    )
     half_extents_m: tuple[float, float] | None = Field(
-        None, description="half width and half height of a box [m]"
+        None,
+        description="half width and half height of a box, each 0.005 to arena_half_width_m [m]",
     )
     position_m: tuple[float, float] | None = Field(
-        None, description="centre [m]; None: a new random place each episode"
+        None, description="centre, inside the walls [m]; None: a new random place each episode"
     )
 
 
@@ -80,17 +91,17 @@ class Fault(Model):
     value: float = Field(
         description="how badly; "
         + "; ".join(
-            f"{name}: {meaning}" + f" [{unit}]" * bool(unit)
-            for name, unit, _, _, _, meaning in _core.FAULT_KINDS
+            f"{name}: {meaning}, {low:.4g} to {high:.4g}" + f" [{unit}]" * bool(unit)
+            for name, unit, low, high, _, meaning in _core.FAULT_KINDS
         )
     )
     onset_step: Count = Field(
         0, description="control step at which it begins, or from which on it may begin at random"
     )
-    onset_rate_hz: float | None = Field(
+    onset_rate_hz: Annotated[float | None, Told(1e-6, 1_000.0)] = Field(
         None, description="how often it begins at random while it is not there [1/s]; None: once"
     )
-    duration_steps: Count | None = Field(
+    duration_steps: Annotated[Count | None, Told(1, 1_000_000)] = Field(
         None, description="control steps it lasts; None: to the end of the episode"
     )
 
@@ -158,32 +169,54 @@ class Scenario(Model, Shown):
         description="single: one victim at a time; double: one of each task, always; "
         "mixed: waves of 1 to max_victims victims of random tasks",
     )
-    robots: tuple[Robot, ...] = Field(default_factory=_default_team, description="the team")
-    tasks: tuple[Task, ...] = Field(default_factory=_default_tasks, description="kinds of victim")
-    max_victims: Count = Field(2, description="most victims of a wave in mixed")
-    obstacles: tuple[Obstacle, ...] = Field((), description="fixed bodies in the way")
-    arena_half_width_m: float = Field(1.0, description="half the side of the square arena [m]")
-    rescue_radius_m: float = Field(0.15, description="how near a helper must be [m]")
-    spawn_clearance_m: float = Field(
+    robots: Annotated[tuple[Robot, ...], Told(1, 64)] = Field(
+        default_factory=_default_team, description="the team"
+    )
+    tasks: Annotated[tuple[Task, ...], Told(1, 32)] = Field(
+        default_factory=_default_tasks, description="kinds of victim"
+    )
+    max_victims: Annotated[Count, Told(1, 32)] = Field(
+        2, description="most victims of a wave in mixed"
+    )
+    obstacles: Annotated[tuple[Obstacle, ...], Told(0, 64)] = Field(
+        (), description="fixed bodies in the way"
+    )
+    arena_half_width_m: Annotated[float, Told(0.2, 100.0)] = Field(
+        1.0, description="half the side of the square arena [m]"
+    )
+    rescue_radius_m: Annotated[float, Told(0.001, 10.0)] = Field(
+        0.15, description="how near a helper must be [m]"
+    )
+    spawn_clearance_m: Annotated[float, Told(0.0, 10.0)] = Field(
         0.2, description="least distance of a new victim to robots [m]"
     )
-    wall_clearance_m: float = Field(0.1, description="least distance of a new victim to walls [m]")
+    wall_clearance_m: Annotated[float, Told(0.0, 10.0)] = Field(
+        0.1, description="least distance of a new victim to walls [m]"
+    )
     victim_area_m: Annotated[tuple[float, float, float, float] | None, ADDED_LATER] = Field(
         None,
         description="rectangle in which victims appear: least x, least y, most x, most y [m]; "
         "None: the arena",
     )
-    victim_places_m: Annotated[tuple[tuple[float, float], ...], ADDED_LATER] = Field(
+    victim_places_m: Annotated[tuple[tuple[float, float], ...], ADDED_LATER, Told(0, 256)] = Field(
         (), description="the only places at which victims appear [m]; none given: any"
     )
-    episode_steps: Count = Field(25, description="length of an episode [control steps]")
-    end_when_rescued: Count | None = Field(
+    episode_steps: Annotated[Count, Told(1, 1_000_000)] = Field(
+        25, description="length of an episode [control steps]"
+    )
+    end_when_rescued: Annotated[Count | None, Told(1, 1_000_000)] = Field(
         None, description="end an episode after so many rescues; None: never"
     )
-    dt_s: float = Field(0.1, description="control period [s]")
-    substeps: Count = Field(6, description="physics steps per control period")
-    damping: float = Field(0.25, description="share of speed lost per control period")
-    friction: float = Field(0.0, description="friction coefficient at contacts")
+    dt_s: Annotated[float, Told(0.001, 1.0)] = Field(0.1, description="control period [s]")
+    substeps: Annotated[Count, Told(1, 1_000)] = Field(
+        6, description="physics steps per control period"
+    )
+    damping: Annotated[float, Told(0.0, 1.0)] = Field(
+        0.25, description="share of speed lost per control period"
+    )
+    friction: Annotated[float, Told(0.0, 10.0)] = Field(
+        0.0, description="friction coefficient at contacts"
+    )
     engine: Literal["rapier", "discs"] = Field(
         "rapier",
         description="contacts; rapier: rigid bodies in substeps; discs: exact, without friction",
@@ -194,19 +227,31 @@ class Scenario(Model, Shown):
     rescue_credit: Literal["helpers", "team"] = Field(
         "helpers", description="who is rewarded for a rescue"
     )
-    rescue_reward: float = Field(1.0, description="reward of one rescue")
+    rescue_reward: Annotated[float, Told(-1e6, 1e6)] = Field(
+        1.0, description="reward of one rescue"
+    )
     shaping: Literal["progress", "potential", "none"] = Field(
         "progress", description="reward for coming nearer to victims"
     )
-    shaping_weight: float = Field(1.0, description="weight of the shaping reward [1/m]")
-    shaping_discount: float = Field(0.95, description="discount used by potential shaping")
-    contact_cost: float = Field(0.0, description="cost of a control step with a contact")
-    action_cost: float = Field(0.0, description="cost of a control step with the drive on")
+    shaping_weight: Annotated[float, Told(-1e6, 1e6)] = Field(
+        1.0, description="weight of the shaping reward [1/m]"
+    )
+    shaping_discount: Annotated[float, Told(0.0, 1.0)] = Field(
+        0.95, description="discount used by potential shaping"
+    )
+    contact_cost: Annotated[float, Told(-1e6, 1e6)] = Field(
+        0.0, description="cost of a control step with a contact"
+    )
+    action_cost: Annotated[float, Told(-1e6, 1e6)] = Field(
+        0.0, description="cost of a control step with the drive on"
+    )
     victim_order: Literal["relevant", "slot"] = Field(
         "relevant",
         description="order of victims in an observation; relevant: helpable first, then nearest",
     )
-    faults: tuple[Fault, ...] = Field((), description="what goes wrong with which robot, and when")
+    faults: Annotated[tuple[Fault, ...], Told(0, 256)] = Field(
+        (), description="what goes wrong with which robot, and when"
+    )
     observe_faults: bool = Field(
         False, description="let robots see the faults in effect, their own and their teammates'"
     )

@@ -1,7 +1,7 @@
 """JSON Schemas of the scenario's file and of the run's file, for editors that complete and check.
 
-They tell keys, types, words and defaults. Rules between keys, and most ranges of a scenario, are
-checked only when a file is loaded. `python -m innerattn.config.schema` writes the copies that are
+They tell keys, types, words, ranges and defaults. Rules between keys are checked only when a file
+is loaded. `python -m innerattn.config.schema` writes the copies that are
 part of the package.
 """
 

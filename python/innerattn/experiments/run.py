@@ -211,10 +211,7 @@ def refuse_unlike(runs: Sequence[FinishedRun]) -> None:
                     f"{run.folder}: train.{name} = {getattr(run.config.train, name)!r}, "
                     f"but it is listed as {label!r}"
                 )
-        what = run.config.in_use()
-        for free in ("seed", "threads", "device", "compile", "log_every_env_steps"):
-            what["train"].pop(free)
-        worlds = what["evaluate"].pop("seed")
+        what, worlds = comparable(run.config), run.config.evaluate.seed
         first = measured.setdefault((run.situation, run.seed), (run.folder, worlds))
         if worlds != first[1]:
             raise RunError(
@@ -227,6 +224,15 @@ def refuse_unlike(runs: Sequence[FinishedRun]) -> None:
                 f"{run.folder} and {other}: are listed as the same but for the seed, and differ "
                 f"in {', '.join(differing)}"
             )
+
+
+def comparable(config: RunConfig) -> dict[str, dict[str, Any]]:
+    """The values, by section and key, that runs share which differ by their seeds alone."""
+    what = config.in_use()
+    for free in ("seed", "threads", "device", "compile", "log_every_env_steps"):
+        what["train"].pop(free)
+    what["evaluate"].pop("seed")
+    return what
 
 
 def refuse_without_steps(runs: Sequence[FinishedRun]) -> None:

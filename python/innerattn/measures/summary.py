@@ -45,10 +45,13 @@ class Performance:
 
     def script_score(self, name: str) -> float | None:
         """The score of a scripted policy; None where the policy has none."""
-        if self.score is None:
-            return None
-        least, most = self.scripted["random"].mean, self.scripted["hungarian"].mean
-        return (self.scripted[name].mean - least) / (most - least)
+        return None if self.score is None else script_score(self.scripted, name)
+
+
+def script_score(scripted: Mapping[str, Estimate], name: str) -> float:
+    """The score of a scripted policy, from rescues per episode of all of them by name."""
+    least, most = scripted["random"].mean, scripted["hungarian"].mean
+    return (scripted[name].mean - least) / (most - least)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,15 +10,21 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import PHONE, WIDE, opened_browser, until, visit
+from made_run import made_run
 from playwright.sync_api import Browser
 
 from innerattn.cli.main import main
-from innerattn.errors import MissingLibraryError, RunError
+from innerattn.errors import RunError
 from innerattn.experiments.run import FinishedRun
 from innerattn.report.runs.page import read_robustness, read_runs, runs_page
 from innerattn.stats import Estimate
 from innerattn.stats.text import format_estimate
 
+# Texts of plots that reach out of their picture.
+OUTSIDE = """[...document.querySelectorAll(".picture text")].filter((text) => {
+  const box = text.closest("svg").getBoundingClientRect(), own = text.getBoundingClientRect();
+  return own.left < box.left - 1 || own.right > box.right + 1 || own.bottom > box.bottom + 1;
+}).map((text) => text.textContent).join()"""
 INTERVAL = {"mean": 0.5, "low": 0.25, "high": 0.75}
 ROBUSTNESS: dict[str, Any] = {
     "schema_version": 1,
@@ -92,29 +97,88 @@ def test_it_tells_what_was_trained(page: str, mixed: list[FinishedRun]) -> None:
 def test_plots_hold_the_courses_of_the_runs(page: str) -> None:
     plots = {plot["title"]: plot for plot in plots_of(page)}
     assert list(plots) == [
-        "Rescues per training episode",
-        "Attention entropy",
-        "Attention around handoffs",
+        "Rescues per training episode: mixed",
+        "Attention entropy: td-inner, mixed",
+        "Attention around handoffs: td-inner, mixed",
         "Retention under faults",
     ]
-    curve = plots["Rescues per training episode"]
+    curve = plots["Rescues per training episode: mixed"]
     assert curve["levels"].keys() == {"hungarian", "greedy"}
-    names = [one["name"] for one in curve["traces"] if one.get("showlegend", True)]
-    assert names == ["td-inner, mixed", "td-uniform, mixed"]
-    entropy = plots["Attention entropy"]
-    assert [one["name"] for one in entropy["traces"]] == [
-        "food_0",
-        "food_1",
-        "navigation_0",
-        "medical_0",
+    assert [line["name"] for line in curve["lines"]] == ["td-inner", "td-uniform"]
+    assert len(curve["lines"][0]["low"]) == len(curve["lines"][0]["x"])  # a band over three runs
+    entropy = plots["Attention entropy: td-inner, mixed"]["lines"]
+    looks = [(line["name"], line["colour"], line["dash"]) for line in entropy]
+    assert looks == [  # as in the replay: a colour for a kind, a dash for a twin
+        ("food_0", "kind-0", 0),
+        ("food_1", "kind-0", 1),
+        ("navigation_0", "kind-1", 0),
+        ("medical_0", "kind-2", 0),
     ]
-    retention = plots["Retention under faults"]["traces"][0]
-    assert retention["x"] == ["motor gain", "all"]
-    assert retention["error_y"]["array"] == [0.25, 0.25]
+    retention = plots["Retention under faults"]
+    assert retention["rows"] == ["motor gain", "blackout", "all kinds"]
+    first = retention["lines"][0]
+    assert (first["x"], first["low"], first["y"], first["high"]) == (
+        [0, 2],
+        [0.25, 0.25],
+        [0.5, 0.5],
+        [0.75, 0.75],
+    )
+
+
+def test_scripts_have_the_scores_that_the_terminal_shows(
+    page: str, mixed: list[FinishedRun]
+) -> None:
+    text = text_of(page)
+    scripted = min(mixed, key=lambda run: run.seed).summary["scripted"]
+    least, greedy, most = (scripted[name]["mean"] for name in ("random", "greedy", "hungarian"))
+    shown = format_estimate(Estimate.from_json(scripted["greedy"]))
+    assert f" greedy {shown} {(greedy - least) / (most - least):.2f} " in text
+    assert re.search(r" hungarian \S+ \[\S+ \S+ 1\.00 ", text)
+
+
+def test_it_opens_with_the_scores_the_best_first(page: str) -> None:
+    (line,) = re.findall(r'<p class="verdict">(.*?)</p>', page)
+    head = "Score (0 plays like random, 1 like hungarian): "
+    assert line.startswith(head)
+    found = [
+        (float(score), name)
+        for name, score in re.findall(r"(td-\w+) on mixed mean of \d runs ([\d.]+) \[", line)
+    ]
+    assert {name for _, name in found} == {"td-inner", "td-uniform"}
+    assert found == sorted(found, reverse=True)
+
+
+def test_scenarios_and_settings_of_every_kind_stand_side_by_side(
+    runs: list[FinishedRun], tmp_path: Path
+) -> None:
+    """Three situations or settings, two of which have one method, seed and situation."""
+    wide = made_run(
+        tmp_path / "wide", "mixed", "td-inner", 0, keys={"scenario.arena_half_width_m": 3.0}
+    )
+    slow = made_run(tmp_path / "slow", "mixed", "ppo-inner", 0, keys={"ppo.gamma": 0.9})
+    fast = made_run(tmp_path / "fast", "mixed", "ppo-inner", 0)
+    named = [
+        run.folder.rename(run.folder.parent / name)
+        for run, name in ((wide, "wide"), (slow, "slow"), (fast, "fast"))
+    ]
+    every = read_runs([*(run.folder for run in runs), *named])
+    page = runs_page(every)
+    assert len(page) < 1_500_000
+    (line,) = re.findall(r"<h1>(.*?)</h1>", page)
+    assert line == (
+        "td-inner on mixed as in mixed-td-inner-s2, td-uniform on mixed as in mixed-td-inner-s2, "
+        "ppo-inner on single, td-inner on mixed as in wide, "
+        "ppo-inner on mixed as in slow, ppo-inner on mixed as in fast"
+    )
+    titles = [plot["title"] for plot in plots_of(page)]
+    assert "Rescues per training episode: single" in titles
+    assert "Rescues per training episode: mixed as in wide" in titles
+    assert "; and 2 more" in page
+    assert "Shown, since a replay holds up to 4 runs of the same worlds: " in page
 
 
 def test_runs_in_other_worlds_show_the_first_alone(page: str) -> None:
-    assert "Runs were recorded in different worlds, so only the first is shown." in page
+    assert "a replay holds up to 4 runs of the same worlds: mixed-td-inner-s" in page
     assert page.count("<iframe") == 1
 
 
@@ -158,16 +222,11 @@ def test_the_command(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
         assert captured.count("\n") == 1
 
 
-def test_what_is_missing_is_named(
-    mixed: list[FinishedRun], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_missing_is_named(mixed: list[FinishedRun], tmp_path: Path) -> None:
     with pytest.raises(RunError, match="not a document of innerattn robustness"):
         runs_page(mixed[:1], {"policies": [{}]})
     with pytest.raises(RunError, match="not a document of innerattn robustness"):
         read_robustness(tmp_path / "nothing.json")
-    monkeypatch.setitem(sys.modules, "plotly.offline", None)
-    with pytest.raises(MissingLibraryError, match=r"plotly: pip install .innerattn\[report\]"):
-        runs_page(mixed[:1])
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -179,9 +238,10 @@ def test_everybody_can_read_it(
     path.write_text(page, "utf-8")
     with visit(browser, path, size, theme) as seen:
         until(seen.page, "document.documentElement.dataset.drawn === 'true'")
-        assert seen.page.locator(".plot .main-svg").count() >= 4
+        assert seen.page.locator(".plot .picture").count() == 4
+        assert not seen.page.evaluate(OUTSIDE)
         replay = seen.page.frame_locator("iframe")
         replay.get_by_role("button", name="Next event").click()
-        assert replay.locator("canvas").count() == 1
+        assert replay.locator("canvas").count() == 2  # td-inner and td-uniform of one seed
         assert not seen.serious_faults()
         assert seen.page.evaluate("document.documentElement.scrollWidth") <= size[0]

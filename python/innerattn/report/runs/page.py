@@ -17,15 +17,15 @@ from innerattn.experiments.paper.fig4 import fig4
 from innerattn.experiments.paper.fig5 import evidence
 from innerattn.experiments.paper.table2 import table2
 from innerattn.experiments.plan import Case
-from innerattn.experiments.run import FinishedRun, by_method, read_run, refuse_unlike
+from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.records.run_folder import read_config
 from innerattn.report.html import fill, html_table, json_text, shared_text
 from innerattn.report.paper.fig4 import entropy_table
 from innerattn.report.paper.fig5 import evidence_summary
 from innerattn.report.paper.table2 import sharing_summary
-from innerattn.report.plotly import plot_script, plotly_script
 from innerattn.report.replay.data import MOST_RECORDS, refuse_what_cannot_replay
 from innerattn.report.replay.page import replay_page
+from innerattn.report.runs.groups import grouped, in_situations
 from innerattn.report.runs.plots import (
     Plot,
     curves_plot,
@@ -38,6 +38,7 @@ from innerattn.report.runs.tables import (
     robustness_table,
     scores_table,
     training_table,
+    verdict,
     versions_text,
 )
 
@@ -53,18 +54,15 @@ def read_runs(folders: Sequence[Path]) -> list[FinishedRun]:
     """The finished runs in some folders that one page can tell of.
 
     Raises:
-        RunError: a folder holds no finished and measured run, or they cannot be compared.
+        RunError: a folder holds no finished and measured run, or two runs differ by nothing.
         ConfigError: a configuration is not valid.
-        MissingLibraryError: plotly is not installed.
     """
     found = []
     for folder in folders:
         config = read_config(folder)
         case = Case(config.scenario.situation, config.train.method, config.train.seed)
         found.append(read_run(case, folder.resolve()))
-    by_method(found)
-    refuse_unlike(found)
-    plotly_script()
+    grouped(found)
     return found
 
 
@@ -78,7 +76,7 @@ def runs_page(
     Every number is stored in the runs or in ``robustness``, or is a mean over the runs.
 
     Args:
-        runs: finished runs that can be compared, at least one, with their single steps.
+        runs: finished runs of any scenarios and methods, at least one, with their single steps.
         robustness: the document of ``innerattn robustness --json``.
         notes: what is said above all else, such as which runs are missing.
 
@@ -86,12 +84,11 @@ def runs_page(
         The page; it loads nothing from elsewhere.
 
     Raises:
-        RunError: runs cannot be compared, or hold no metrics; or ``robustness`` is no such
+        RunError: two runs differ by nothing, or hold no metrics; or ``robustness`` is no such
             document.
-        MissingLibraryError: plotly is not installed.
     """
-    groups = list(by_method(runs).values())
-    refuse_unlike(runs)
+    groups = grouped(runs)
+    runs = [run for group in groups for run in group]
     plots: list[Plot] = []
     parts = [
         *(f"<p>{escape(note)}</p>" for note in notes),
@@ -103,15 +100,15 @@ def runs_page(
     if robustness is not None:
         parts.append(_robustness(robustness, plots))
     parts.append(_replay(runs))
-    title = ", ".join(dict.fromkeys(f"{run.method} on {run.situation}" for run in runs))
+    title = ", ".join(f"{group[0].method} on {group[0].situation}" for group in groups)
     count = "1 run" if len(runs) == 1 else f"{len(runs)} runs"
     return fill(
         _text("report.html"),
         title=escape(title),
+        verdict=escape(verdict(groups)),
         subtitle=escape(f"{count}; {versions_text(runs)}"),
         style=shared_text("page.css"),
-        library=plotly_script(),
-        script=f"{plot_script()}\n{_text('report.js')}",
+        script=f"{shared_text('dom.js', 'marks.js', 'plots.js')}\n{_text('report.js')}",
         parts="\n".join(parts),
         plots=json_text([plot.to_json() for plot in plots]),
     )
@@ -124,11 +121,8 @@ def _section(title: str, *parts: str) -> str:
 def _figure(plot: Plot, plots: list[Plot]) -> str:
     """Where the page's script draws a plot, which is added to ``plots``."""
     plots.append(plot)
-    label = escape(f"{plot.title}. {plot.note}", quote=True)
-    return (
-        f'<figure><div class="plot" role="img" aria-label="{label}"></div>'
-        f"<figcaption>{escape(plot.note)}</figcaption></figure>"
-    )
+    note = escape(plot.note)
+    return f'<figure><div class="plot"></div><figcaption>{note}</figcaption></figure>'
 
 
 def _details(summary: str, inside: str) -> str:
@@ -141,7 +135,9 @@ def _training(
     curves = learning_curves(groups)
     parts = [html_table(training_table(runs))]
     if curves:
-        parts.append(_figure(curves_plot(curves), plots))
+        for worlds in dict.fromkeys(curve.situation for curve in curves):
+            alike = [curve for curve in curves if curve.situation == worlds]
+            parts.append(_figure(curves_plot(alike), plots))
         parts.append(_details("Numbers of the curve", html_table(curve_table(curves))))
     for group in groups:
         run = group[0]
@@ -157,23 +153,32 @@ def _attention(
     courses = [course for course in fig4(runs) if course.chooses]
     if not courses:
         return _section("Attention", "<p>These runs have no learnt attention.</p>")
-    parts = [_figure(entropy_plot(courses), plots), html_table(entropy_table(courses))]
+    scenarios = {(run.situation, run.method): run.config.scenario for run in runs}
+    parts = [
+        _figure(entropy_plot(course, scenarios[course.situation, course.method]), plots)
+        for course in courses
+    ]
+    parts.append(html_table(entropy_table(courses)))
     found = [one for one in map(evidence, groups) if one is not None]
     if found:
-        parts += [_figure(handoff_plot(found), plots), html_table(evidence_summary(found))]
+        parts += [_figure(handoff_plot(one), plots) for one in found]
+        parts.append(html_table(evidence_summary(found)))
     else:
         parts.append("<p>No handoff was recorded that tells anything about attention.</p>")
     return _section("Attention", *parts)
 
 
 def _sharing(groups: Sequence[Sequence[FinishedRun]]) -> str:
+    parts = []
+    for situation, alike in in_situations(groups).items():
+        parts.append(f"<h3>{escape(situation)}</h3>")
+        try:
+            table = table2(alike)
+        except RunError as error:
+            parts.append(f"<p>Left out: {escape(str(error))}.</p>")
+        else:
+            parts.append(html_table(sharing_summary(table, situation)))
     title = "How two robots share the work (Table II)"
-    try:
-        table = table2(groups)
-    except RunError as error:
-        return _section(title, f"<p>Left out: {escape(str(error))}.</p>")
-    situations = dict.fromkeys(row.situation for row in table.rows)
-    parts = [html_table(sharing_summary(table, situation)) for situation in situations]
     return _section(title, f"<p>{escape(_SHARING)}</p>", *parts)
 
 
@@ -186,21 +191,28 @@ def _robustness(document: dict[str, Any], plots: list[Plot]) -> str:
 
 
 def _replay(runs: Sequence[FinishedRun]) -> str:
-    """The replay of runs that were recorded in the same worlds, or of the first."""
-    shown = list(runs[:MOST_RECORDS])
-    names = [run.folder.name for run in shown]
+    """The replay of the first run, and of others that were recorded in the same worlds."""
+    shown: list[FinishedRun] = []
+    for run in runs:
+        try:
+            refuse_what_cannot_replay([one.recorded for one in (*shown, run)], _folders(shown, run))
+        except RunError:
+            continue
+        shown.append(run)
+    if not shown:
+        return _section("Episodes", "<p>Left out: no run was recorded step by step.</p>")
     note = ""
-    try:
-        refuse_what_cannot_replay([run.recorded for run in shown], names)
-    except RunError:
-        shown, names = shown[:1], names[:1]
-        note = "<p>Runs were recorded in different worlds, so only the first is shown.</p>"
-    try:
-        page = replay_page([run.recorded for run in shown], names)
-    except RunError as error:
-        return _section("Episodes", f"<p>Left out: {escape(str(error))}.</p>")
+    if len(shown) < len(runs):
+        names = ", ".join(_folders(shown))
+        note = f"<p>Shown, since a replay holds up to {MOST_RECORDS} runs of the same worlds: "
+        note += f"{escape(names)}.</p>"
+    page = replay_page([run.recorded for run in shown], _folders(shown))
     frame = f'<iframe title="Replay" srcdoc="{escape(page, quote=True)}"></iframe>'
     return _section("Episodes", note, frame)
+
+
+def _folders(runs: Sequence[FinishedRun], *more: FinishedRun) -> list[str]:
+    return [run.folder.name for run in (*runs, *more)]
 
 
 def read_robustness(path: Path) -> dict[str, Any]:

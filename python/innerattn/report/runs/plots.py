@@ -1,21 +1,44 @@
-"""Interactive plots of the page about runs, as data for plotly.js. They compute nothing."""
+"""Interactive plots of the pages about runs, as data for ``web/plots.js``. They compute nothing."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
+from innerattn.config import Scenario
 from innerattn.experiments.learning.curves import LearningCurve
 from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence
 from innerattn.stats.seeds import BAND_NAMES, SeedCurve
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-"""Okabe and Ito's, told apart with every common colour blindness."""
+_COLOURS = 6  # of lines, and of kinds of robots, in ``web/page.css``
 
-_DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
+
+@dataclass(frozen=True)
+class Line:
+    """A course, or values of some rows of a plot.
+
+    Attributes:
+        name: what it is.
+        x: times, or numbers of rows.
+        y: values at these; None where there is none.
+        colour: a colour of ``web/page.css``, such as "series-0".
+        dash: 0 for a solid line, more for other dashes.
+        low: lower ends of its band or intervals; empty for none.
+        high: upper ends, likewise.
+        thin: whether it stands back.
+    """
+
+    name: str
+    x: Sequence[float]
+    y: Sequence[float | None]
+    colour: str
+    dash: int = 0
+    low: Sequence[float | None] = ()
+    high: Sequence[float | None] = ()
+    thin: bool = False
 
 
 @dataclass(frozen=True)
@@ -25,117 +48,121 @@ class Plot:
     Attributes:
         title: what it shows.
         note: what its lines and bands are.
-        traces: for plotly.js.
+        lines: courses; with ``rows``, points.
         x: title of the horizontal axis.
-        y: title of the vertical axis.
-        levels: dashed horizontal lines by name.
+        y: title of the values.
+        levels: dashed lines by name.
+        rows: names of rows, from the top; empty for courses over time.
     """
 
     title: str
     note: str
-    traces: list[dict[str, Any]]
+    lines: Sequence[Line]
     x: str
     y: str
     levels: dict[str, float]
+    rows: Sequence[str] = ()
 
     def to_json(self) -> dict[str, Any]:
         """What the page's script draws."""
-        axes = {"x": self.x, "y": self.y}
-        return {"title": self.title, "traces": self.traces, **axes, "levels": self.levels}
+        return asdict(self)
+
+
+def line_colour(index: int) -> dict[str, Any]:
+    """Colour and dash of a line by its number: no two are alike among the first 36."""
+    return {"colour": f"series-{index % _COLOURS}", "dash": index // _COLOURS}
 
 
 def curves_plot(curves: Sequence[LearningCurve]) -> Plot:
-    """Rescues per training episode against env-steps."""
-    traces = []
-    for index, curve in enumerate(curves):
-        name = _label(curve)
-        traces += _banded(name, curve.env_steps.tolist(), curve.rescues, index)
+    """Rescues per training episode against env-steps, of curves in the same worlds."""
     first = curves[0]
     return Plot(
-        title="Rescues per training episode",
-        note=f"{_bands([curve.rescues for curve in curves])} Dashed: scripts in the worlds of the "
-        f"first run's evaluation, situation {first.situation}.",
-        traces=traces,
+        title=f"Rescues per training episode: {first.situation}",
+        note=f"{_bands([curve.rescues for curve in curves])} Dashed: scripts in the same worlds.",
+        lines=[
+            _banded(curve.method, curve.env_steps.tolist(), curve.rescues, **line_colour(index))
+            for index, curve in enumerate(curves)
+        ],
         x="env-steps",
         y="rescues per episode",
         levels=dict(first.scripts),
     )
 
 
-def entropy_plot(courses: Sequence[EntropyCourse]) -> Plot:
-    """Attention entropy of each robot against env-steps."""
-    traces = []
-    for which, course in enumerate(courses):
-        by_robot, times = course.by_robot(), course.env_steps.tolist()
-        for index, robot in enumerate(course.robots):
-            name = robot if len(courses) == 1 else f"{robot}, {_label(course)}"
-            line = {"color": COLOURS[index % len(COLOURS)], "dash": _DASHES[which % len(_DASHES)]}
-            traces.append(_line(name, times, by_robot.mean[:, index].tolist(), line))
-    evens = {f"even, ln {len(one.robots) - 1}": one.even_nats for one in courses}
+def entropy_plot(course: EntropyCourse, scenario: Scenario) -> Plot:
+    """Attention entropy of each robot against env-steps, in the colours of the replay."""
+    by_robot, times = course.by_robot(), course.env_steps.tolist()
+    kinds = list(dict.fromkeys(robot.kind for robot in scenario.robots))
+    lines = []
+    for index, robot in enumerate(scenario.robots):
+        twins = sum(other.kind == robot.kind for other in scenario.robots[:index])
+        colour = f"kind-{kinds.index(robot.kind) % _COLOURS}"
+        lines.append(Line(robot.name, times, _known(by_robot.mean[:, index]), colour, twins))
     return Plot(
-        title="Attention entropy",
+        title=f"Attention entropy: {_label(course)}",
         note="Mean over heads, and over runs. Less is more selective; even attention is dashed.",
-        traces=traces,
+        lines=lines,
         x="env-steps",
         y="entropy [nats]",
-        levels=evens,
+        levels={f"even, ln {len(course.robots) - 1}": course.even_nats},
     )
 
 
-def handoff_plot(found: Sequence[Evidence]) -> Plot:
+def handoff_plot(part: Evidence) -> Plot:
     """The weights that robots give to their partners around handoffs."""
-    traces = []
+    times = (part.offsets * part.step_s).tolist()
     words = {"before": "partner of the first rescue", "to_be": "partner of the second rescue"}
-    for which, part in enumerate(found):
-        times = (part.offsets * part.step_s).tolist()
-        name = "" if len(found) == 1 else f"{_label(part)}: "
-        for index, (role, word) in enumerate(words.items()):
-            weight = part.robot[role].weight
-            traces += _banded(f"{name}{word}", times, weight, index, _DASHES[which % 2])
-            line = {"color": COLOURS[index], "dash": "dot", "width": 1.5}
-            control = part.control[role].weight.mean.tolist()
-            traces.append(_line(f"{name}bystander, {word}", times, control, line))
-    bands = _bands([part.robot["to_be"].weight for part in found])
+    lines = []
+    for index, (role, word) in enumerate(words.items()):
+        colour = f"series-{index}"
+        lines.append(_banded(word, times, part.robot[role].weight, colour=colour))
+        control = _known(part.control[role].weight.mean)
+        lines.append(Line(f"bystander, {word}", times, control, colour, 2, thin=True))
     return Plot(
-        title="Attention around handoffs",
-        note=f"At 0 s the robot completes its first rescue. {bands} Dotted: a robot that could "
-        "have helped and does not, at the same steps.",
-        traces=traces,
+        title=f"Attention around handoffs: {_label(part)}",
+        note="At 0 s the robot completes its first rescue. "
+        f"{_bands([part.robot['to_be'].weight])} Dotted: a robot that could have helped and does "
+        "not, at the same steps.",
+        lines=lines,
         x="time since the first rescue [s]",
         y="attention weight",
-        levels={"even": found[0].even},
+        levels={"even": part.even},
     )
 
 
 def robustness_plot(document: Mapping[str, Any]) -> Plot:
     """Retention by kind of fault."""
-    traces = []
-    for index, one in enumerate(document["policies"]):
-        known = {kind: value for kind, value in one["by_kind"].items() if value is not None}
-        means = [value["mean"] for value in known.values()]
-        colour = COLOURS[index % len(COLOURS)]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "name": one["policy"],
-                "x": [kind.replace("_", " ") for kind in known],
-                "y": means,
-                "marker": {"color": colour, "size": 10, "symbol": index},
-                "error_y": {
-                    "type": "data",
-                    "symmetric": False,
-                    "color": colour,
-                    "array": [v["high"] - v["mean"] for v in known.values()],
-                    "arrayminus": [v["mean"] - v["low"] for v in known.values()],
-                },
-            }
+    policies = document["policies"]
+    kinds = list(policies[0]["by_kind"])
+    lines = []
+    for index, one in enumerate(policies):
+        known = [(k, found) for k, kind in enumerate(kinds) if (found := one["by_kind"][kind])]
+        values = {
+            name: [float(found[name]) for _, found in known] for name in ("mean", "low", "high")
+        }
+        lines.append(
+            Line(
+                name=one["policy"],
+                x=[k for k, _ in known],
+                y=values["mean"],
+                low=values["low"],
+                high=values["high"],
+                **line_colour(index),
+            )
         )
-    note = "Mean over robots, onsets and severities; bars are 95 % intervals."
-    return Plot("Retention under faults", note, traces, "", "retention", {"nothing lost": 1.0})
+    return Plot(
+        title="Retention under faults",
+        note="Mean over robots, onsets and severities; bars are 95 % intervals. Dashed: nothing is "
+        "lost.",
+        lines=lines,
+        x="",
+        y="retention",
+        levels={"nothing lost": 1.0},
+        rows=["all kinds" if kind == "all" else kind.replace("_", " ") for kind in kinds],
+    )
 
 
-def _label(part: LearningCurve | EntropyCourse | Evidence) -> str:
+def _label(part: EntropyCourse | Evidence) -> str:
     return f"{part.method}, {part.situation}"
 
 
@@ -144,32 +171,11 @@ def _bands(curves: Sequence[SeedCurve]) -> str:
     return f"Band: {' or '.join(kinds)} over runs." if kinds else "One run, so no band."
 
 
-def _line(
-    name: str, x: Sequence[float], y: Sequence[float], line: Mapping[str, Any]
-) -> dict[str, Any]:
-    values = [None if math.isnan(value) else value for value in y]
-    drawn = {"type": "scatter", "mode": "lines", "connectgaps": True, "line": line}
-    return {**drawn, "name": name, "x": x, "y": values}
+def _banded(name: str, x: Sequence[float], curve: SeedCurve, *, colour: str, dash: int = 0) -> Line:
+    """A line, with a band where the curve has one."""
+    ends = () if curve.kind == "none" else (_known(curve.low), _known(curve.high))
+    return Line(name, x, _known(curve.mean), colour, dash, *ends)
 
 
-def _banded(
-    name: str, x: Sequence[float], curve: SeedCurve, index: int, dash: str | None = None
-) -> list[dict[str, Any]]:
-    """A line, and a band where the curve has one."""
-    colour = COLOURS[index % len(COLOURS)]
-    style = {"color": colour, "dash": dash or _DASHES[index % len(_DASHES)], "width": 2.5}
-    line = _line(name, x, curve.mean.tolist(), style)
-    if curve.kind == "none":
-        return [line]
-    hidden = {"width": 0, "color": colour}
-    edges = [
-        {
-            **_line(name, x, values.tolist(), hidden),
-            "showlegend": False,
-            "hoverinfo": "skip",
-            "legendgroup": name,
-        }
-        for values in (curve.low, curve.high)
-    ]
-    edges[1] |= {"fill": "tonexty", "fillcolor": f"{colour}33"}
-    return [*edges, {**line, "legendgroup": name}]
+def _known(values: Any) -> list[float | None]:
+    return [value if math.isfinite(value) else None for value in values.tolist()]

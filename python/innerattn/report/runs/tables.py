@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from innerattn.experiments.learning.curves import LearningCurve
 from innerattn.experiments.run import FinishedRun
 from innerattn.experiments.score_means import MeanScores, scores_over_runs
+from innerattn.measures.summary import script_score
 from innerattn.policies import SCRIPTED
+from innerattn.report.runs.groups import in_situations
 from innerattn.report.table import Row, Table, columns, plain_table, section
 from innerattn.stats import Estimate
 from innerattn.stats.text import NONE, format_estimate, format_number
 
+_MOST_NAMED = 4  # groups of runs in one line
 _DIGITS = 12  # of a digest, enough to tell two apart
 
 
@@ -48,25 +52,53 @@ def versions_text(runs: Sequence[FinishedRun]) -> str:
     return "; or ".join(found)
 
 
+def verdict(groups: Sequence[Sequence[FinishedRun]]) -> str:
+    """What the groups scored, the best first, in one line."""
+    found = []
+    for group in groups:
+        mean = scores_over_runs(group)[0] if len(group) > 1 else None
+        own = group[0].summary["score"]
+        score = mean.score if mean else _estimate(own)
+        of = f"mean of {len(group)} runs " if mean else ""
+        name = f"{group[0].method} on {group[0].situation}"
+        found.append((-math.inf if score is None else score.mean, f"{name} {of}{_score(score)}"))
+    found.sort(key=lambda one: one[0], reverse=True)
+    shown = [text for _, text in found[:_MOST_NAMED]]
+    left = f"; and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
+    return f"Score (0 plays like random, 1 like hungarian): {'; '.join(shown)}{left}"
+
+
+def _score(score: Estimate | None) -> str:
+    return format_estimate(score) if score else "has none, since hungarian is not surely better"
+
+
 def scores_table(groups: Sequence[Sequence[FinishedRun]]) -> Table:
     """Rescues and scores of every run, of the means over runs, and of the scripts."""
-    first = groups[0][0].summary
-    lengths = [f"{part['episode_steps']} steps" for part in (first, first["long"])]
-    heads = columns(["policy"], [word for length in lengths for word in (length, "score")])
+    heads = columns(["policy"], ["rescues", "score", "rescues, longer", "score, longer"])
     parts = []
-    for group in groups:
-        rows = [Row((_name(run), *_cells(run.summary))) for run in group]
-        if len(group) > 1:
-            means = scores_over_runs(group)
-            cells = [cell for mean in means for cell in _mean_cells(mean)]
-            rows.append(Row((f"mean of {len(group)} runs", *cells), strong=True))
-        parts.append(section(rows, f"{group[0].method}, situation {group[0].situation}"))
-        parts.append(section(_script_rows(group[0]), "scripts, in the worlds of the first run"))
+    for situation, alike in in_situations(groups).items():
+        for group in alike:
+            rows = [Row((_name(run), *_cells(run.summary))) for run in group]
+            if len(group) > 1:
+                means = scores_over_runs(group)
+                cells = [cell for mean in means for cell in _mean_cells(mean)]
+                rows.append(Row((f"mean of {len(group)} runs", *cells), strong=True))
+            first = group[0]
+            lengths = " and ".join(str(part["episode_steps"]) for part in _lengths(first))
+            title = f"{first.method}, situation {situation}, episodes of {lengths} steps"
+            parts.append(section(rows, title))
+        name = alike[0][0].folder.name
+        parts.append(section(_script_rows(alike[0][0]), f"scripts, in the worlds of {name}"))
     notes = (
         "Rescues per episode, at two lengths of episodes. Score: 0 is random, 1 is hungarian.",
         "Brackets: 95 % intervals, over episodes for a run, over runs (Student's t) for a mean.",
     )
     return Table(heads, tuple(parts), notes=notes)
+
+
+def _lengths(run: FinishedRun) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """What the summary holds at both lengths of episodes."""
+    return run.summary, run.summary["long"]
 
 
 def _name(run: FinishedRun) -> str:
@@ -92,16 +124,16 @@ def _mean_cells(mean: MeanScores) -> list[str]:
 
 def _script_rows(run: FinishedRun) -> list[list[str]]:
     return [
-        [
-            name,
-            *(
-                cell
-                for part in (run.summary, run.summary["long"])
-                for cell in (format_estimate(_estimate(part["scripted"][name])), NONE)
-            ),
-        ]
+        [name, *(cell for part in _lengths(run) for cell in _script_cells(part, name))]
         for name in SCRIPTED
     ]
+
+
+def _script_cells(part: Mapping[str, Any], name: str) -> tuple[str, str]:
+    """Rescues and score of a script."""
+    scripted = {one: Estimate.from_json(found) for one, found in part["scripted"].items()}
+    score = script_score(scripted, name) if part["score"] else None
+    return format_estimate(scripted[name]), NONE if score is None else format_number(score)
 
 
 def curve_table(curves: Sequence[LearningCurve]) -> Table:

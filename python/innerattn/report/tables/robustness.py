@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import string
+import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -13,9 +15,10 @@ from innerattn.report.table import Row, Table, columns, plain_table, print_table
 from innerattn.report.tables.text import NONE, mean_alone, number, percent, plus_minus
 
 if TYPE_CHECKING:
+    from innerattn.config import Scenario
     from innerattn.evaluate.bounds.results import Bounds, Level
     from innerattn.evaluate.faults.grid import Grid, Retention
-    from innerattn.evaluate.faults.overview import Overview
+    from innerattn.evaluate.faults.overview import KindOverview, Overview
     from innerattn.measures.faults.shift_results import FaultAttention
 
 _RETENTION = (
@@ -24,6 +27,7 @@ _RETENTION = (
     "rescues: per episode; with a fault from its start, mean over kinds, severities, robots",
     "greedy and hungarian take all robots to be healthy, oracle knows of faults",
 )
+_NO_SHARE = f"{NONE}: too few rescues without a fault to give a share of them"
 _BOUNDS = (
     "each cell: median, largest; teammates' observations were changed by gradient ascent",
     "radius: size of the change, in norms of an observation; Q: of its teammates; flips: another "
@@ -32,6 +36,7 @@ _BOUNDS = (
 _ALPHABET = string.ascii_uppercase
 _MOST_NAMED = 2  # runs that one line of 80 columns holds
 _MOST_WITH_INTERVALS = 4  # policies that 80 columns hold with their intervals
+_WIDTH = 80
 
 
 def print_robustness(
@@ -55,8 +60,8 @@ def print_robustness(
     policies = {name: overview(grid, one) for name, one in found.items()}
     letters = run_letters(found)
     console.print()
-    for line in verdict(policies, letters):
-        console.print(line, style="bold", soft_wrap=True)
+    for line in verdict(grid.scenario, policies, letters):
+        console.print(textwrap.fill(line, _WIDTH), style="bold", soft_wrap=True)
     console.print()
     for name, letter in letters.items():
         console.print(f"{letter}: {name}", soft_wrap=True)
@@ -81,7 +86,7 @@ def robustness_line(grid: Grid, found: Mapping[str, Retention]) -> str:
     from innerattn.evaluate.faults.overview import overview
 
     policies = {name: overview(grid, one) for name, one in found.items()}
-    return verdict(policies, {name: name for name in run_letters(found)})[0]
+    return _kept(policies, {name: name for name in run_letters(found)})
 
 
 def run_letters(found: Mapping[str, object]) -> dict[str, str]:
@@ -95,8 +100,50 @@ def run_letters(found: Mapping[str, object]) -> dict[str, str]:
     }
 
 
-def verdict(policies: Mapping[str, Overview], letters: Mapping[str, str]) -> tuple[str, str]:
-    """What each run keeps when a robot fails, beside a script, and what costs it most."""
+def verdict(
+    scenario: Scenario, policies: Mapping[str, Overview], letters: Mapping[str, str]
+) -> list[str]:
+    """What was found, in words: whose loss costs each run most and why, then what a run keeps.
+
+    Args:
+        scenario: the worlds; it tells what each robot offers.
+        policies: what was measured, the runs first.
+        letters: how each run is called.
+    """
+    lines = []
+    for name, letter in list(letters.items())[:_MOST_NAMED]:
+        subject = "the team" if len(letters) == 1 else letter
+        lines.append(_in_words(scenario, subject, policies[name]))
+    return [*lines, _kept(policies, letters), _costs_most(policies, letters)]
+
+
+def _in_words(scenario: Scenario, subject: str, found: Overview) -> str:
+    """What a run keeps without its most needed robot, or under the worst fault that was tried."""
+    known = [kind for kind in found.kinds if not math.isnan(kind.worst.mean)]
+    if not known:
+        return f"{subject[0].upper()}{subject[1:]} rescues nobody, so it cannot lose rescues."
+    lost = [kind for kind in known if kind.kind == "unavailable"]
+    kind = min(lost or known, key=lambda kind: kind.worst.mean)
+    what = f"Without {kind.worst_robot}" if lost else f"With {_fault_of(kind)}"
+    alone = _offered_by_nobody_else(scenario, kind.worst_robot)
+    why = f": nobody else offers {' and '.join(alone)}" if alone else ""
+    return f"{what} {subject} keeps {100.0 * kind.worst.mean:.0f} % of its rescues{why}."
+
+
+def _fault_of(kind: KindOverview) -> str:
+    return f"the worst {_words(kind.kind)} of {kind.worst_robot}"
+
+
+def _offered_by_nobody_else(scenario: Scenario, name: str) -> list[str]:
+    """The abilities that tasks need and only this robot has."""
+    needed = {need for task in scenario.tasks for need in task.needs}
+    others = {able for robot in scenario.robots if robot.name != name for able in robot.abilities}
+    (own,) = (robot.abilities for robot in scenario.robots if robot.name == name)
+    return [able for able in own if able in needed and able not in others]
+
+
+def _kept(policies: Mapping[str, Overview], letters: Mapping[str, str]) -> str:
+    """What each run keeps when a robot fails, beside a script."""
     kept = [f"{letter} {plus_minus(policies[name].retention)}" for name, letter in letters.items()]
     if len(kept) > _MOST_NAMED:
         means = [policies[name].retention.mean for name in letters]
@@ -105,16 +152,17 @@ def verdict(policies: Mapping[str, Overview], letters: Mapping[str, str]) -> tup
         kept = [f"{len(means)} runs {between}"]
     if "hungarian" in policies:
         kept.append(f"hungarian {plus_minus(policies['hungarian'].retention)}")
+    return f"Share of rescues kept when a robot fails: {', '.join(kept)}"
+
+
+def _costs_most(policies: Mapping[str, Overview], letters: Mapping[str, str]) -> str:
     worst = []
     for name, letter in list(letters.items())[:_MOST_NAMED]:
         kinds = [kind for kind in policies[name].kinds if not math.isnan(kind.retention.mean)]
         if kinds:
             kind = min(kinds, key=lambda kind: kind.retention.mean)
             worst.append(f"{letter} {_words(kind.kind)} {plus_minus(kind.retention)}")
-    return (
-        f"Share of rescues kept when a robot fails: {', '.join(kept)}",
-        f"Fault that costs most: {', '.join(worst) or 'unknown, since the runs rescue nobody'}",
-    )
+    return f"Fault that costs most: {', '.join(worst) or 'unknown, since the runs rescue nobody'}"
 
 
 def _by_kind(grid: Grid, policies: Mapping[str, Overview], letters: Mapping[str, str]) -> Table:
@@ -129,13 +177,14 @@ def _by_kind(grid: Grid, policies: Mapping[str, Overview], letters: Mapping[str,
     overall = Row(("all kinds", *(shown(one.retention) for one in each)), strong=True)
     rescues = ["rescues, no fault", *(shown(one.rescues) for one in each)]
     with_fault = ["rescues, fault", *(shown(one.rescues_with_fault) for one in each)]
-    return Table(
+    table = Table(
         columns(["retention"], heads),
         (kinds, section([overall]), section([rescues, with_fault])),
         f"Retention when a robot fails: {grid.scenario.situation}, {grid.episodes:,} worlds of "
         f"{grid.scenario.episode_steps} steps",
         _RETENTION,
     )
+    return _explained(table)
 
 
 def _by_severity(grid: Grid, name: str, found: Overview) -> Table:
@@ -149,21 +198,32 @@ def _by_severity(grid: Grid, name: str, found: Overview) -> Table:
     severities = [f"{severity:g}" for severity in grid.severities]
     heads = columns(["severity"], [*severities, f"worst robot at {severities[-1]}"])
     title = f"{name}: a fault from the start, by severity (mean over robots)"
-    return plain_table(heads, rows, title)
+    return _explained(plain_table(heads, rows, title))
 
 
 def _after_onset(grid: Grid, name: str, found: Overview, oracle: Overview | None) -> Table:
     """Whether a team recovers, beside the script that knows of the fault, where it was played."""
     steps = grid.scenario.episode_steps
     half = grid.middle + (steps - grid.middle) // 2
-    heads = [f"steps {grid.middle} to {half}", f"steps {half} to {steps}", "difference"]
-    heads += ["oracle's difference"] if oracle else []
+    heads = ["early", "late", "change", *(["oracle's"] if oracle else [])]
     rows = []
     for k, kind in enumerate(found.kinds):
         parts = [kind.early, kind.late, kind.change, *([oracle.kinds[k].change] if oracle else [])]
         rows.append([_words(kind.kind), *map(plus_minus, parts)])
     title = f"{name}: soon after a fault from step {grid.middle}, and later"
-    return plain_table(columns(["retention"], heads), rows, title)
+    notes = [
+        f"early: steps {grid.middle} to {half}; late: steps {half} to {steps}; change: late - early"
+    ]
+    if oracle:
+        notes.append("oracle's: the change of the script that knows of the fault")
+    return _explained(plain_table(columns(["retention"], heads), rows, title, notes))
+
+
+def _explained(table: Table, why: str = _NO_SHARE) -> Table:
+    """The table; where a cell has no value, a note says why."""
+    cells = (cell for part in table.sections for row in part.rows for cell in row.cells)
+    lacks = any(cell.split()[-1:] == [NONE] for cell in cells)
+    return replace(table, notes=(*table.notes, why)) if lacks else table
 
 
 def _bounds(name: str, bounds: Bounds) -> Table:
@@ -175,11 +235,12 @@ def _bounds(name: str, bounds: Bounds) -> Table:
         for level in bounds.levels
         if (level.changed, level.direction) == ("observation", "gradient")
     ]
-    title = (
-        f"{name}: bounds on attention (eqs. 6-10),\n"
-        f"{bounds.violations} violations in {count:,} checks"
+    checked = f"{bounds.violations} violations in {count:,} checks"
+    title = f"{name}: bounds on attention (eqs. 6-10), {checked}"
+    table = plain_table(columns(["radius"], heads), rows, title, _BOUNDS)
+    return _explained(
+        table, f"{NONE}: this critic does not rate each action, so it has no best one"
     )
-    return plain_table(columns(["radius"], heads), rows, title, _BOUNDS)
 
 
 def _level(level: Level) -> Sequence[str]:
@@ -210,7 +271,7 @@ def _attention(name: str, found: FaultAttention) -> Table:
     return Table(
         columns(["worst fault"], ["weight, no fault", "change by the fault", "AUC"]),
         (kinds, section([Row(overall, strong=True)])),
-        f"{name}:\nattention paid to a robot that fails at step {found.onset_step}",
+        f"{name}: attention paid to a robot that fails at step {found.onset_step}",
         (
             f"mean over teammates, heads and robots ({found.even_share:.2f} where attention is "
             "even), beside the same worlds without the fault",

@@ -14,9 +14,8 @@ from innerattn.experiments.live import LiveRun, read_live
 from innerattn.records.record import Record
 from innerattn.report.html import fill, shared_text
 from innerattn.report.local_server import Answer
-from innerattn.report.plotly import plot_script, plotly_script
 from innerattn.report.replay.page import replay_page
-from innerattn.report.runs.plots import COLOURS, Plot
+from innerattn.report.runs.plots import Line, Plot, line_colour
 
 _WEB = files("innerattn.report.watch") / "web"
 
@@ -57,19 +56,14 @@ def watch_pages(
         folders: of the runs.
         scripts: rescues per episode of scripts, to show beside the first run's.
         play: plays the newest policy of a run.
-
-    Raises:
-        MissingLibraryError: plotly is not installed.
     """
-    library = plotly_script()
     first = fill(
         _text("watch.html"),
         style=f"{shared_text('page.css')}\n{_text('watch.css')}",
-        script=f"{shared_text('dom.js')}\n{plot_script()}\n{_text('watch.js')}",
+        script=f"{shared_text('dom.js', 'marks.js', 'plots.js')}\n{_text('watch.js')}",
     )
     pages: dict[str, Callable[[], Answer]] = {
         "": partial(Answer, "text/html", first),
-        "plotly.js": partial(Answer, "text/javascript", library),
         "state": partial(_state, folders, scripts),
     }
     for index, folder in enumerate(folders):
@@ -97,7 +91,7 @@ def _plots(runs: Sequence[LiveRun], scripts: Mapping[str, float]) -> list[Plot]:
     rescues = Plot(
         title=f"Rescues per {per} in training",
         note="",
-        traces=[_line(index, run, run.rescues) for index, run in enumerate(runs)],
+        lines=[_line(index, run, run.rescues) for index, run in enumerate(runs)],
         x="env-steps",
         y=f"rescues per {per}",
         levels=dict(scripts),
@@ -107,7 +101,7 @@ def _plots(runs: Sequence[LiveRun], scripts: Mapping[str, float]) -> list[Plot]:
     entropy = Plot(
         title="Attention entropy, mean",
         note="",
-        traces=[_line(index, run, run.entropy) for index, run in attentive],
+        lines=[_line(index, run, run.entropy) for index, run in attentive],
         x="env-steps",
         y="entropy [nats]",
         levels=evens,
@@ -115,16 +109,8 @@ def _plots(runs: Sequence[LiveRun], scripts: Mapping[str, float]) -> list[Plot]:
     return [rescues, entropy] if attentive else [rescues]
 
 
-def _line(index: int, run: LiveRun, values: Sequence[float | None]) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "connectgaps": True,
-        "name": run.name,
-        "x": list(run.times),
-        "y": list(values),
-        "line": {"color": COLOURS[index % len(COLOURS)], "width": 2.5},
-    }
+def _line(index: int, run: LiveRun, values: Sequence[float | None]) -> Line:
+    return Line(run.name, run.times, values, **line_colour(index))
 
 
 def _text(name: str) -> str:

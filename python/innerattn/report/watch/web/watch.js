@@ -65,12 +65,9 @@ function showRuns() {
 
 function showPlots() {
   while ($("plots").children.length < state.plots.length) {
-    $("plots").append(element("div", { class: "plot", role: "img" }));
+    $("plots").append(element("div", { class: "plot" }));
   }
-  return Promise.all(state.plots.map((plot, index) => {
-    $("plots").children[index].setAttribute("aria-label", plot.title);
-    return drawPlot($("plots").children[index], plot);
-  }));
+  state.plots.forEach((plot, index) => drawPlot($("plots").children[index], plot));
 }
 
 async function refresh() {
@@ -85,7 +82,7 @@ async function refresh() {
     }
     showRuns();
     showEpisodes();
-    await showPlots();
+    showPlots();
     const running = state.runs.filter((run) => run.state === "running").length;
     const news = running ? `${running} of ${state.runs.length} running.` : "All trainings have ended.";
     if ($("news").textContent !== news) $("news").textContent = news;
