@@ -106,7 +106,8 @@ def test_a_faults_value_is_in_its_range(row: tuple[str, str, float, float, float
     kind, unit, low, high, healthy, meaning = row
     described = str(Fault.model_fields["value"].description)
     assert f"{kind}: {meaning}" in described
-    assert f"{kind}: {meaning} [{unit}]" in described or not unit
+    unit_shown = f" [{unit}]" if unit else ""
+    assert f"{kind}: {meaning}, {low:.4g} to {high:.4g}{unit_shown}" in described
     for value in (low, high, healthy):
         assert compiled({"faults": [FAULT | {"kind": kind, "value": value}]})
     for value in (low - 0.01, high + 0.01):
