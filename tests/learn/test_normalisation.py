@@ -74,6 +74,13 @@ def test_equal_advantages_are_none(value: float, rows: int, dtype: torch.dtype) 
     assert found.abs().max() == 0.0
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_advantages_that_are_not_finite_stay_so(value: float) -> None:
+    found = standardised(torch.tensor([[1.0, value, 3.0], [1.0, 2.0, 3.0]]))
+    assert found[0].isnan().all()
+    assert found[1].isfinite().all()
+
+
 def test_other_advantages_have_mean_0_and_deviation_1() -> None:
     given = torch.randn(3, 400, generator=torch.Generator().manual_seed(1)) * 1e-3 + 5.0
     found = standardised(given)

@@ -278,4 +278,5 @@ def standardised(advantage: Tensor) -> Tensor:
     centred = advantage - advantage.mean(dim=1, keepdim=True)
     deviation = advantage.std(dim=1, correction=0, keepdim=True)
     rounding = _ROUNDING * torch.finfo(advantage.dtype).eps * advantage.abs().amax(1, keepdim=True)
-    return torch.where(deviation > rounding, centred / (deviation + 1e-8), 0.0)
+    # Asked in this way, so that NaN stays NaN and divergence is found.
+    return torch.where(deviation <= rounding, 0.0, centred / (deviation + 1e-8))
