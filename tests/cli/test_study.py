@@ -57,6 +57,35 @@ def test_everything_is_killed_and_goes_on(file: Path) -> None:
     assert sorted(os.listdir("studies/tiny/runs")) == sorted(found["runs"])
 
 
+def test_ctrl_c_saves_and_frees_every_run(file: Path) -> None:
+    """A terminal sends it to all processes of the command; none may take it for a second one."""
+    file.write_text(TINY.replace("train.env_steps = 192", "train.env_steps = 1_000_000"))
+    words = [sys.executable, "-m", "innerattn", "study", "run", str(file), "--workers", "2", "-q"]
+    command = subprocess.Popen(words, start_new_session=True, stderr=subprocess.PIPE, text=True)
+    work = Path("studies/tiny/work")
+    deadline = time.monotonic() + 60
+    while len(list(work.glob("*/*/metrics.jsonl"))) < 2 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.killpg(command.pid, signal.SIGINT)
+    _, err = command.communicate(timeout=60)
+    assert command.returncode == 130
+    assert err == "innerattn: interrupted\n"
+    claims = Path("studies/tiny/claims")
+    begun = [path for path in claims.iterdir() if path.suffix in (".1", ".2")]
+    assert {f"{path.name}.free" for path in begun} == {p.name for p in claims.glob("*.free")}
+    assert len(begun) == 2
+    for run in work.glob("*/*"):
+        assert json.loads((run / "run.json").read_text())["state"] == "interrupted"
+        assert any(run.glob("checkpoints/*/checkpoint.json"))
+
+
+def test_status_and_report_begin_no_study(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for action in ("status", "report"):
+        assert main(["study", action, str(file)]) == 1
+        assert "holds no study" in capsys.readouterr().err
+    assert not Path("studies").exists()
+
+
 def test_slurm_runs_workers(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """With a stand-in for srun, which just runs the command."""
     assert main(["study", "slurm", str(file), "--workers", "2", "--minutes", "30"]) == 0

@@ -29,7 +29,7 @@ Action = Literal["run", "work", "status", "report", "slurm"]
 _WHAT = """What to do.
 - run: begin or go on with the study in a file, with a worker for each core.
 - work: be one worker for a study that has begun.
-- status: how many runs are done, and what they found so far.
+- status: how many runs are done.
 - report: write report.md and report.json again.
 - slurm: print a script for sbatch whose jobs are workers."""
 
@@ -64,15 +64,16 @@ class Study(LongCommand):
         return getattr(self, f"_{self.action}")()  # type: ignore[no-any-return]
 
     def _run(self) -> int:
-        from innerattn.studies.launch.local import as_many_as_cores, run_workers
+        from innerattn.experiments.processes import places
+        from innerattn.studies.launch.local import run_workers
 
         if self.workers is not None and not 1 <= self.workers <= 256:
             raise UsageError(f"--workers = {self.workers}: must be 1 to 256")
-        study = self._opened()
+        study = self._begun()
         ledger, keys = study.ledger(), [run.key for run in study.planned]
         over = Counter(ledger.states(keys).values())
         left = len(keys) - over["done"] - over["failed"]
-        workers = self.workers or as_many_as_cores(left)
+        workers = self.workers or places(left)
         console = self.console()
         console.print(
             f"{study.path}: {len(keys)} runs, {over['done']} done, {over['failed']} failed, "
@@ -81,14 +82,14 @@ class Study(LongCommand):
         )
         if left:
             with _Progress(self.progress_console()) as progress:
-                run_workers(study.path, workers, looked=lambda: progress(ledger.states(keys)))
+                run_workers(study.path, workers, left=lambda: progress(ledger.states(keys)))
         return self._report(study)
 
     def _work(self) -> int:
         from innerattn.studies.work import work
 
         until = None if self.until is None else time.monotonic() + _seconds(self.until)
-        study = self._opened()
+        study = self._begun()
         console = self.console()
 
         def ended(outcome: Outcome) -> None:
@@ -148,18 +149,27 @@ class Study(LongCommand):
         jobs = 10 if self.workers is None else self.workers
         if not 1 <= jobs <= 10_000:
             raise UsageError(f"--workers = {jobs}: must be 1 to 10,000 jobs")
-        print(slurm_script(self._opened().path, jobs, self.minutes), end="")
+        print(slurm_script(self._begun().path, jobs, self.minutes), end="")
         return 0
 
-    def _opened(self) -> StudyFolder:
+    def _begun(self) -> StudyFolder:
         """The study in a folder, or that of a file, which begins here where it has not begun."""
-        from innerattn.studies.folder import begin_study, open_study
+        from innerattn.studies.folder import begin_study
 
+        return self._opened() if self.study.is_dir() else begin_study(self.study, self._folder())
+
+    def _opened(self) -> StudyFolder:
+        """The study in a folder, or that of a file, which has begun; nothing is written."""
+        from innerattn.studies.folder import open_study
+
+        return open_study(self._folder())
+
+    def _folder(self) -> Path:
         if self.study.is_dir():
-            return open_study(self.study)
+            return self.study
         if self.study.suffix != ".toml":
             raise UsageError(f"{self.study}: must be a TOML file, or the folder of a study")
-        return begin_study(self.study, self.out or Path("studies") / self.study.stem)
+        return self.out or Path("studies") / self.study.stem
 
     def _print_failures(self, study: StudyFolder, states: Mapping[str, State]) -> None:
         ledger = study.ledger()
@@ -175,14 +185,14 @@ class _Progress(Work):
     title = "study"
 
     def __call__(self, states: Mapping[str, State]) -> int:
-        """Show states; gives how many runs are over."""
+        """Show states; gives how many runs are left."""
         counts = Counter(states.values())
         over = counts["done"] + counts["failed"]
         note = f"{counts['done']} of {len(states)} runs done, {counts['claimed']} running"
         note += f", {counts['failed']} failed" if counts["failed"] else ""
         if over:
             self.show(over, len(states), note)
-        return over
+        return len(states) - over
 
 
 def _seconds(text: str) -> float:

@@ -41,7 +41,7 @@ def work(
     *,
     until: float | None = None,
     wait: bool = True,
-    begins: Callable[[PlannedRun], None] = lambda _: None,
+    report: Callable[[float], None] = lambda _: None,
     ended: Callable[[Outcome], None] = lambda _: None,
     clock: Callable[[], float] = time.monotonic,
 ) -> None:
@@ -55,7 +55,8 @@ def work(
         planned: its runs in the order in which they are to be done.
         until: when to stop, as ``clock`` has it; the run at hand is saved and given back.
         wait: whether to stay while others work on the last runs, in case they fall silent.
-        begins: called with each run that is claimed.
+        report: called with the part of the run at hand that is done, and with 0 while there is
+            none; a `KeyboardInterrupt` of it asks the worker to end.
         ended: called with what became of it.
         clock: seconds.
 
@@ -67,30 +68,35 @@ def work(
     while until is None or clock() < until:
         claim = ledger.claim(by_key)
         if claim is not None:
-            begins(by_key[claim.key])
-            ended(_worked(claim, by_key[claim.key], until, clock))
+            ended(_worked(claim, by_key[claim.key], until, report, clock))
             continue
         states = ledger.states(by_key).values()
         if not wait or "claimed" not in states:
             return
+        report(0.0)
         time.sleep(_LOOK_EVERY_S)
 
 
 def _worked(
-    claim: Claim, run: PlannedRun, until: float | None, clock: Callable[[], float]
+    claim: Claim,
+    run: PlannedRun,
+    until: float | None,
+    report: Callable[[float], None],
+    clock: Callable[[], float],
 ) -> Outcome:
     """Train and measure one run."""
     times_up = False
     with _beating(claim) as lost:
 
-        def report(_: float) -> None:
+        def go_on(share: float) -> None:
             nonlocal times_up
             times_up = until is not None and clock() >= until
             if times_up or lost.is_set():
                 raise KeyboardInterrupt  # as a user's: training saves what it has
+            report(share)
 
         try:
-            Run(run.config, claim.folder, begun=claim.folder.exists()).do(report)
+            Run(run.config, claim.folder, begun=claim.folder.exists()).do(go_on)
             claim.finish()
         except ClaimLostError:
             return Outcome(run, "lost")
