@@ -56,6 +56,15 @@ impl Solid {
         }
     }
 
+    /// Half its shortest diameter, m.
+    #[must_use]
+    pub fn half_breadth(&self) -> f32 {
+        match self {
+            Self::Disc(radius) => *radius,
+            Self::Box(half) => half.min(),
+        }
+    }
+
     /// Radius of the smallest disc around the centre that holds the solid, m.
     #[must_use]
     pub fn reach(&self) -> f32 {
@@ -102,7 +111,8 @@ impl Touch {
         let (place, speed) = (place * side.signum(), speed * side.signum());
         let gap = limit - place;
         if -speed >= self.parting_at(gap) {
-            return f32::INFINITY;
+            // Off this wall: what overlapped it may meet the opposite one.
+            return if speed < 0.0 { (limit + place) / -speed } else { f32::INFINITY };
         }
         if gap <= 0.0 { 0.0 } else { gap / speed }
     }
@@ -191,8 +201,10 @@ mod tests {
         assert!((EXACT.walls(0.5, -1.0, 0.95) - 1.45).abs() < 1e-6);
         assert!(EXACT.walls(0.5, 0.0, 0.95).is_infinite());
         assert!(EXACT.walls(-0.96, -0.1, 0.95) <= 0.0);
-        assert!(EXACT.walls(-0.96, 0.1, 0.95).is_infinite());
+        assert!((EXACT.walls(-0.96, 0.1, 0.95) - 19.1).abs() < 1e-4, "the opposite wall");
         assert!(MENDING.walls(-0.96, 0.0, 0.95) <= 0.0);
+        let across = MENDING.walls(-0.96, 10.0, 0.95);
+        assert!((across - 0.191).abs() < 1e-4, "the opposite wall: {across}");
     }
 
     #[test]

@@ -99,6 +99,52 @@ impl Shapes {
         }
         first
     }
+
+    /// Puts whoever overlaps something by more than `most` of the smaller of the two back to where it was
+    /// `before`, and stops it there, until nobody does. Nothing overlapped more deeply before, so this holds.
+    fn hold(
+        &self,
+        most: f32,
+        before: &[Vec2],
+        positions: &mut [Vec2],
+        velocities: &mut [Vec2],
+        obstacles: &[Vec2],
+    ) {
+        let mut held = 0_u64;
+        loop {
+            let sunk = self.sunk(most, positions, obstacles) & !held;
+            if sunk == 0 {
+                return;
+            }
+            held |= sunk;
+            for index in (0..positions.len()).filter(|index| sunk >> index & 1 == 1) {
+                positions[index] = before[index];
+                velocities[index] = Vec2::zeros();
+            }
+        }
+    }
+
+    /// The robots that overlap another robot or an obstacle by more than `most` of the smaller of the two,
+    /// as bits.
+    fn sunk(&self, most: f32, positions: &[Vec2], obstacles: &[Vec2]) -> u64 {
+        let mut sunk = 0_u64;
+        for (index, at) in positions.iter().enumerate() {
+            let radius = self.radii[index];
+            for (other, place) in positions[..index].iter().enumerate() {
+                let reach = radius + self.radii[other] - most * radius.min(self.radii[other]);
+                if (place - at).norm_squared() < reach * reach {
+                    sunk |= 1 << index | 1 << other;
+                }
+            }
+            for (solid, centre) in self.solids.iter().zip(obstacles) {
+                let reach = radius - most * radius.min(solid.half_breadth());
+                if solid.nearest(at - centre).0 < reach {
+                    sunk |= 1 << index;
+                }
+            }
+        }
+        sunk
+    }
 }
 
 /// Moves all straight on for `time`, s.

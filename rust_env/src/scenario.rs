@@ -30,8 +30,8 @@ pub const MAX_MASS_RATIO: f64 = 100.0;
 /// The same for rapier, which squeezes lighter robots deep into heavier ones and into walls.
 pub const MAX_MASS_RATIO_RAPIER: f64 = 16.0;
 
-/// Farthest that a robot may move in a substep of rapier, in smallest radii: up to here nothing
-/// overlaps by more than a tenth of a radius.
+/// Farthest that a robot may move in a substep of rapier, in smallest radii: up to here robots of one size
+/// overlap by no more than a tenth of a radius, and it is rare that one has to be held back.
 pub const MAX_TRAVEL_RADII: f64 = 3.0;
 
 /// When and how many victims appear (paper, section III).

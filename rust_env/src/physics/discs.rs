@@ -18,6 +18,9 @@ const STILL_MPS: f32 = 1e-5;
 const MOST_SWEEPS: usize = 200;
 /// Change of velocity in a sweep below which the impulses have settled, m/s.
 const SETTLED_MPS: f32 = 1e-6;
+/// Deepest overlap that a period may leave, as a share of the smaller of the two: less than the promised
+/// 5 % by more than rounding.
+const MOST_OVERLAP: f32 = 0.045;
 /// Sweeps that push apart what rounding has left overlapping.
 const SEPARATING_SWEEPS: usize = 8;
 
@@ -33,7 +36,11 @@ struct Contact {
 }
 
 #[derive(Default)]
-pub(super) struct Scratch(Vec<Contact>);
+pub(super) struct Scratch {
+    contacts: Vec<Contact>,
+    /// Where the robots were before the period, m.
+    before: Vec<Vec2>,
+}
 
 pub(super) struct Discs {
     shapes: Shapes,
@@ -159,7 +166,9 @@ impl Engine for Discs {
         velocities: &mut [Vec2],
         obstacles: &[Vec2],
     ) -> u64 {
-        let contacts = &mut workspace.discs.0;
+        let Scratch { contacts, before } = &mut workspace.discs;
+        before.clear();
+        before.extend_from_slice(positions);
         let mut left = self.dt;
         let mut touched = 0;
         // Each instant past the limit stops somebody for good, so that as many more as there are robots
@@ -186,6 +195,7 @@ impl Engine for Discs {
         }
         fly(positions, velocities, left);
         self.separate(positions, obstacles);
+        self.shapes.hold(MOST_OVERLAP, before, positions, velocities, obstacles);
         touched
     }
 

@@ -4,6 +4,7 @@
 
 use innerattn_env::geometry::{Solid, Vec2};
 use innerattn_env::rng::Stream;
+use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Actions, Engine, Scenario};
 use innerattn_env::world::World;
 
@@ -15,7 +16,7 @@ const MOST: f32 = 0.05;
 const USUAL: f32 = 0.01;
 
 #[derive(Debug, Clone, Copy)]
-enum Play {
+pub enum Play {
     /// Random discrete actions.
     Random,
     /// Everyone into one corner.
@@ -26,10 +27,10 @@ enum Play {
     Chase,
 }
 
-const PLAYS: [Play; 4] = [Play::Random, Play::Corner, Play::HeadOn, Play::Chase];
+pub const PLAYS: [Play; 4] = [Play::Random, Play::Corner, Play::HeadOn, Play::Chase];
 
 impl Play {
-    fn drive(self, world: &World, robot: usize, chance: &mut Stream) -> [f32; 2] {
+    pub fn drive(self, world: &World, robot: usize, chance: &mut Stream) -> [f32; 2] {
         let own = world.positions[robot];
         let robots = world.positions.len();
         let phase = (world.step / 12) as usize;
@@ -50,9 +51,8 @@ impl Play {
     }
 }
 
-/// Overlaps of one world, each as a share of the smaller radius; `before` are the places one period ago.
-fn inspect(table: &Table, world: &World, before: Option<&[Vec2]>, overlaps: &mut Vec<f32>) {
-    let rules = table.batch.rules();
+/// The deepest overlap in a world, as a share of the smaller of the two; of a box that is half its shorter side.
+pub fn deepest(rules: &Rules, world: &World) -> f32 {
     let arena = rules.scenario.arena_half_width_m as f32;
     let mut worst = 0.0_f32;
     for (index, (at, body)) in world.positions.iter().zip(&rules.team).enumerate() {
@@ -62,13 +62,16 @@ fn inspect(table: &Table, world: &World, before: Option<&[Vec2]>, overlaps: &mut
             worst = worst.max(overlap / body.radius.min(from.radius));
         }
         for (solid, centre) in rules.solids.iter().zip(&world.obstacles) {
-            worst = worst.max((body.radius - solid.distance(at - centre)) / body.radius);
+            let small = body.radius.min(solid.half_breadth());
+            worst = worst.max((body.radius - solid.nearest(at - centre).0) / small);
         }
     }
-    overlaps.push(worst);
-    let Some(before) = before else { return };
-    // Without forces nothing turns round something else within a period: whoever's straight line from
-    // start to end leads deep through something has gone through it.
+    worst
+}
+
+/// Panics if somebody went through something since all were at `before`, one period ago. It takes periods in which
+/// nobody moves farther than three of the smallest radii: without forces, nobody turns round something else in one.
+pub fn check_uncrossed(rules: &Rules, world: &World, before: &[Vec2]) {
     for index in 0..before.len() {
         let radius = rules.team[index].radius;
         for other in 0..index {
@@ -123,7 +126,10 @@ fn play_within(name: &str, engines: &[Engine], scenario: &Scenario, steps: usize
             table.step(&actions);
             for (world, before) in table.batch.worlds().zip(&before) {
                 let same = (world.episode == before.episode).then_some(&before.positions[..]);
-                inspect(&table, world, same, &mut overlaps);
+                overlaps.push(deepest(table.batch.rules(), world));
+                if let Some(before) = same {
+                    check_uncrossed(table.batch.rules(), world, before);
+                }
             }
         }
         overlaps.sort_unstable_by(f32::total_cmp);

@@ -19,7 +19,7 @@ use crate::common::{
 const ENVS: usize = 2;
 
 /// Repeats `attempt` until the time is up; says how often it was.
-fn for_a_while(what: &str, mut attempt: impl FnMut(&mut Stream) -> bool) {
+pub fn for_a_while(what: &str, mut attempt: impl FnMut(&mut Stream) -> bool) {
     let seconds = std::env::var("INNERATTN_FUZZ_SECONDS").map_or(1.0, |text| text.parse().expect("a number"));
     let (start, mut source) = (Instant::now(), chance(2));
     let (mut tried, mut taken) = (0_u64, 0_u64);

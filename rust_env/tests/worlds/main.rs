@@ -9,6 +9,7 @@ mod determinism;
 mod digests;
 mod engines;
 mod extending;
+mod extremes;
 mod faults;
 mod fuzz;
 mod snapshot;
