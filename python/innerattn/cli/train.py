@@ -23,7 +23,6 @@ from innerattn.cli.usage import parse, words_of
 from innerattn.config import BUDGETS, SCENARIOS, RunConfig, load_run_config
 from innerattn.config.registry import methods
 from innerattn.config.sections import WarmStart
-from innerattn.config.untrusted import parse_json
 from innerattn.cores import usable_cores
 from innerattn.errors import ConfigError, RunError
 from innerattn.experiments.side_by_side import (
@@ -33,7 +32,7 @@ from innerattn.experiments.side_by_side import (
     train_side_by_side,
 )
 from innerattn.loggers import LOGGERS, Opened, RunLoggers
-from innerattn.records.logged import logged_rescues, still_rises
+from innerattn.records.logged import METRICS, logged_lines, logged_rescues, still_rises
 from innerattn.report.tables.evaluation import (
     print_seeds,
     print_summary,
@@ -332,7 +331,7 @@ def _say_what_is_kept(folders: Sequence[Path]) -> None:
 def _still_rises(run_dir: Path, config: RunConfig) -> bool:
     """Whether the course of a finished training has not come to its end."""
     first = config.imitation.env_steps if config.train.warm_start != "none" else 0
-    lines = [parse_json(line) for line in (run_dir / "metrics.jsonl").read_bytes().splitlines()]
+    lines = logged_lines((run_dir / METRICS).read_bytes())
     course = [logged_rescues(config, line) for line in lines if line["env_steps"] > first]
     return still_rises([value for value in course if value is not None])
 

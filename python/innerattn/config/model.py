@@ -190,9 +190,13 @@ def config_error(
         root: what places are inside of, e.g. "scenario".
         source: the file the values came from, if any.
         model: what was checked; the message names the key of it that an unknown one is like.
+
+    Returns:
+        An error that names the first ten places, each in at most some 400 letters.
     """
-    lines = []
-    for item in error.errors(include_url=False):
+    lines: list[str] = []
+    errors = error.errors(include_url=False)
+    for item in errors[:_MOST_ERRORS]:
         location = item["loc"]
         place = _place([root, *location])
         if item["type"] == "value_error":  # our own rules name their place themselves
@@ -206,7 +210,21 @@ def config_error(
             rule = item["msg"].replace("Input should be", "must be").replace("tuple", "list")
             near = _meant_word(item["input"], rule) if item["type"] in _OF_WORDS else ""
             lines.append(f"{place} = {item['input']!r}: {rule}{near}")
+    lines = [_shortened(line) for line in lines]
+    if len(errors) > _MOST_ERRORS:
+        lines.append(f"and {len(errors) - _MOST_ERRORS:,} more")
     return ConfigError((f"{source}: " if source else "") + "; ".join(lines))
+
+
+_MOST_ERRORS = 10
+"""As many errors of one file are named."""
+_MOST_LETTERS = 400
+
+
+def _shortened(line: str) -> str:
+    """A line of a message without the middle of what is long in it, e.g. a value."""
+    half = _MOST_LETTERS // 2
+    return line if len(line) <= 2 * half else f"{line[:half]} ... {line[-half:]}"
 
 
 _OF_WORDS = ("literal_error", "word")

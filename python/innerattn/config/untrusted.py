@@ -22,6 +22,11 @@ _MOST_DEPTH = 64
 _MOST_KEYS = 20_000
 _MOST_KEY_PARTS = 16
 _MOST_DIGITS = 40
+_FREE_BYTES = 16 << 20
+_MOST_MEMORY = 20
+"""Most bytes of memory for each byte of a JSON text, past `_FREE_BYTES`."""
+_COSTS = {b"[": 72, b"{": 80, b",": 64, b":": 160}
+"""Bytes of memory that a value costs at most beside its text, by the sign that comes with it."""
 
 _QUOTED = re.compile(r'"(?:[^"\\\n]|\\[^\n])*+"|\'[^\'\n]*+\'')
 _MANY_PARTS = re.compile(rf"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++){{{_MOST_KEY_PARTS},}}")
@@ -68,9 +73,11 @@ def parse_json(text: str | bytes) -> Any:
     """The document in a JSON text, without what Python's own reader adds to JSON.
 
     Raises:
-        ValueError: it is no JSON, names a key of an object twice, is nested more than 64 deep, or
-            holds a number that is not finite or has more than 40 digits.
+        ValueError: it is no JSON, names a key of an object twice, is nested more than 64 deep,
+            holds a number that is not finite or has more than 40 digits, or holds so many tiny
+            values that they take over 20 times the memory of their text.
     """
+    _refuse_dense(text)
     try:
         document = json.loads(
             text,
@@ -91,8 +98,8 @@ def parse_toml(text: str) -> dict[str, Any]:
     Raises:
         ValueError: it is no TOML, or larger in some way than any configuration is.
     """
-    if text.count("=") > _MOST_KEYS or text.count("[") > _MOST_KEYS:
-        raise ValueError(f"more than {_MOST_KEYS} keys or tables")
+    if any(text.count(sign) > _MOST_KEYS for sign in "=[,"):
+        raise ValueError(f"more than {_MOST_KEYS} keys, tables or values of lists")
     if _MANY_PARTS.search(_QUOTED.sub("q", text)):
         raise ValueError(f"a key of more than {_MOST_KEY_PARTS} parts")
     try:
@@ -131,6 +138,17 @@ def _no_key_twice(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         twice = next(name for name, _ in pairs if name in seen or seen.add(name))  # type: ignore[func-returns-value]
         raise ValueError(f"the key {twice[:_MOST_DIGITS]!r} comes twice")
     return found
+
+
+def _refuse_dense(text: str | bytes) -> None:
+    """Refuse a text of tiny values, each of which takes much more memory than its text."""
+    data = text.encode() if isinstance(text, str) else text
+    memory = sum(cost * data.count(sign) for sign, cost in _COSTS.items())
+    if memory > max(_FREE_BYTES, _MOST_MEMORY * len(data)):
+        raise ValueError(
+            f"takes up to {memory:,} bytes of memory: must be at most {_MOST_MEMORY} times its "
+            f"{len(data):,} bytes"
+        )
 
 
 def _refuse_deep(document: Any) -> None:

@@ -11,12 +11,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from innerattn.config import RunConfig
-from innerattn.config.untrusted import parse_json, read_plain
+from innerattn.config.untrusted import read_plain
 from innerattn.errors import RunError
-from innerattn.records.logged import logged_rescues, unit_of_rescues
+from innerattn.records.logged import (
+    METRICS,
+    MOST_METRICS_BYTES,
+    logged_lines,
+    logged_rescues,
+    unit_of_rescues,
+)
 from innerattn.records.run_folder import State, newest_weights, read_config, read_info
 
-_MOST_BYTES = 1 << 30
 MOST_POINTS = 400
 """As many points of a course are kept; of longer ones every second, third, ..."""
 
@@ -70,7 +75,7 @@ def read_live(folder: Path) -> LiveRun:
         ConfigError: its configuration is not valid.
     """
     info, config = read_info(folder), read_config(folder)
-    path = folder / "metrics.jsonl"
+    path = folder / METRICS
     logged = _read_logged(path, config)
     total, robots = _total(config), config.scenario.num_robots
     done = max(info.env_steps, *(line.env_steps for line in logged[-1:]), 0)
@@ -110,8 +115,8 @@ def _read_logged(path: Path, config: RunConfig) -> list[_Logged]:
     if not path.exists():
         return []
     try:
-        lines = read_plain(path, _MOST_BYTES).splitlines()
-        return [_logged(parse_json(line), config) for line in lines]
+        data = read_plain(path, MOST_METRICS_BYTES)
+        return [_logged(line, config) for line in logged_lines(data)]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not the metrics of a run") from error
 

@@ -19,14 +19,13 @@ from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json
 from innerattn.errors import RunError
 from innerattn.experiments.plan import Case
 from innerattn.measures.summary import SCHEMA_VERSION
+from innerattn.records.logged import METRICS, MOST_METRICS_BYTES, logged_lines
 from innerattn.records.parquet import RECORD_FILES, read_records
 from innerattn.records.record import Record
 from innerattn.records.run_files import AlteredFileError, RunFiles
 from innerattn.records.run_folder import RunInfo, config_of
 from innerattn.records.tables import MOST_FILE_BYTES, refuse_damaged
 from innerattn.shown import Shown
-
-_MOST_METRICS_BYTES = 1 << 30
 
 
 class NotMeasuredError(RunError):
@@ -158,11 +157,10 @@ def read_metrics(run: FinishedRun, *names: str) -> list[tuple[Any, ...]]:
     Raises:
         RunError: its ``metrics.jsonl`` is missing, as with an archived run, empty or damaged.
     """
-    path = run.folder / "metrics.jsonl"
+    path = run.folder / METRICS
     try:
-        text = RunFiles(run.folder).read(path.name, _MOST_METRICS_BYTES).decode("utf-8")
-        lines = [parse_json(line) for line in text.splitlines()]
-        found = [tuple(line[name] for name in names) for line in lines]
+        data = RunFiles(run.folder).read(path.name, MOST_METRICS_BYTES)
+        found = [tuple(line[name] for name in names) for line in logged_lines(data)]
     except AlteredFileError:
         raise
     except (RunError, ValueError, KeyError, TypeError) as error:

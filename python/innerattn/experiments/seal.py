@@ -7,18 +7,17 @@ import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from innerattn.config.untrusted import parse_json, read_plain
+from innerattn.config.untrusted import read_plain
 from innerattn.errors import RunError, UnsealedRunWarning
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import measured_run
+from innerattn.records.logged import METRICS, MOST_METRICS_BYTES, logged_lines
 from innerattn.records.run_files import MANIFEST, RunFiles, seal, unsealed
 from innerattn.records.run_folder import config_of
 from innerattn.train import load_policy
 from innerattn.train.resume import verify_checkpoints
 from innerattn.train.run_lock import only_training_in
 from innerattn.train.weights import MOST_BYTES, weights_in
-
-_MOST_METRICS_BYTES = 1 << 30
 
 
 @dataclass
@@ -113,12 +112,12 @@ def _check_weights(files: RunFiles, sealed: Sealed) -> set[str]:
 
 def _check_metrics(files: RunFiles, sealed: Sealed) -> set[str]:
     """Read all lines of metrics, if there are any; the file's name."""
-    path = files.path / "metrics.jsonl"
+    path = files.path / METRICS
     if not path.exists() and files.info.state == "interrupted":  # before its first line
         return set()
-    data = read_plain(path, _MOST_METRICS_BYTES)
+    data = read_plain(path, MOST_METRICS_BYTES)
     try:
-        lines = [parse_json(line)["env_steps"] for line in data.decode("utf-8").splitlines()]
+        lines = [line["env_steps"] for line in logged_lines(data)]
     except (ValueError, KeyError, TypeError) as error:
         raise RunError(f"{path}: not the metrics of a run ({error})") from error
     if not lines or not data.endswith(b"\n") or lines != sorted(lines):
@@ -128,4 +127,4 @@ def _check_metrics(files: RunFiles, sealed: Sealed) -> set[str]:
             f"{path}: goes on to env-step {lines[-1]}, run.json to {files.info.env_steps}"
         )
     sealed.checked.append(f"{len(lines)} lines of metrics")
-    return {"metrics.jsonl"}
+    return {METRICS}

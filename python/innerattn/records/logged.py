@@ -1,14 +1,35 @@
-"""How many rescues a line of a training's metrics tells of."""
+"""The lines of a training's metrics, and how many rescues one tells of."""
 
 from __future__ import annotations
 
+import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from innerattn.config import RunConfig
+from innerattn.config.untrusted import parse_json
+
+METRICS = "metrics.jsonl"
+MOST_METRICS_BYTES = 1 << 30
+"""Longest file of metrics that is read."""
+_MOST_LINE_BYTES = 1 << 20
+
+
+def logged_lines(data: bytes) -> Iterator[dict[str, Any]]:
+    """The lines in the bytes of a ``metrics.jsonl``, one after the other.
+
+    Raises:
+        ValueError: a line is longer than 1 MiB, or no JSON, see `parse_json`.
+    """
+    for number, line in enumerate(io.BytesIO(data), 1):
+        if len(line) > _MOST_LINE_BYTES:
+            raise ValueError(
+                f"line {number} has {len(line):,} bytes: must have at most {_MOST_LINE_BYTES:,}"
+            )
+        yield parse_json(line)
 
 
 def logged_rescues(config: RunConfig, line: Mapping[str, Any]) -> float | None:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
 from pkgutil import resolve_name
 
 import torch
+from torch import Tensor
 
 from innerattn.config import RunConfig, Scenario
 from innerattn.config.registry import methods
 from innerattn.cores import usable_cores
 from innerattn.envs import BatchEnv
-from innerattn.errors import ConfigError
+from innerattn.errors import ConfigError, RunError
 from innerattn.learn.framed import FramedLearner
+from innerattn.learn.networks import draw_networks
 from innerattn.learn.types import Learner, LearnerClass, Team
 from innerattn.nn import SquareSymmetry, VectorColumns
 from innerattn.train.columns import (
@@ -51,6 +54,28 @@ def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -
             states = SquareSymmetry(state_columns(env.state_names()), device)
         return FramedLearner(learner, symmetry, None, states)
     return FramedLearner(learner, symmetry, config.train.seed) if training else learner
+
+
+def refuse_larger_networks(config: RunConfig, weights: Mapping[str, Tensor], path: Path) -> None:
+    """Refuse networks that the weights of a run cannot fill, before memory is spent on them.
+
+    Args:
+        config: the run, as it says of itself.
+        weights: everything learnt, by name.
+        path: of the weights, for messages.
+
+    Raises:
+        RunError: the configuration asks for larger networks.
+    """
+    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env, torch.device("meta"):
+        team = team_of(config, env)  # tensors on "meta" have a shape and no memory
+        networks = draw_networks(team, config.network, torch.Generator("cpu"), critic_outputs=1)
+    least = sum(one.numel() for network in networks for one in network.parameters())
+    found = sum(tensor.numel() for tensor in weights.values())
+    if least > found:
+        raise RunError(
+            f"{path}: holds {found:,} numbers; the networks of config.toml have at least {least:,}"
+        )
 
 
 def team_of(config: RunConfig, env: BatchEnv) -> Team:

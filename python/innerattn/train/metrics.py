@@ -22,9 +22,9 @@ from torch import Tensor
 from innerattn.config.untrusted import parse_json, read_plain
 from innerattn.errors import RunError
 from innerattn.learn.resume import State, inside, take, take_within
+from innerattn.records.logged import MOST_METRICS_BYTES
 from innerattn.train.collect import Tally
 
-_MOST_BYTES = 1 << 30
 _COUNTS = ("skipped_updates",)
 Metrics = Mapping[str, Any]
 """One line: env_steps, episodes, updates, seconds, env_steps_per_s, updates_per_s, losses by name,
@@ -91,7 +91,7 @@ class MetricsFile:
         else:
             self.path.unlink(missing_ok=True)
         self.bytes, self._digest = length, hashlib.sha256(kept)
-        last: Metrics | None = parse_json(kept.splitlines()[-1]) if kept else None
+        last: Metrics | None = parse_json(kept[kept.rfind(b"\n", 0, -1) + 1 :]) if kept else None
         return last
 
     def verified(self, length: int, sha256: str) -> bytes:
@@ -100,7 +100,7 @@ class MetricsFile:
         Raises:
             RunError: they are not there, or have another digest.
         """
-        kept = read_plain(self.path, _MOST_BYTES)[:length] if length else b""
+        kept = read_plain(self.path, MOST_METRICS_BYTES)[:length] if length else b""
         if len(kept) < length or hashlib.sha256(kept).hexdigest() != sha256:
             raise RunError(f"{self.path}: is not that of the checkpoint; it was altered")
         return kept

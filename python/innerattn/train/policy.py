@@ -18,7 +18,7 @@ from innerattn.learn.actor_critic import MOMENTS
 from innerattn.learn.types import Learner
 from innerattn.records.run_files import RunFiles
 from innerattn.records.run_folder import config_of, weights_name
-from innerattn.train.build import build_learner
+from innerattn.train.build import build_learner, refuse_larger_networks
 from innerattn.train.weights import MOST_BYTES, weights_in
 from innerattn.zoo import CARD, run_path
 
@@ -86,14 +86,15 @@ def moments_in(state: dict[str, Tensor]) -> dict[str, Tensor]:
 def _load(files: RunFiles, name: str, device: str) -> NewestPolicy:
     config = config_of(files)
     train = config.train.model_copy(update={"device": device})
-    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
-        learner = build_learner(config.model_copy(update={"train": train}), env)
     weights = files.path / name
     known = files.info.weights_sha256 if files.info.state != "running" else None
     tensors = weights_in(files.read(name, MOST_BYTES), weights, known)
-    if (files.path / CARD).is_file():  # a team of the zoo comes without moments
-        tensors = moments_in(learner.state()) | tensors
+    refuse_larger_networks(config, tensors, weights)
+    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
+        learner = build_learner(config.model_copy(update={"train": train}), env)
     try:
+        if (files.path / CARD).is_file():  # a team of the zoo comes without moments
+            tensors = moments_in(learner.state()) | tensors
         learner.load(tensors)
     except ValueError as error:
         raise RunError(f"{weights}: {error}") from error

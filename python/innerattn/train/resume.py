@@ -10,6 +10,7 @@ from innerattn.errors import RunError
 from innerattn.learn.resume import State
 from innerattn.records.run_files import RunFiles
 from innerattn.records.run_folder import RunInfo, config_of
+from innerattn.train.build import refuse_larger_networks
 from innerattn.train.checkpoint_info import MOST_BYTES as MOST_INFO_BYTES
 from innerattn.train.checkpoint_info import CheckpointInfo, checkpoint_info
 from innerattn.train.metrics import MetricsFile
@@ -93,7 +94,8 @@ def read_saved(run: Path) -> Saved:
         NothingToResumeError: the run is done, or has no checkpoint that it could go on from;
             `NothingSavedError` if it was stopped before its first one.
         DamagedCheckpointError: a file of the checkpoint is damaged.
-        RunError: there is no run, or a file of it is damaged.
+        RunError: there is no run, a file of it is damaged, or its weights are too few for its
+            networks.
         ConfigError: its configuration is not valid.
     """
     files = RunFiles(run)
@@ -127,6 +129,7 @@ def read_saved(run: Path) -> Saved:
             "on as it began"
         )
     weights, state = read.values()
+    refuse_larger_networks(config, weights, run / name / "weights.safetensors")
     return Saved(run, config, files.info, number, info, weights, state)
 
 

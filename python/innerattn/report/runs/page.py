@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
@@ -11,6 +10,7 @@ from typing import Any
 
 import tomli_w
 
+from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json, read_plain
 from innerattn.errors import RunError
 from innerattn.experiments.learning.curves import learning_curves
 from innerattn.experiments.paper.fig4 import fig4
@@ -222,10 +222,10 @@ def read_robustness(path: Path) -> dict[str, Any]:
         RunError: it cannot be read, or is none.
     """
     try:
-        found = json.loads(path.read_text("utf-8"))
+        found = parse_json(read_plain(path, MOST_JSON_BYTES, follow_link=True))
         if found["schema_version"] != 1 or not found["policies"]:
             raise ValueError("another document")
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise RunError(f"{path}: not a document of innerattn robustness --json") from error
     return dict(found)
 
