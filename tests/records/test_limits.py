@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import pytest
 from innerattn.config import Scenario
 from innerattn.errors import RunError
 from innerattn.evaluate.play import run_episodes
-from innerattn.policies import scripted_policy
+from innerattn.policies import PolicyInput, scripted_policy
 from innerattn.records import read_records, write_records
 
 FORMAT = b"innerattn.records"
@@ -129,16 +130,60 @@ def test_numbers_that_no_play_leaves_behind_are_refused(folder: Path, what: str)
         read_records(folder)
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_observations_are_finite(folder: Path, bad: float) -> None:
-    def spoil(parts: dict[str, Any]) -> None:
-        lists = parts["obs"].to_pylist()
-        lists[3][7] = bad
-        parts["obs"] = pa.array(lists, pa.large_list(pa.float32()))
+IN_A_STEP: dict[str, tuple[str, str, Any, str]] = {
+    "observation of nothing": ("greedy", "obs", np.nan, "obs: must be finite"),
+    "observation without end": ("greedy", "obs", np.inf, "obs: must be finite"),
+    "observation far off": ("greedy", "obs", 1e30, "obs: must be in -1e"),
+    "place far off": ("greedy", "positions", 1e30, "positions: must be in -1..=1"),
+    "place outside": ("greedy", "positions", -1.01, "positions: must be in -1..=1"),
+    "speed": ("greedy", "velocities", 1e5, "velocities: must be in -10000..=10000"),
+    "reward": ("greedy", "rewards", 1e30, "rewards: must be in -1e"),
+    "action": ("greedy", "actions", 5, "actions: must be in 0..=4"),
+    "attention": ("attentive", "attention", 1.5, "attention: must be in "),
+    "task": ("greedy", "victims", ("task", 2), "task of a victim: must be in 0..=1"),
+    "place of a victim": ("greedy", "victims", ("x", 1e30), "x of a victim: must be in -1..=1"),
+    "time of a victim": ("greedy", "victims", ("appeared_step", 26), "appeared_step of a victim"),
+    "fault": ("greedy", "faults", ("motor_gain", -1e30), "fault motor_gain: must be in "),
+}
 
-    forge(folder / "episodes.parquet", columns=spoil)
-    with pytest.raises(RunError, match="obs: must be finite"):
-        read_records(folder)
+
+class EvenAttention:
+    """A script that looks at all teammates alike."""
+
+    name, needs_true_state = "attentive", True
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._script = scripted_policy("greedy", scenario, 0)
+
+    def reset(self, seed: int) -> None:
+        self._script.reset(seed)
+
+    def act(self, view: PolicyInput) -> np.ndarray:
+        return np.asarray(self._script.act(view))
+
+    def attention(self, view: PolicyInput, actions: np.ndarray) -> np.ndarray:
+        assert len(actions) == len(view.obs)
+        even = (1 - np.eye(4, dtype=np.float32)) / 3
+        return np.broadcast_to(even, (len(actions), 1, 4, 4))
+
+
+@pytest.mark.parametrize("what", IN_A_STEP)
+def test_no_step_holds_what_worlds_cannot(tmp_path: Path, what: str) -> None:
+    policy_name, name, bad, message = IN_A_STEP[what]
+    scenario = Scenario.preset("mixed")
+    attentive = policy_name == "attentive"
+    policy = EvenAttention(scenario) if attentive else scripted_policy("greedy", scenario, 0)
+    record = run_episodes(policy, scenario, 2, 0, record=[name])
+    write_records([record], tmp_path)
+    read_records(tmp_path)
+    values = record.steps[name].copy()
+    if isinstance(bad, tuple):
+        values[bad[0]].flat[0] = bad[1]
+    else:
+        values.flat[0] = bad
+    write_records([replace(record, steps={name: values})], tmp_path)
+    with pytest.raises(RunError, match=message):
+        read_records(tmp_path)
 
 
 BOMB = """

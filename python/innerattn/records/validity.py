@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
 from innerattn.records.record import Record
 
 _MOST_EPISODE = 2**53
 _KINDS = "biuf"
+_MOST_SPEED_MPS = 1e4  # worlds take no more, see `BatchEnv.set_state`
+_MOST_SEEN = 1e6
+_MOST_REWARD = 1e12
+_MOST_FAULT = 1e3
+_ROUNDING = 1e-3
 
 
 def step_dtype(text: Any) -> np.dtype[Any]:
@@ -70,6 +77,38 @@ def refuse_impossible(record: Record) -> None:
         for part in [values[field] for field in values.dtype.names or ()] or [values]:
             if not np.isfinite(part).all():
                 raise ValueError(f"{name}: must be finite")
+    for name, values, low, high in _ranges(record):
+        if values.size and not (low <= values.min() and values.max() <= high):
+            raise ValueError(f"{name}: must be in {low:g}..={high:g}")
+
+
+def _ranges(record: Record) -> Iterator[tuple[str, NDArray[Any], float, float]]:
+    """What was recorded step by step, and the least and the most that worlds can hold."""
+    scenario, steps = record.scenario, record.steps
+    half = float(np.float32(scenario.arena_half_width_m))  # as worlds hold it
+    sizes = {
+        "obs": _MOST_SEEN,
+        "positions": half,
+        "velocities": _MOST_SPEED_MPS,
+        "rewards": _MOST_REWARD,
+    }
+    for name, size in sizes.items():
+        if name in steps:
+            yield name, steps[name], -size, size
+    if "attention" in steps:
+        yield "attention", steps["attention"], -_ROUNDING, 1.0 + _ROUNDING
+    if "actions" in steps:
+        low, high = (-1, 1) if scenario.actions == "continuous" else (0, NUM_DISCRETE_ACTIONS - 1)
+        yield "actions", steps["actions"], low, high
+    if "victims" in steps:
+        victims = steps["victims"][steps["victims"]["present"]]
+        yield "task of a victim", victims["task"], 0, len(scenario.tasks) - 1
+        yield "id of a victim", victims["id"], 0, 2**32 - 1
+        yield "appeared_step of a victim", victims["appeared_step"], 0, scenario.episode_steps
+        for axis in "xy":
+            yield f"{axis} of a victim", victims[axis], -half, half
+    for kind in steps["faults"].dtype.names or () if "faults" in steps else ():
+        yield f"fault {kind}", steps["faults"][kind], -_MOST_FAULT, _MOST_FAULT
 
 
 def _within(name: str, value: Any, low: int, high: int) -> None:
