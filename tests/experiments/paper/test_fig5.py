@@ -18,9 +18,10 @@ from innerattn.experiments.paper.scene import choose_scene, scene_json
 from innerattn.experiments.run import FinishedRun
 from innerattn.measures.sharing.handoff import HANDOFF, handoffs, need_following_attention
 from innerattn.measures.sharing.handoff_attention import handoff_attention
-from innerattn.report.paper.fig5 import evidence_lines
+from innerattn.report.paper.fig5 import evidence_lines, shift_sentence
 from innerattn.report.plots.aligned import draw_aligned
 from innerattn.report.plots.handoff import draw_handoff
+from innerattn.stats import Estimate
 
 
 @pytest.fixture(scope="module")
@@ -190,3 +191,34 @@ def test_all_handoffs_are_drawn_with_their_control(found: Evidence) -> None:
     assert np.array(drawn) == pytest.approx(np.array(courses))
     assert len(panel.collections) == 4
     assert json.dumps(evidence_json([found]), allow_nan=False)
+
+
+def shifted(found: Evidence, robot: float, control: float, own: Estimate) -> Evidence:
+    """The same evidence with other changes of the weight on the next partner."""
+    parts = [
+        {**of, "to_be": replace(of["to_be"], change=Estimate(change))}
+        for of, change in ((found.robot, robot), (found.control, control))
+    ]
+    return replace(found, robot=parts[0], control=parts[1], own_part=own)
+
+
+def test_one_sentence_tells_what_part_of_the_shift_singles_out_the_partner(
+    found: Evidence,
+) -> None:
+    rises = "After the first rescue the weight on the next partner rises by 0.28"
+    cases = [
+        (0.28, 0.21, Estimate(0.07, 0.02, 0.12), f"{rises}, a bystander's weight on it by 0.21: "
+         "75 % of the shift is the bystander's too, and 25 % (0.07 [0.02, 0.12]) singles out the "
+         "partner."),
+        (0.28, 0.21, Estimate(0.07, -0.02, 0.16), "25 % (0.07 [-0.02, 0.16]), whose interval "
+         "includes 0, singles out the partner."),
+        (0.28, -0.05, Estimate(0.33), f"{rises}, a bystander's weight on it does not (-0.05): the "
+         "whole shift singles out the partner."),
+        (0.28, 0.3, Estimate(-0.02), "by 0.30: nothing singles out the partner."),
+        (-0.04, 0.3, Estimate(-0.34), "does not rise (-0.04), so nothing singles it out."),
+    ]  # fmt: skip
+    for robot, control, own, words in cases:
+        assert words in shift_sentence(shifted(found, robot, control, own))
+    assert found.robot["to_be"].change is not None
+    assert f"{found.robot['to_be'].change.mean:.2f}" in shift_sentence(found)
+    assert "No handoff" in shift_sentence(replace(found, own_part=None))

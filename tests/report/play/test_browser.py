@@ -18,6 +18,10 @@ from innerattn.report.worlds import worlds_document
 
 HOSTILE = "</script><img src=x onerror='window.struck=1'>"
 
+# What the others give to the last robot now, a mean over heads.
+RECEIVED = """[0, 1, 2].map((other) => play.run.now.attention.reduce(
+  (sum, head) => sum + head[other][3], 0) / play.run.heads)"""
+
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
@@ -163,6 +167,10 @@ def test_a_broken_motor_slows_a_robot(browser: Browser) -> None:
         settle(page)
         assert state(page)["faults"][0] == {}
         assert driven(page) == pytest.approx(healthy, abs=1e-3)
+        until(page, "document.querySelectorAll('.chart .fault').length === 1")
+        (mark,) = page.locator(".chart .fault").all()
+        assert mark.locator("title").text_content() == "food_0: motor gain 20 %"
+        assert mark.locator("polygon").count() == 2, "it began and has ended"
 
 
 def test_a_robot_is_blinded_and_taken_out_and_comes_back(browser: Browser) -> None:
@@ -272,6 +280,24 @@ def test_another_policy_acts_on_the_same_state(browser: Browser, team: Any) -> N
         assert state(page)["policy"] == "mine"
         assert "of food_0's attention" in page.locator("#robots li").nth(1).inner_text()
         until(page, "document.querySelectorAll('.chart').length === 2")
+
+
+def test_who_still_attends_to_a_robot_that_is_out(browser: Browser, team: Any) -> None:
+    with played(team) as server, visit(browser, server.address) as seen:
+        page = seen.page
+        ready(page)
+        page.locator("#robots button").nth(3).click()
+        page.get_by_role("button", name="Take out").click()
+        page.get_by_role("combobox", name="Arrows").select_option("received")
+        settle(page)
+        shares = [f"{round(100 * share)} %" for share in page.evaluate(RECEIVED)]
+        for robot, share in enumerate(shares):
+            text = page.locator("#robots button").nth(robot).inner_text()
+            assert text.endswith(f"gives medical_0 {share}")
+        assert "attends most to medical_0, which is out (" in page.locator("#now").inner_text()
+        page.get_by_role("button", name="Steer").click()
+        settle(page)
+        assert page.get_by_role("button", name="Let go").is_visible()
 
 
 def test_two_browsers_play_apart_and_a_closed_page_gives_its_place_back(browser: Browser) -> None:

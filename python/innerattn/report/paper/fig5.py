@@ -67,6 +67,37 @@ def _run(part: Evidence, index: int) -> Row:
     )
 
 
+def shift_sentence(part: Evidence) -> str:
+    """How much of the shift to the next partner a bystander shows too, in one sentence."""
+    change, control, own = part.robot["to_be"].change, part.control["to_be"].change, part.own_part
+    if change is None or control is None or own is None:
+        return "No handoff tells how the weights shift."
+    if round(change.mean, 2) <= 0.0:
+        return (
+            "After the first rescue the weight on the next partner does not rise "
+            f"({format_signed(change.mean)}), so nothing singles it out."
+        )
+    opening = (
+        f"After the first rescue the weight on the next partner rises by {format_estimate(change)}"
+    )
+    bystander = f"a bystander's weight on it by {format_estimate(control)}"
+    if control.mean <= 0.0:
+        signed = format_signed(control.mean)
+        return (
+            f"{opening}, a bystander's weight on it does not ({signed}): the whole shift singles "
+            "out the partner."
+        )
+    if own.mean <= 0.0:
+        return f"{opening}, {bystander}: nothing singles out the partner."
+    shared = f"{100.0 * control.mean / change.mean:.0f} %"
+    apart = f"{100.0 * own.mean / change.mean:.0f} %"
+    doubt = ", whose interval includes 0," if own.low <= 0.0 and own.bounded else ""
+    return (
+        f"{opening}, {bystander}: {shared} of the shift is the bystander's too, and {apart} "
+        f"({format_estimate(own)}){doubt} singles out the partner."
+    )
+
+
 def evidence_lines(found: Sequence[Evidence]) -> list[AlignedLines]:
     """What is drawn."""
     lines = []

@@ -10,7 +10,10 @@ from innerattn.report.html import fill, shared_text
 from innerattn.report.local_server import Answer
 
 _WEB = files("innerattn.report.play") / "web"
-_SHARED = ("dom.js", "worlds.js", "story.js", "scene.js", "marks.js", "charts.js", "panel.js")
+_SHARED = (
+    *("dom.js", "theme.js", "worlds.js", "story.js", "ground.js", "room.js"),
+    *("scene.js", "marks.js", "charts.js", "panel.js"),
+)
 _SCRIPTS = ("live.js", "link.js", "hands.js", "forms.js", "app.js")
 
 
@@ -23,7 +26,7 @@ def play_page(name: str) -> str:
     return fill(
         _text("play.html"),
         title=escape(name),
-        style=f"{shared_text('arena.css')}\n{_text('play.css')}",
+        style=f"{shared_text('colours.css', 'arena.css')}\n{_text('play.css')}",
         script="\n".join([shared_text(*_SHARED), *map(_text, _SCRIPTS)]),
     )
 

@@ -12,7 +12,10 @@ from innerattn.report.html import fill, json_text, shared_text
 from innerattn.report.replay.data import replay_document
 
 _WEB = files("innerattn.report.replay") / "web"
-_SHARED = ("dom.js", "worlds.js", "story.js", "scene.js", "marks.js", "charts.js", "panel.js")
+_SHARED = (
+    *("dom.js", "theme.js", "worlds.js", "story.js", "ground.js", "room.js"),
+    *("scene.js", "marks.js", "charts.js", "panel.js"),
+)
 _SCRIPTS = ("data.js", "app.js")
 
 
@@ -37,7 +40,7 @@ def page_of(document: dict[str, Any], names: Sequence[str]) -> str:
     return fill(
         _text("page.html"),
         title=escape(_listed(names)),
-        style=f"{shared_text('arena.css')}\n{_text('replay.css')}",
+        style=f"{shared_text('colours.css', 'arena.css')}\n{_text('replay.css')}",
         script="\n".join([shared_text(*_SHARED), *map(_text, _SCRIPTS)]),
         data=json_text(document),
     )

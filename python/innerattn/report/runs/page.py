@@ -21,7 +21,7 @@ from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.records.run_folder import read_config
 from innerattn.report.html import fill, html_table, json_text, shared_text
 from innerattn.report.paper.fig4 import entropy_table
-from innerattn.report.paper.fig5 import evidence_summary
+from innerattn.report.paper.fig5 import evidence_summary, shift_sentence
 from innerattn.report.paper.table2 import sharing_summary
 from innerattn.report.replay.data import MOST_RECORDS, refuse_what_cannot_replay
 from innerattn.report.replay.page import replay_page
@@ -107,8 +107,8 @@ def runs_page(
         title=escape(title),
         verdict=escape(verdict(groups)),
         subtitle=escape(f"{count}; {versions_text(runs)}"),
-        style=shared_text("page.css"),
-        script=f"{shared_text('dom.js', 'marks.js', 'plots.js')}\n{_text('report.js')}",
+        style=shared_text("colours.css", "page.css"),
+        script=f"{shared_text('dom.js', 'theme.js', 'marks.js', 'plots.js')}\n{_text('report.js')}",
         parts="\n".join(parts),
         plots=json_text([plot.to_json() for plot in plots]),
     )
@@ -161,7 +161,8 @@ def _attention(
     parts.append(html_table(entropy_table(courses)))
     found = [one for one in map(evidence, groups) if one is not None]
     if found:
-        parts += [_figure(handoff_plot(one), plots) for one in found]
+        for one in found:
+            parts += [_figure(handoff_plot(one), plots), f"<p>{escape(shift_sentence(one))}</p>"]
         parts.append(html_table(evidence_summary(found)))
     else:
         parts.append("<p>No handoff was recorded that tells anything about attention.</p>")

@@ -13,7 +13,7 @@ from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence
 from innerattn.stats.seeds import BAND_NAMES, SeedCurve
 
-_COLOURS = 6  # of lines, and of kinds of robots, in ``web/page.css``
+_COLOURS = 6  # of lines, and of kinds of robots, in ``web/colours.css``
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Line:
         name: what it is.
         x: times, or numbers of rows.
         y: values at these; None where there is none.
-        colour: a colour of ``web/page.css``, such as "series-0".
+        colour: a colour of ``web/colours.css``, such as "series-0".
         dash: 0 for a solid line, more for other dashes.
         low: lower ends of its band or intervals; empty for none.
         high: upper ends, likewise.

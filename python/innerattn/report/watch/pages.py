@@ -59,8 +59,8 @@ def watch_pages(
     """
     first = fill(
         _text("watch.html"),
-        style=f"{shared_text('page.css')}\n{_text('watch.css')}",
-        script=f"{shared_text('dom.js', 'marks.js', 'plots.js')}\n{_text('watch.js')}",
+        style=f"{shared_text('colours.css', 'page.css')}\n{_text('watch.css')}",
+        script=f"{shared_text('dom.js', 'theme.js', 'marks.js', 'plots.js')}\n{_text('watch.js')}",
     )
     pages: dict[str, Callable[[], Answer]] = {
         "": partial(Answer, "text/html", first),

@@ -18,13 +18,14 @@ class Charts {
   }
 
   /** Draws the charts of an episode anew. */
-  show(run, episode, robot, head) {
-    Object.assign(this, { run, episode, robot });
+  show(run, episode, look) {
+    const robot = Math.max(look.robot, 0);
+    Object.assign(this, { run, episode, robot, look: { ...look, robot } });
     this.length = run.lengths[episode];
     this.width = Math.max(300, this.box.clientWidth || CHART.width);
     this.cursors = [];
     const charts = [];
-    if (run.attention) charts.push(this.attentionChart(head));
+    if (run.attention) charts.push(this.attentionChart());
     if (run.rewards.length) charts.push(this.rewardChart());
     charts.push(this.distanceChart());
     this.box.replaceChildren(...charts);
@@ -52,13 +53,14 @@ class Charts {
     return Array.from({ length: this.length }, (_, step) => of(step));
   }
 
-  attentionChart(head) {
-    const { run, episode, robot } = this, even = 1 / (run.size - 1);
+  attentionChart() {
+    const { run, episode, robot, look } = this, even = 1 / (run.size - 1);
     const lines = run.worlds.robots.filter((one) => one.index !== robot).map((one) => (
-      this.lineOf(one.index, one.name, (step) => run.weight(episode, step, head, robot, one.index))
+      this.lineOf(one.index, one.name, (step) => chosenWeight(run, episode, step, look, one.index))
     ));
-    const which = head < 0 ? `mean of ${counted(run.heads, "head")}` : `head ${head + 1}`;
-    return this.chart(`Attention of ${this.name(robot)}`, `to each teammate, ${which}; dashed: even`, lines, {
+    const which = look.head < 0 ? `mean of ${counted(run.heads, "head")}` : `head ${look.head + 1}`;
+    const [title, whose] = look.received ? ["Attention received by", "from"] : ["Attention of", "to"];
+    return this.chart(`${title} ${this.name(robot)}`, `${whose} each teammate, ${which}; dashed: even`, lines, {
       low: 0, high: Math.max(1.5 * even, ...known(lines)), text: percent,
       level: even, spans: this.handoffSpans(),
     });
@@ -72,7 +74,7 @@ class Charts {
   }
 
   rewardChart() {
-    const { run, episode, robot } = this, marks = ["var(--accent)", "var(--victim)", "var(--kind-2)", "var(--quiet)"];
+    const { run, episode, robot } = this, marks = ["var(--ink)", "var(--victim)", "var(--accent)", "var(--quiet)"];
     const lines = run.rewards.map(({ name }, index) => ({
       label: name, colour: marks[index % marks.length], dash: DASHES[index % DASHES.length],
       values: this.series((step) => run.reward(index, episode, step, robot)),
@@ -102,7 +104,7 @@ class Charts {
     for (const { from, to, text } of scale.spans || []) {
       const [x0, x1] = [this.x(from), this.x(to)];
       picture.append(svg("rect", { x: x0, y: top, width: x1 - x0, height: height - top - bottom, fill: "var(--grid)" }));
-      texts.push(svg("text", { x: (x0 + x1) / 2, y: top + 11, "text-anchor": "middle", class: "over" }, text));
+      texts.push({ x: (x0 + x1) / 2, text });
     }
     for (const value of [scale.low, scale.high]) {
       picture.append(svg("line", { x1: left, x2: end, y1: y(value), y2: y(value), stroke: "var(--line)" }));
@@ -113,10 +115,11 @@ class Charts {
     for (const rescue of this.run.rescues[this.episode]) {
       picture.append(eventMark("rescue", this.x(rescue.step), height - bottom + 9));
     }
+    texts.push(...this.addFaults(picture, height - bottom));
     const drawn = [...lines].sort((a, b) => Number(a.thick || 0) - Number(b.thick || 0));
     for (const line of drawn) picture.append(this.path(line, y, lines.length));
     this.addLabels(picture, lines, y, end);
-    picture.append(...texts);
+    picture.append(...this.texts(texts, end));
     const cursor = svg("line", { x1: 0, x2: 0, y1: 0, y2: height - bottom + 2, stroke: "var(--ink)", "stroke-width": 1.5 });
     picture.append(cursor);
     this.cursors.push(cursor);
@@ -128,6 +131,33 @@ class Charts {
     box.className = "chart";
     box.append(heading, picture);
     return box;
+  }
+
+  /** Marks the faults of all robots on the axis; gives their texts, of few robots or the chosen one. */
+  addFaults(picture, axis) {
+    const { run } = this, last = this.length - 1;
+    return run.faults[this.episode].flatMap((fault) => {
+      const from = this.x(fault.start), to = this.x(Math.min(fault.end, last));
+      const text = `${this.name(fault.robot)}: ${faultText(run.worlds, fault)}`;
+      const mark = svg("g", { class: "fault" });
+      mark.append(svg("title", {}, text), svg("rect", { x: from, y: axis - 2, width: Math.max(to - from, 2), height: 4, fill: "var(--blocked)" }),
+        eventMark("fault", from, axis + 9));
+      if (fault.end <= last) mark.append(eventMark("recovery", to, axis + 9));
+      picture.append(mark);
+      return run.size <= MANY_LINES || fault.robot === this.robot ? [{ x: from, text }] : [];
+    });
+  }
+
+  /** Texts in up to three rows, clear of each other; what finds no room is left out. */
+  texts(found, end) {
+    const rows = [[], [], []];
+    return found.flatMap(({ x, text }) => {
+      const half = 3.2 * [...text].length, at = Math.min(Math.max(x, CHART.left + half), Math.max(end - half, CHART.left + half));
+      const row = rows.findIndex((taken) => taken.every((other) => Math.abs(other.at - at) > other.half + half));
+      if (row < 0) return [];
+      rows[row].push({ at, half });
+      return [svg("text", { x: at, y: CHART.top + 11 + 14 * row, "text-anchor": "middle", class: "over" }, text)];
+    });
   }
 
   path(line, y, count) {

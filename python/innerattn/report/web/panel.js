@@ -23,12 +23,21 @@ class RobotList {
       note.className = faults.length ? "bad" : "";
       const parts = faults.length ? faults : [`offers ${listed(robot.abilities)}`];
       if (run.attention && look.robot >= 0 && index !== look.robot) {
-        const weight = run.weight(episode, step, look.head, look.robot, index);
-        parts.push(`${percent(weight)} of ${this.worlds.robots[look.robot].name}'s attention`);
+        const weight = percent(chosenWeight(run, episode, step, look, index)), { name } = this.worlds.robots[look.robot];
+        parts.push(look.received ? `gives ${name} ${weight}` : `${weight} of ${name}'s attention`);
       }
       note.textContent = parts.join(" · ");
     });
   }
+}
+
+/** Shows what is chosen in the controls that both pages with an arena have. */
+function showLook({ received, all, least }) {
+  $("direction").value = received ? "received" : "given";
+  $("all").checked = all;
+  $("least-box").hidden = !all;
+  $("least").value = String(Math.round(100 * least));
+  $("least-text").textContent = percent(least);
 }
 
 class EventList {
@@ -85,12 +94,24 @@ function fillLegend(list, worlds) {
   worlds.tasks.forEach((task, index) => {
     row(taskSymbol(index), `victim of ${task.name}, needs ${listed(task.needs)}`);
   });
+  const line = (d, stroke = "var(--ink)", more = {}) => symbol(svg("path", { d, stroke, fill: "none", "stroke-width": 2.5, ...more }));
+  const disc = (fill, stroke, radius = 8) => svg("circle", { r: radius, fill, stroke, "stroke-width": 2 });
+  const kind = kindColour(0), cross = svg("path", { d: "M-6 -6L6 6M6 -6L-6 6", stroke: "var(--blocked)", "stroke-width": 3 });
+  row(symbol(svg("circle", { r: 10, fill: "none", stroke: "var(--ink)", "stroke-width": 2 }), disc(kind, "none", 6)), "the chosen robot");
+  row(line("M-9 0H9"), "line out of a robot: its velocity");
+  row(line("M-9 0H9", kind, { opacity: 0.4 }), "pale line behind a robot: its trail, the last 15 steps");
+  row(line("M-9 4Q-2 -6 5 -1M1 -4L7 1L0 3", kind), "arrow: attention, from the robot that attends; the wider, the larger the weight");
+  row(symbol(disc("var(--floor)", kind)), "small disc at a victim: what it needs");
+  row(symbol(disc(kind, kind)), "filled small disc: a robot that offers it is inside the rescue radius");
   const ring = svg("circle", { r: 9, fill: "none", stroke: "var(--victim)", "stroke-dasharray": "4 3", "stroke-width": 1.5 });
-  row(symbol(ring), "rescue radius: a need is filled while a robot that offers it is inside");
+  row(symbol(ring), "dashed circle: the rescue radius");
   const brackets = svg("path", { d: "M-7 -6a9 9 0 0 0 0 12M7 -6a9 9 0 0 1 0 12", fill: "none", stroke: "var(--blocked)", "stroke-width": 3 });
   row(symbol(brackets), "blocked robot");
   row(symbol(eventMark("fault", 0, 0)), "a fault, or where it begins");
   row(symbol(eventMark("recovery", 0, 0)), "where a fault ends");
+  row(line("M-9 0H9", "var(--blocked)", { "stroke-width": 4 }), "line below a chart: how long a fault lasts");
+  row(symbol(disc("var(--floor)", kind), cross), "a robot that is out");
   row(symbol(eventMark("rescue", 0, 0)), "a rescue");
   row(symbol(eventMark("handoff", 0, 0)), "a handoff: a robot rescues with another partner than before");
+  row(symbol(svg("rect", { x: -9, y: -9, width: 18, height: 18, fill: "var(--grid)", stroke: "var(--line)" })), "grey band in a chart: from the rescue before a handoff to that after it");
 }

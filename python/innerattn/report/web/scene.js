@@ -4,18 +4,11 @@ const TRAIL_STEPS = 15;
 const FLASH_STEPS = 2.5;
 const WIDEST_ARROW = 0.055; // of the arena's half width, for a weight of 1
 const FEW_ROBOTS = 8;
+const BADGE = 8.5; // radius of what a victim needs, px
 
-/** The page's colours as canvases need them. */
-function paints() {
-  const style = getComputedStyle(document.documentElement), found = { kinds: [] };
-  const names = ["floor", "grid", "wall", "ink", "quiet", "victim", "obstacle", "obstacle-line",
-    "blocked", "card", "neutral"];
-  for (const name of names) found[name] = style.getPropertyValue(`--${name}`).trim();
-  for (let kind = 0; kind < KINDS; kind++) {
-    found.kinds.push(style.getPropertyValue(`--kind-${kind}`).trim());
-  }
-  found.of = (kindIndex) => (kindIndex < 0 ? found.neutral : found.kinds[kindIndex % KINDS]);
-  return found;
+/** The weight from which on arrows of all robots are drawn at first: of large teams the strongest. */
+function strongWeight(size) {
+  return size > 4 ? Math.ceil(200 / (size - 1)) / 100 : 0;
 }
 
 class Scene {
@@ -58,84 +51,31 @@ class Scene {
     return found;
   }
 
-  /** Draws a moment. look: {robot, all, head, trails}; robot -1: nobody is chosen. */
+  /**
+   * Draws a moment. look: {robot, received, all, least, head, trails}; robot -1: nobody is chosen.
+   * Where no free place is left for a badge it lies below robots, and a text is left out.
+   */
   draw(episode, step, look, paint) {
-    const { context, run } = this;
-    Object.assign(this, { episode, step, look, paint, taken: [], labels: [] });
-    this.spots = this.worlds.robots.map((one) => this.at(...run.place(episode, step, one.index)));
+    const { context, run, worlds } = this, victims = run.victims[episode];
+    Object.assign(this, { episode, step, look, paint, labels: [] });
+    this.spots = worlds.robots.map((one) => this.at(...run.place(episode, step, one.index)));
+    this.room = new Room(this.side, worlds.robots.map(({ index, radius_m: radius }) => (
+      [...this.spots[index], radius * this.scale + (index === look.robot ? 6 : 2)]
+    )));
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     context.clearRect(0, 0, this.side, this.side);
     context.lineJoin = context.lineCap = "round";
-    this.drawArena();
-    if (look.trails) this.worlds.robots.forEach((robot) => this.drawTrail(robot));
-    run.victims[episode].forEach((victim) => this.drawVictim(victim));
+    drawGround(this);
+    if (look.trails) worlds.robots.forEach((robot) => this.drawTrail(robot));
+    victims.forEach((victim) => this.drawVictim(victim));
     run.rescues[episode].forEach((rescue) => this.drawFlash(rescue));
-    if (run.attention && !look.all && look.robot >= 0) this.drawArrows(look.robot, 0.9);
-    if (run.attention && look.all) {
-      this.worlds.robots.forEach((one) => this.drawArrows(one.index, one.index === look.robot ? 0.95 : 0.5));
-    }
-    this.worlds.robots.forEach((robot) => this.drawRobot(robot));
-    run.victims[episode].forEach((victim) => this.drawNeeds(victim));
-    if (this.worlds.robots.length <= FEW_ROBOTS) {
-      this.labels.forEach(([text, places]) => {
-        const width = this.measure(text, true);
-        const isClear = ([x, y]) => this.taken.every(([tx, ty, tw]) => (
-          Math.abs(tx - x) > (tw + width) / 2 || Math.abs(ty - y) > this.letters
-        ));
-        const place = places.find(isClear); // the list beside the arena has every weight
-        if (place) this.write(text, ...place, true);
-      });
-    }
-    this.worlds.robots.forEach((robot) => this.drawName(robot));
-  }
-
-  drawArena() {
-    const { context, paint, scale, worlds } = this, half = worlds.half_width_m;
-    const [left, top] = this.at(-half, half), side = 2 * half * scale;
-    context.fillStyle = paint.floor;
-    context.fillRect(left, top, side, side);
-    context.strokeStyle = paint.grid;
-    context.lineWidth = 1;
-    context.setLineDash([]);
-    context.beginPath();
-    for (let line = -Math.floor(half * 2) / 2; line < half; line += 0.5) {
-      const [x, y] = this.at(line, line);
-      context.moveTo(x, top);
-      context.lineTo(x, top + side);
-      context.moveTo(left, y);
-      context.lineTo(left + side, y);
-    }
-    context.stroke();
-    worlds.obstacles.forEach((shape, index) => this.drawObstacle(shape, index));
-    context.strokeStyle = paint.wall;
-    context.lineWidth = 3;
-    context.strokeRect(left - 1.5, top - 1.5, side + 3, side + 3);
-    context.lineWidth = 2;
-    context.beginPath();
-    context.moveTo(left + 10, top + side - 10);
-    context.lineTo(left + 10 + 0.5 * scale, top + side - 10);
-    context.strokeStyle = paint.quiet;
-    context.stroke();
-    this.font(11);
-    context.fillStyle = paint.quiet;
-    context.textAlign = "left";
-    context.fillText("0.5 m", left + 10, top + side - 18);
-  }
-
-  drawObstacle(shape, index) {
-    const { context, paint, scale } = this;
-    const [x, y] = this.at(...this.worlds.obstacle(this.episode, index));
-    context.beginPath();
-    if (shape.radius_m !== null) context.arc(x, y, shape.radius_m * scale, 0, 7);
-    else {
-      const [width, height] = shape.half_extents_m.map((half) => half * scale);
-      context.rect(x - width, y - height, 2 * width, 2 * height);
-    }
-    context.fillStyle = paint.obstacle;
-    context.strokeStyle = paint["obstacle-line"];
-    context.lineWidth = 1.5;
-    context.fill();
-    context.stroke();
+    if (run.attention) this.drawAttention();
+    worlds.robots.forEach((robot) => this.drawFault(robot));
+    victims.forEach((victim) => this.drawNeeds(victim));
+    worlds.robots.forEach((robot) => this.drawRobot(robot));
+    // The list beside the arena has every weight.
+    if (worlds.robots.length <= FEW_ROBOTS) this.labels.forEach(([text, places]) => this.writeAt(text, places, true));
+    worlds.robots.forEach((robot) => this.drawName(robot));
   }
 
   drawTrail(robot) {
@@ -173,21 +113,23 @@ class Scene {
     taskCorners(victim.task, x, y, 7).forEach(([px, py]) => context.lineTo(px, py));
     context.closePath();
     context.fill();
+    this.room.take(x, y, 8, 8);
   }
 
-  /** What a victim needs, in small discs on top of its circle; a need that is met is filled. */
+  /** What a victim needs, in small discs on its circle; a need that is met is filled. */
   drawNeeds(victim) {
     if (this.step < victim.from || this.step >= victim.to) return;
-    const radius = this.worlds.rescue_radius_m * this.scale, size = 8.5, gap = 2 * size + 2;
+    const radius = this.worlds.rescue_radius_m * this.scale, gap = 2 * BADGE + 2;
     const { needs } = this.worlds.tasks[victim.task], half = ((needs.length - 1) / 2) * gap;
-    const [x, y] = this.at(victim.x, victim.y), edge = half + size + 3;
-    const middle = Math.min(Math.max(x, edge), this.side - edge);
-    const top = y - Math.max(radius, 18);
-    const height = top > size + 3 ? top : y + Math.max(radius, 18);
+    const [x, y] = this.at(victim.x, victim.y), reach = Math.max(radius, 18);
+    const places = [reach, reach + gap].flatMap((far) => [0, 45, -45, 90, -90, 135, -135, 180].map((turn) => {
+      const angle = (turn * Math.PI) / 180;
+      return [x + far * Math.sin(angle), y - far * Math.cos(angle)];
+    }));
+    const [middle, height] = this.room.find(places, half + BADGE + 1, BADGE + 1) ?? places[0];
     needs.forEach((need, index) => {
-      this.drawNeed(need, middle - half + index * gap, height, size, this.isMet(victim, need, radius));
+      this.drawNeed(need, middle - half + index * gap, height, BADGE, this.isMet(victim, need, radius));
     });
-    this.taken.push([middle, height + 4, 2 * edge]);
   }
 
   /** Whether a robot that offers what is needed is near enough. */
@@ -240,20 +182,28 @@ class Scene {
     context.globalAlpha = fade;
     context.stroke();
     context.globalAlpha = 1;
-    this.write("rescued", x, y + radius + 14, true);
+    this.writeAt("rescued", [[x, y + radius + 14], [x, y - radius - 8]], true);
   }
 
-  /** The arrows from one robot to its teammates; the width of each is its weight. */
-  drawArrows(robot, alpha) {
-    const { run, worlds, episode, step, look } = this;
-    for (const other of worlds.robots) {
-      if (other.index === robot) continue;
-      const weight = run.weight(episode, step, look.head, robot, other.index);
-      const width = weight * WIDEST_ARROW * this.side / 2;
-      if (width < 0.4) continue;
-      const places = this.arrow(worlds.robots[robot], other, width, alpha);
-      if (robot === look.robot) this.labels.push([percent(weight), places]);
+  /** Arrows of the chosen robot, or from it and to it and of all others that are strong enough. */
+  drawAttention() {
+    const { worlds, look } = this;
+    for (const { index: from } of worlds.robots) {
+      for (const { index: to } of worlds.robots) {
+        const isOwn = (look.received ? to : from) === look.robot;
+        if (from !== to && (look.all || isOwn)) this.drawArrow(from, to, isOwn);
+      }
     }
+  }
+
+  /** The arrow from one robot to another; its width is the weight. */
+  drawArrow(from, to, isOwn) {
+    const { run, worlds, episode, step, look } = this;
+    const weight = run.weight(episode, step, look.head, from, to);
+    const width = weight * WIDEST_ARROW * this.side / 2;
+    if (width < 0.4 || (look.all && weight < look.least)) return;
+    const places = this.arrow(worlds.robots[from], worlds.robots[to], width, isOwn ? 0.9 : 0.5);
+    if (isOwn) this.labels.push([percent(weight), places]);
   }
 
   /** A bent arrow between two robots; gives places for its label, the best first. */
@@ -284,7 +234,7 @@ class Scene {
     context.fill();
     context.globalAlpha = 1;
     context.lineCap = "round";
-    return [0.5, 0.65, 0.35, 0.75].map((part) => {
+    return [0.5, 0.65, 0.35, 0.75, 0.25, 0.58, 0.42, 0.82, 0.18].map((part) => {
       const out = 2 * part * (1 - part) * bend;
       return [ax + (bx - ax) * part + nx * out, ay + (by - ay) * part + ny * out + this.letters / 3];
     });
@@ -316,7 +266,7 @@ class Scene {
     context.fillStyle = away ? paint.ink : letterColour(robot.kindIndex);
     context.fillText(letters, x, y + 0.36 * size);
     if (run.isBlocked(episode, step, robot.index)) this.drawBlocked(x, y, radius);
-    if (run.faultsAt(episode, step, robot.index).length) this.drawFault(x, y, radius, away);
+    if (away) this.drawCross(x, y, 0.8 * radius);
   }
 
   drawHeading(robot, x, y, radius) {
@@ -344,9 +294,13 @@ class Scene {
     }
   }
 
-  /** A triangle at the robot's upper right; a cross over a robot that is away. */
-  drawFault(x, y, radius, away) {
-    const { context, paint } = this, fx = x + radius + 3, fy = y - radius - 2;
+  /** A triangle at a corner of the robot. */
+  drawFault(robot) {
+    const { context, paint, run, room } = this, [x, y] = this.spots[robot.index];
+    if (!run.faultsAt(this.episode, this.step, robot.index).length) return;
+    const away = robot.radius_m * this.scale + 3;
+    const corners = [[1, -1], [-1, -1], [1, 1], [-1, 1]].map(([right, down]) => [x + right * away, y + down * away]);
+    const [fx, fy] = room.find(corners, 7, 7, robot.index) ?? corners[0];
     context.fillStyle = paint.blocked;
     context.strokeStyle = paint.card;
     context.lineWidth = 1.5;
@@ -355,11 +309,14 @@ class Scene {
     context.closePath();
     context.stroke();
     context.fill();
-    if (!away) return;
-    context.strokeStyle = paint.blocked;
+  }
+
+  /** Over a robot that is out. */
+  drawCross(x, y, arm) {
+    const { context } = this;
+    context.strokeStyle = this.paint.blocked;
     context.lineWidth = 3;
     context.beginPath();
-    const arm = 0.8 * radius;
     context.moveTo(x - arm, y - arm);
     context.lineTo(x + arm, y + arm);
     context.moveTo(x + arm, y - arm);
@@ -368,25 +325,16 @@ class Scene {
   }
 
   drawName(robot) {
-    if (this.worlds.robots.length > FEW_ROBOTS && robot.index !== this.look.robot) return;
+    const chosen = robot.index === this.look.robot;
+    if (this.worlds.robots.length > FEW_ROBOTS && !chosen) return;
     const [x, y] = this.spots[robot.index], away = robot.radius_m * this.scale + 9;
-    const lower = away + 0.7 * this.letters;
-    const width = this.measure(robot.name, false), edge = width / 2 + 4, beside = away + width / 2;
+    const width = this.measure(robot.name, chosen), edge = width / 2 + 4;
+    const lower = away + 0.7 * this.letters, beside = away + width / 2;
     const places = [
       [0, -away], [0, lower], [beside, 4], [-beside, 4], [0, -away - 14], [0, lower + 14],
-      [0, -away - 28], [0, lower + 28],
+      [beside, -away], [-beside, -away], [beside, lower], [-beside, lower], [0, -away - 28], [0, lower + 28],
     ].map(([dx, dy]) => [Math.min(Math.max(x + dx, edge), this.side - edge), y + dy]);
-    const inside = places.filter(([, py]) => py > this.letters + 4 && py < this.side - 6);
-    const place = inside.find(([px, py]) => this.isFree(px, py, width)) || inside[0];
-    this.write(robot.name, ...place, robot.index === this.look.robot);
-  }
-
-  isFree(x, y, width) {
-    return this.taken.every(([tx, ty, tw]) => (
-      Math.abs(tx - x) > (tw + width) / 2 + 4 || Math.abs(ty - y) > this.letters + 1
-    )) && this.spots.every(([sx, sy]) => (
-      Math.abs(sx - x) > width / 2 + 4 || Math.abs(sy - y + this.letters / 3) > 16
-    ));
+    this.writeAt(robot.name, places, chosen);
   }
 
   font(size, bold = false) {
@@ -396,6 +344,13 @@ class Scene {
   measure(text, bold) {
     this.font(this.letters, bold);
     return this.context.measureText(text).width;
+  }
+
+  /** Writes a text at the first place, the middle of its base line, where it covers nothing. */
+  writeAt(text, places, bold) {
+    const width = this.measure(text, bold) / 2 + 2, rise = 0.35 * this.letters;
+    const found = this.room.find(places.map(([x, y]) => [x, y - rise]), width, 0.55 * this.letters);
+    if (found) this.write(text, found[0], found[1] + rise, bold);
   }
 
   /** Text with an edge of the floor's colour. */
@@ -408,6 +363,5 @@ class Scene {
     context.strokeText(text, x, y);
     context.fillStyle = paint.ink;
     context.fillText(text, x, y);
-    this.taken.push([x, y, context.measureText(text).width]);
   }
 }

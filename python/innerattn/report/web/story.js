@@ -119,23 +119,30 @@ function sortedEpisodes(runs, sort, chosen) {
 
 function episodeText(runs, episode) {
   const number = runs[0].worlds.first_episode + episode;
-  const rescues = runs.map((run) => rescueCount(run, episode));
-  const parts = [`Episode ${number}`];
-  parts.push(runs.length > 1 ? `${rescues.join(" : ")} rescues` : counted(rescues[0], "rescue"));
-  const total = (of) => runs.reduce((sum, run) => sum + of(run), 0);
-  const handoffs = total((run) => run.handoffs[episode].length);
-  const faults = total((run) => run.faults[episode].length);
-  if (handoffs) parts.push(counted(handoffs, "handoff"));
-  if (faults) parts.push(counted(faults, "fault"));
+  const counts = (of, what) => {
+    const found = runs.map((run) => of(run)[episode].length);
+    return found.length > 1 ? `${found.join(" : ")} ${what}s` : counted(found[0], what);
+  };
+  const parts = [`Episode ${number}`, counts((run) => run.rescues, "rescue")];
+  if (runs.some((run) => run.handoffs[episode].length)) parts.push(counts((run) => run.handoffs, "handoff"));
+  if (runs.some((run) => run.faults[episode].length)) parts.push(counts((run) => run.faults, "fault"));
   return parts.join(" · ");
 }
 
-/** Whom a robot attends to most, as a sentence; "" without attention. */
-function attentionText(run, episode, step, head, robot) {
+/** The weight between the chosen robot and another: what it gives, or what it receives. */
+function chosenWeight(run, episode, step, look, other) {
+  const [from, to] = look.received ? [other, look.robot] : [look.robot, other];
+  return run.weight(episode, step, look.head, from, to);
+}
+
+/** Whom the chosen robot attends to most, or who attends most to it; "" without attention. */
+function attentionText(run, episode, step, look) {
   if (!run.attention) return "";
-  const others = run.worlds.robots.filter((one) => one.index !== robot);
-  const weights = others.map((one) => run.weight(episode, step, head, robot, one.index));
-  const best = weights.indexOf(Math.max(...weights));
-  return `${run.worlds.robots[robot].name} attends most to ${others[best].name} ` +
-    `(${percent(weights[best])}).`;
+  const others = run.worlds.robots.filter((one) => one.index !== look.robot);
+  const weights = others.map((one) => chosenWeight(run, episode, step, look, one.index));
+  const best = weights.indexOf(Math.max(...weights)), { name } = run.worlds.robots[look.robot];
+  if (!look.received) return `${name} attends most to ${others[best].name} (${percent(weights[best])}).`;
+  const out = run.isAway(episode, step, look.robot) ? ", which is out" : "";
+  return `Of all teammates ${others[best].name} attends most to ${name}${out} ` +
+    `(${percent(weights[best])}; even: ${percent(1 / others.length)}).`;
 }

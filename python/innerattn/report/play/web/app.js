@@ -16,7 +16,8 @@ class App {
     this.worlds = new Worlds(worlds, opened.obstacles.flat(), 1);
     this.policies = policies;
     this.run = new LiveRun(document.title, this.worlds);
-    this.look = { robot: 0, all: false, head: -1, trails: true };
+    this.look = { robot: 0, received: false, all: false, least: 0, head: -1, trails: true };
+    this.look.least = strongWeight(this.worlds.robots.length);
     // Only this page changes them: what was asked for last is so, though the answer is on its way.
     Object.assign(this, { steered: opened.steered, policy: opened.policy });
     Object.assign(this, { running: false, due: 0, arrived: 0, charted: 0, times: [], drive: [], moving: null });
@@ -35,7 +36,7 @@ class App {
     this.take(opened);
     this.fillControls();
     this.listen();
-    this.setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    startTheme(() => this.takeTheme());
     this.setSpeed(0.5);
     this.setRunning(!matchMedia("(prefers-reduced-motion: reduce)").matches);
     setInterval(() => this.stayAlive(), ALIVE_MS / 4);
@@ -78,12 +79,11 @@ class App {
     on("policy", "change", () => this.choosePolicy($("policy").value));
     on("head", "change", () => this.setLook({ head: Number($("head").value) }));
     on("all", "change", () => this.setLook({ all: $("all").checked }));
+    on("least", "input", () => this.setLook({ least: $("least").value / 100 }));
+    on("direction", "change", () => this.setLook({ received: $("direction").value === "received" }));
     on("trails", "change", () => this.setLook({ trails: $("trails").checked }));
     on("task", "change", () => this.setTool("add"));
     on("steer", "click", () => this.toggleSteering());
-    on("theme", "click", () => {
-      this.setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
-    });
     for (const radio of document.querySelectorAll("[name=tool]")) {
       radio.addEventListener("change", () => this.setTool(radio.value));
     }
@@ -238,7 +238,7 @@ class App {
 
   setLook(look) {
     Object.assign(this.look, look);
-    $("all").checked = this.look.all;
+    showLook(this.look);
     this.charted = 0;
     this.fresh = this.stale = this.chartsAreOld = true;
   }
@@ -259,9 +259,8 @@ class App {
     $("now").setAttribute("aria-live", running ? "off" : "polite");
   }
 
-  setTheme(theme) {
-    document.documentElement.dataset.theme = theme;
-    $("theme").textContent = theme === "dark" ? "Light" : "Dark";
+  /** Takes the colours of the theme. */
+  takeTheme() {
     this.paint = paints();
     $("robots").replaceChildren();
     this.robots = new RobotList($("robots"), this.worlds, (robot) => this.choose(robot));
@@ -308,7 +307,7 @@ class App {
 
   showCharts() {
     const recent = this.run.recent(CHART_STEPS);
-    this.charts.show(recent, 0, this.look.robot, this.look.head);
+    this.charts.show(recent, 0, this.look);
     this.charts.moveTo(recent.lengths[0] - 1);
   }
 
@@ -324,7 +323,7 @@ class App {
     $("clock").textContent = `${(now.step * worlds.dt_s).toFixed(1)} s · ${counted(now.rescued, "rescue")}`;
     const says = this.happened.map(({ text }) => `${text}.`);
     says.push(...run.hopeless().map(([need, tasks]) => `Nobody offers ${need} now: ${listed(tasks)} must wait.`));
-    says.push(worlds.robots.length > 1 ? attentionText(run, 0, now.step, look.head, look.robot) : "");
+    says.push(worlds.robots.length > 1 ? attentionText(run, 0, now.step, look) : "");
     $("now").textContent = says.filter(Boolean).join(" ");
   }
 
@@ -353,6 +352,7 @@ function pressed(app, event) {
     s: () => app.toggleSteering(),
     p: () => app.choosePolicy(next(app.policies, app.policy)),
     h: () => app.setLook({ head: ((look.head + 2) % (app.run.heads + 1)) - 1 }),
+    g: () => app.setLook({ received: !look.received }),
     a: () => app.setLook({ all: !look.all }),
     "-": () => faster(-1),
     "+": () => faster(1),

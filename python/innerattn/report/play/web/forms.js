@@ -17,7 +17,7 @@ class RobotPanel {
   constructor(worlds, change, put) {
     Object.assign(this, { worlds, change });
     this.buttons = BREAKS.map((one) => {
-      const button = element("button", { type: "button", class: "toggle" }, one.text);
+      const button = element("button", { type: "button" }, one.text);
       button.addEventListener("click", () => this.toggle(one));
       $("breaks").append(button);
       return button;
@@ -61,7 +61,6 @@ class RobotPanel {
     for (const field of [x, y]) Object.assign(field, { min: -most, max: most });
     showNumber(x, at[0]);
     showNumber(y, at[1]);
-    $("steer").setAttribute("aria-pressed", String(steered === robot));
     $("steer").textContent = steered === robot ? "Let go" : "Steer";
     const does = steered === robot ? "The arrows drive it, as the arrow keys do." :
       "The arrows push it. Steer: you drive it, the policy drives the others.";

@@ -154,14 +154,36 @@ class LiveRun {
     return [...found].map(([need, waiting]) => [need, [...waiting]]);
   }
 
+  /** Faults since a step, as {robot, kind, value, start, end}; one that goes on ends after the last. */
+  faultSpells(from) {
+    const open = new Map(), found = [];
+    for (const { step, faults } of this.moments) {
+      if (step < from) continue;
+      faults.forEach((wrong, robot) => {
+        for (const kind in this.kindNumbers) {
+          const key = `${robot} ${kind}`, spell = open.get(key), value = wrong[kind];
+          if (spell?.value === value) continue;
+          if (spell) spell.end = step;
+          open.delete(key);
+          if (value === undefined) continue;
+          open.set(key, { robot, kind: this.kindNumbers[kind], value, start: step, end: this.last + 1 });
+          found.push(open.get(key));
+        }
+      });
+    }
+    return found;
+  }
+
   /** The last steps as a run of its own, for charts. */
   recent(steps) {
     const from = Math.max(this.first, this.last + 1 - steps), { worlds, size, heads, attention } = this;
     const shift = (step) => step - from;
     const rescues = this.rescues[0].filter((one) => one.step >= from);
     const handoffs = this.handoffs[0].filter((one) => one.second >= from);
+    const faults = this.faultSpells(from).map((one) => ({ ...one, start: shift(one.start), end: shift(one.end) }));
     return {
       worlds, size, heads, attention, rewards: [], lengths: [this.last + 1 - from],
+      faults: [faults],
       rescues: [rescues.map((one) => ({ ...one, step: shift(one.step) }))],
       handoffs: [handoffs.map((one) => (
         { ...one, first: Math.max(shift(one.first), 0), second: shift(one.second) }

@@ -7,7 +7,8 @@ class App {
     const { obstacle_places: places, position_unit_m: unit } = described.worlds;
     this.worlds = new Worlds(described.worlds, view(buffer, places), unit);
     this.runs = described.runs.map((run) => new Run(run, buffer, this.worlds));
-    this.look = { robot: 0, all: false, head: -1, trails: true };
+    this.look = { robot: 0, received: false, all: false, least: 0, head: -1, trails: true };
+    this.look.least = strongWeight(this.worlds.robots.length);
     Object.assign(this, { chosen: 0, step: 0, playing: false, hovered: -1, times: [] });
     this.order = [];
     this.chosen = Math.max(this.runs.findIndex((run) => run.attention), 0);
@@ -21,7 +22,7 @@ class App {
     this.makePanes();
     this.fillControls();
     this.listen();
-    this.setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    startTheme(() => this.takeTheme());
     this.setSort(this.sorts()[0]);
     this.choose(this.run.handoffs[this.episode][0]?.robot ?? 0);
     const seconds = this.runs[0].steps * this.worlds.dt_s;
@@ -94,10 +95,9 @@ class App {
     on("speed", "change", () => this.setSpeed(Number($("speed").value)));
     on("head", "change", () => this.setLook({ head: Number($("head").value) }));
     on("all", "change", () => this.setLook({ all: $("all").checked }));
+    on("least", "input", () => this.setLook({ least: $("least").value / 100 }));
+    on("direction", "change", () => this.setLook({ received: $("direction").value === "received" }));
     on("trails", "change", () => this.setLook({ trails: $("trails").checked }));
-    on("theme", "click", () => {
-      this.setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
-    });
     document.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => this.fit()).observe($("panes"));
   }
@@ -119,6 +119,7 @@ class App {
       "]": () => this.nextEpisode(1),
       r: () => this.choose(next(robots, this.look.robot)),
       h: () => this.setLook({ head: ((this.look.head + 2) % (this.run.heads + 1)) - 1 }),
+      g: () => this.setLook({ received: !this.look.received }),
       a: () => this.setLook({ all: !this.look.all }),
       "-": () => this.setSpeed(SPEEDS[Math.max(SPEEDS.indexOf(this.speed) - 1, 0)]),
       "+": () => this.setSpeed(SPEEDS[Math.min(SPEEDS.indexOf(this.speed) + 1, SPEEDS.length - 1)]),
@@ -129,9 +130,8 @@ class App {
     action();
   }
 
-  setTheme(theme) {
-    document.documentElement.dataset.theme = theme;
-    $("theme").textContent = theme === "dark" ? "Light" : "Dark";
+  /** Takes the colours of the theme. */
+  takeTheme() {
     this.paint = paints();
     $("robots").replaceChildren();
     this.robots = new RobotList($("robots"), this.worlds, (robot) => this.choose(robot));
@@ -169,6 +169,7 @@ class App {
   choosePolicy(index) {
     this.chosen = index;
     this.showRun();
+    this.scenes[index].fit(); // a phone shows the chosen one only
     this.goTo(this.step);
   }
 
@@ -180,7 +181,7 @@ class App {
     Object.assign(this.look, look);
     this.look.head = Math.min(this.look.head, this.run.heads - 1);
     $("head").value = String(Math.max(this.look.head, -1));
-    $("all").checked = this.look.all;
+    showLook(this.look);
     this.showCharts();
     this.draw();
   }
@@ -205,7 +206,7 @@ class App {
   }
 
   showCharts() {
-    this.charts.show(this.run, this.episode, Math.max(this.look.robot, 0), this.look.head);
+    this.charts.show(this.run, this.episode, this.look);
     this.charts.moveTo(this.step);
   }
 
@@ -270,7 +271,7 @@ class App {
   /** The texts, only when the step, the robot or the policy is another one. */
   showTexts(look) {
     const { run, episode } = this, step = Math.min(Math.floor(this.step), run.lengths[episode] - 1);
-    const key = [this.chosen, episode, step, look.robot, look.head, document.documentElement.dataset.theme].join();
+    const key = [this.chosen, episode, step, look.robot, look.received, look.head, document.documentElement.dataset.theme].join();
     $("scrubber").value = Math.floor(this.step);
     if (key === this.shown) return;
     this.shown = key;
@@ -280,7 +281,7 @@ class App {
     this.robots.show(run, episode, step, look);
     this.events.showStep(step);
     const happens = this.events.events.filter((one) => one.step === step).map((one) => `${one.text}.`);
-    if (look.robot >= 0) happens.push(attentionText(run, episode, step, look.head, look.robot));
+    if (look.robot >= 0) happens.push(attentionText(run, episode, step, look));
     $("now").textContent = happens.filter(Boolean).map(capital).join(" ");
     this.scenes.forEach(({ run: one, count, canvas }) => {
       const now = Math.min(step, one.lengths[episode] - 1);

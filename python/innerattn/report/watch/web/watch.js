@@ -93,4 +93,5 @@ async function refresh() {
   setTimeout(refresh, EVERY_MS);
 }
 
+startTheme();
 refresh();
