@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
+from innerattn.envs.colours import robot_looks
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe & Ito's palette, told apart with every common colour blindness.
-_KIND_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#F0E442")
 _VICTIM_COLOUR = "#D55E00"
 _TASK_MARKERS = "*XDP^v"
 _ARROW_S = 0.2  # an arrow's tip is where the robot would be after so many seconds
@@ -142,9 +141,11 @@ def _paint_robots(
 
     legend: dict[str, Artist] = {}
     halo = [withStroke(linewidth=2.5, foreground="white")]
-    kinds = list(dict.fromkeys(robot.kind for robot in scenario.robots))
-    for robot, (x, y), velocity in zip(scenario.robots, positions, velocities, strict=True):
-        colour = _KIND_COLOURS[kinds.index(robot.kind) % len(_KIND_COLOURS)]
+    looks = robot_looks(robot.kind for robot in scenario.robots)
+    for robot, look, (x, y), velocity in zip(
+        scenario.robots, looks, positions, velocities, strict=True
+    ):
+        colour = look.colour
         if robot.kind not in legend:
             legend[robot.kind] = Line2D(
                 [], [], color=colour, marker="o", linestyle="", markersize=11

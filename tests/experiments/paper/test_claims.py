@@ -112,6 +112,7 @@ def test_claims_about_entropy(
         method="td-inner",
         seeds=tuple(range(len(end))),
         robots=("a", "b", "c", "d"),
+        kinds=("k", "k", "l", "m"),
         env_steps=np.array([1]),
         nats=np.reshape(end, (-1, 1, 1, 1)),
         begin=first,

@@ -10,12 +10,17 @@ import numpy as np
 import pytest
 from reseal import reseal
 
+from innerattn.envs.colours import KIND_COLOURS
 from innerattn.errors import RunError
 from innerattn.experiments.paper.fig4 import PRINTED_NATS, EntropyCourse, fig4, fig4_json
 from innerattn.experiments.run import FinishedRun
 from innerattn.report.paper.fig4 import fig4_csv, fig4_lines
 from innerattn.report.plots.entropy import draw_entropy
 from innerattn.stats.student import student_interval
+
+FOOD, NAVIGATION, MEDICAL = KIND_COLOURS[:3]
+TEAM_LOOKS = [(FOOD, "-"), (FOOD, "--"), (NAVIGATION, "-"), (MEDICAL, "-")]
+"""Of food_0, food_1, navigation_0 and medical_0: a colour for each kind, a dash for a twin."""
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +86,12 @@ def test_the_figure_has_a_panel_for_each_situation_and_method(
         courses_drawn = by_length[len(line.env_steps)]
         assert np.array_equal(courses_drawn[-1], line.mean[0])
         assert np.array_equal(courses_drawn[:-1], line.by_robot.T)
+        robots_drawn = [one for one in panel.lines if one.get_marker() == "None"][:4]
+        looks = [(one.get_color(), one.get_linestyle()) for one in robots_drawn]
+        assert looks == TEAM_LOOKS
+        assert [one.get_color() for one in panel.lines if one.get_marker() == "o"] == [
+            colour for colour, _ in TEAM_LOOKS
+        ]
         runs, robots, heads = line.heads.shape
         strips = [one for one in panel.lines if one.get_marker() == "o"]
         assert [len(one.get_ydata()) for one in strips] == [runs * heads] * robots

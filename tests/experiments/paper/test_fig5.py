@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from innerattn.envs.colours import robot_looks
 from innerattn.experiments.paper.claims import handoff_claims
 from innerattn.experiments.paper.fig5 import (
     Evidence,
@@ -172,6 +173,10 @@ def test_the_scene_is_drawn_as_panels_a_b_and_c(inner: list[FinishedRun]) -> Non
     assert all(names <= {text.get_text() for text in panel.texts} for panel in arenas)
     assert overall.get_xlabel() == "step of the episode [0.1 s each]"
     lines = [line for line in overall.lines if line.get_label().startswith("on ")]
+    looks = robot_looks(robot.kind for robot in scene.scenario.robots)
+    assert [line.get_color() for line in lines] == [look.colour for look in looks[1:]]
+    assert [line.get_linestyle() for line in lines] == ["--", "-", "-"]  # food_1 is food_0's twin
+    assert [one.get_color() for one in arenas[0].lines[0:8:2]] == [look.colour for look in looks]
     shown = np.array([line.get_ydata() for line in lines])
     steps = slice(scene.start, scene.second + 1)
     assert shown == pytest.approx(scene.weights[steps].mean(1)[:, 1:].T)

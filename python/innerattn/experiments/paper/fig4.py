@@ -37,6 +37,7 @@ class EntropyCourse:
         method: of training.
         seeds: N of them.
         robots: R names.
+        kinds: of the R robots.
         env_steps: (T,) int64 at which all runs were logged [env-steps].
         nats: (N, T, R, H) float64 entropy by run, time, robot and head.
         begin: mean over robots, heads and the first tenth of the times.
@@ -48,6 +49,7 @@ class EntropyCourse:
     method: str
     seeds: tuple[int, ...]
     robots: tuple[str, ...]
+    kinds: tuple[str, ...]
     env_steps: NDArray[np.int64]
     nats: Array
     begin: Estimate
@@ -134,6 +136,7 @@ def _course(group: Sequence[FinishedRun]) -> EntropyCourse | None:
         method=group[0].method,
         seeds=tuple(run.seed for run in group),
         robots=robots,
+        kinds=tuple(robot.kind for robot in group[0].config.scenario.robots),
         env_steps=np.array(times, np.int64),
         nats=nats,
         begin=first,

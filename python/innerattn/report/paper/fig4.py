@@ -71,6 +71,7 @@ def fig4_lines(courses: Sequence[EntropyCourse]) -> list[EntropyLines]:
                 env_steps=course.env_steps,
                 mean=np.stack([mean.mean, mean.low, mean.high]),
                 robots=course.robots,
+                kinds=course.kinds,
                 by_robot=course.by_robot().mean,
                 heads=course.end_by_head(),
                 even_nats=course.even_nats,

@@ -22,8 +22,8 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
 )
 """Okabe & Ito's palette, told apart with every common colour blindness."""
 
-ROBOT_COLOURS = (BLUE, SKY, ORANGE, GREEN, PURPLE, VERMILION, BLACK, YELLOW)
-"""By index in the team; beyond the last they repeat."""
+TWIN_DASHES = ("-", "--", ":", "-.")
+"""Of lines of robots of one kind, which have one colour; beyond the last they repeat."""
 
 COLUMN_WIDTH_IN, PAGE_WIDTH_IN = 3.4, 7.0
 """Widths of figures over one column of a page and over both [in]."""

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from innerattn.report.plots.drawing import BLACK, COLUMN_WIDTH_IN, PAGE_WIDTH_IN, ROBOT_COLOURS
+from innerattn.envs.colours import robot_looks
+from innerattn.report.plots.drawing import BLACK, COLUMN_WIDTH_IN, PAGE_WIDTH_IN, TWIN_DASHES
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -37,6 +38,7 @@ class EntropyLines:
         env_steps: (T,) [env-steps].
         mean: (3, T) mean over robots and heads, low and high end of the band; NaN for no band.
         robots: R names.
+        kinds: of the R robots; twins of a kind have its colour and another dash.
         by_robot: (T, R) mean over heads.
         heads: (N, R, H) of each run's own heads, at the end.
         even_nats: ln(R - 1).
@@ -48,6 +50,7 @@ class EntropyLines:
     env_steps: NDArray[np.int64]
     mean: Array
     robots: tuple[str, ...]
+    kinds: tuple[str, ...]
     by_robot: Array
     heads: Array
     even_nats: float
@@ -103,9 +106,11 @@ def _course(panel: Axes, line: EntropyLines) -> dict[str, Artist]:
     mean, low, high = line.mean
     if np.isfinite(low).any():
         panel.fill_between(steps, low, high, color=_GREY, linewidth=0.0)
-    for r, robot in enumerate(line.robots):
-        colour = ROBOT_COLOURS[r % len(ROBOT_COLOURS)]
-        (handles[robot],) = panel.plot(steps, line.by_robot[:, r], color=colour, linewidth=0.8)
+    for r, (robot, look) in enumerate(zip(line.robots, robot_looks(line.kinds), strict=True)):
+        dash = TWIN_DASHES[look.twin % len(TWIN_DASHES)]
+        (handles[robot],) = panel.plot(
+            steps, line.by_robot[:, r], dash, color=look.colour, linewidth=0.8
+        )
     (handles["mean over robots"],) = panel.plot(steps, mean, color=BLACK, linewidth=1.3)
     return handles
 
@@ -117,14 +122,13 @@ def _heads(panel: Axes, line: EntropyLines) -> None:
     last = float(line.env_steps[-1]) / 1000.0
     strip = _HEADS * last
     places = last + strip * (np.arange(len(line.robots)) + 1.0) / (len(line.robots) + 0.5)
-    for r, place in enumerate(places):
+    for r, (place, look) in enumerate(zip(places, robot_looks(line.kinds), strict=True)):
         values = line.heads[:, r].ravel()
-        colour = ROBOT_COLOURS[r % len(ROBOT_COLOURS)]
         panel.plot(
             np.full(len(values), place),
             values,
             "o",
-            color=colour,
+            color=look.colour,
             markersize=2.2,
             markeredgewidth=0.0,
             alpha=0.6,

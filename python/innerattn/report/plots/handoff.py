@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from innerattn.envs.colours import robot_looks
 from innerattn.experiments.paper.scene import HandoffScene
-from innerattn.report.plots.drawing import BLACK, PAGE_WIDTH_IN, ROBOT_COLOURS, VERMILION
+from innerattn.report.plots.drawing import BLACK, PAGE_WIDTH_IN, TWIN_DASHES, VERMILION
 from innerattn.report.plots.names import place_names
 
 if TYPE_CHECKING:
@@ -103,8 +104,9 @@ def _arena(panel: Axes, scene: HandoffScene, stage: tuple[int, int]) -> _Names:
         "in_layout": False,
     }
     robots, victims = [], []
+    looks = robot_looks(robot.kind for robot in scene.scenario.robots)
     for r, robot in enumerate(scene.scenario.robots):
-        colour, own = ROBOT_COLOURS[r % len(ROBOT_COLOURS)], r == scene.robot
+        colour, own = looks[r].colour, r == scene.robot
         trail = scene.positions[since : now + 1, r]
         panel.plot(*trail.T, color=colour, linewidth=1.6 if own else 0.9, zorder=3)
         edge: dict[str, Any] = {"markeredgecolor": BLACK, "markeredgewidth": 1.2 if own else 0.4}
@@ -166,10 +168,11 @@ def _weights(panel: Axes, scene: HandoffScene, weights: NDArray[np.float32]) -> 
     from matplotlib.ticker import MaxNLocator
 
     steps = np.arange(scene.start, scene.second + 1)
+    looks = robot_looks(robot.kind for robot in scene.scenario.robots)
     for r, robot in enumerate(scene.scenario.robots):
         if r != scene.robot:
-            colour = ROBOT_COLOURS[r % len(ROBOT_COLOURS)]
-            panel.plot(steps, weights[steps, r], f"{_marker(r)}-", color=colour, linewidth=1.3,
+            style = f"{_marker(r)}{TWIN_DASHES[looks[r].twin % len(TWIN_DASHES)]}"
+            panel.plot(steps, weights[steps, r], style, color=looks[r].colour, linewidth=1.3,
                        markersize=2.5, label=f"on {robot.name}")  # fmt: skip
     even = 1.0 / (len(scene.scenario.robots) - 1)
     panel.axhline(even, color=BLACK, linewidth=0.7, linestyle=":", label="even attention")

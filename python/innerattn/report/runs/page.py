@@ -153,11 +153,7 @@ def _attention(
     courses = [course for course in fig4(runs) if course.chooses]
     if not courses:
         return _section("Attention", "<p>These runs have no learnt attention.</p>")
-    scenarios = {(run.situation, run.method): run.config.scenario for run in runs}
-    parts = [
-        _figure(entropy_plot(course, scenarios[course.situation, course.method]), plots)
-        for course in courses
-    ]
+    parts = [_figure(entropy_plot(course), plots) for course in courses]
     parts.append(html_table(entropy_table(courses)))
     found = [one for one in map(evidence, groups) if one is not None]
     if found:

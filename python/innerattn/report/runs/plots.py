@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from innerattn.config import Scenario
+from innerattn.envs.colours import robot_looks
 from innerattn.experiments.learning.curves import LearningCurve
 from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence
@@ -89,15 +89,15 @@ def curves_plot(curves: Sequence[LearningCurve]) -> Plot:
     )
 
 
-def entropy_plot(course: EntropyCourse, scenario: Scenario) -> Plot:
+def entropy_plot(course: EntropyCourse) -> Plot:
     """Attention entropy of each robot against env-steps, in the colours of the replay."""
     by_robot, times = course.by_robot(), course.env_steps.tolist()
-    kinds = list(dict.fromkeys(robot.kind for robot in scenario.robots))
     lines = []
-    for index, robot in enumerate(scenario.robots):
-        twins = sum(other.kind == robot.kind for other in scenario.robots[:index])
-        colour = f"kind-{kinds.index(robot.kind) % _COLOURS}"
-        lines.append(Line(robot.name, times, _known(by_robot.mean[:, index]), colour, twins))
+    for index, (robot, look) in enumerate(
+        zip(course.robots, robot_looks(course.kinds), strict=True)
+    ):
+        colour = f"kind-{look.kind % _COLOURS}"
+        lines.append(Line(robot, times, _known(by_robot.mean[:, index]), colour, look.twin))
     return Plot(
         title=f"Attention entropy: {_label(course)}",
         note="Mean over heads, and over runs. Less is more selective; even attention is dashed.",
