@@ -49,6 +49,7 @@ def frame_times(page: Page, address: str, app: str) -> list[float]:
     while not page.evaluate(f"Boolean(window.{app})"):  # the page itself evaluates no text
         page.wait_for_timeout(20)
     page.get_by_label("arrows of all robots").check()
+    page.get_by_label("weight at least").fill("0")
     if app == "replay":
         page.get_by_role("button", name="Play", exact=True).click()
     page.evaluate(f"{app}.times.length = 0")

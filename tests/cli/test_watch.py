@@ -20,6 +20,9 @@ from innerattn.errors import RunError
 from innerattn.records.run_files import seal
 from innerattn.records.run_folder import run_info
 
+FRAME = "document.querySelector('#episodes')"
+INSIDE = f"{FRAME}.contentDocument.documentElement"
+
 
 def mark(run: Path, **values: Any) -> None:
     """Change what ``run.json`` says, whole, as training does."""
@@ -62,6 +65,12 @@ def test_a_training_goes_on_under_the_eyes_of_its_reader(run_dir: Path, tmp_path
             replay.get_by_role("button", name="Next event").click()
             assert replay.locator("#episode option").count() == 2
             until(page, "document.querySelectorAll('.plot .picture').length === 2")
+            until(page, f"{FRAME}.clientHeight >= {INSIDE}.offsetHeight")
+            page.get_by_role("button", name="Dark").click()
+            until(page, f"{INSIDE}.dataset.theme === 'dark'")
+            page.get_by_role("button", name="after 400").click()  # loads the replay anew
+            until(page, f"{INSIDE}.dataset.theme === 'dark'")
+            assert replay.locator("#theme").is_hidden()
             assert not Visit(page).serious_faults()
             page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
             until(page, f"document.documentElement.scrollWidth <= {PHONE[0]}")

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from innerattn.config import Obstacle, Scenario
 from innerattn.envs import parallel_env
-from innerattn.envs.render import draw_world
+from innerattn.envs.render import draw_world, paint_figure
 
 VICTIM = np.dtype([("present", "i1"), ("task", "i1"), ("x", "f4"), ("y", "f4")])
 PLACES = np.array([[-0.7, -0.7], [0.7, -0.7], [-0.7, 0.7], [0.7, 0.7]], np.float32)
@@ -57,6 +58,16 @@ def test_robots_are_where_they_are() -> None:
     assert columns.max() - columns.min() > 250
     middle = (columns.max() + columns.min()) // 2
     assert not difference[:, middle - 40 : middle + 40].any()
+
+
+def test_the_legend_names_every_mark() -> None:
+    figure, scenario = Figure(), Scenario()
+    victims = np.zeros(0, VICTIM)
+    paint_figure(figure, scenario, PLACES, np.ones_like(PLACES), victims, np.zeros((0, 2), "f4"))
+    (legend,) = figure.legends
+    names = [text.get_text().split(":")[0] for text in legend.texts]
+    tasks = [task.name for task in scenario.tasks]
+    assert names == [*tasks, "rescue radius", "food", "navigation", "medical", "velocity"]
 
 
 def test_render_through_the_environment() -> None:

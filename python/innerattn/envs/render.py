@@ -120,6 +120,8 @@ def _paint_victims(axes: Axes, scenario: Scenario, victims: NDArray[np.void]) ->
     style: dict[str, Any] = {"color": _VICTIM_COLOUR, "linestyle": "", "markersize": 11}
     for task, marker in zip(scenario.tasks, markers, strict=True):
         legend[f"{task.name}:\n{' + '.join(task.needs)}"] = Line2D([], [], marker=marker, **style)
+    ring_style: dict[str, Any] = {"markerfacecolor": "none", "linestyle": "", "markersize": 13}
+    legend["rescue radius"] = Line2D([], [], marker="o", color=_VICTIM_COLOUR, **ring_style)
     for victim in victims[victims["present"].astype(bool)]:
         x, y = float(victim["x"]), float(victim["y"])
         axes.plot([x], [y], marker=markers[int(victim["task"])], zorder=2, **style)
@@ -171,4 +173,7 @@ def _paint_robots(
                 arrowprops={"arrowstyle": "->", "linewidth": 1.5},
                 zorder=6,
             )
+    legend["velocity"] = Line2D(
+        [], [], color="k", marker=r"$\rightarrow$", linestyle="", markersize=14
+    )
     return legend

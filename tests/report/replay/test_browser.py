@@ -136,6 +136,11 @@ def test_episodes_can_be_sorted(browser: Browser, one: Path) -> None:
         assert counts == sorted(counts, reverse=True)
         page.get_by_role("combobox", name="Sorted").select_option("number")
         assert page.evaluate("replay.order") == list(range(20))
+        assert page.get_by_role("button", name="Previous episode").is_disabled()
+        page.get_by_role("combobox", name="Episode").select_option("19")
+        assert page.get_by_role("button", name="Next episode").is_disabled()
+        assert page.get_by_role("button", name="Previous episode").is_enabled()
+        page.get_by_role("combobox", name="Episode").select_option("0")
         page.get_by_role("button", name="Next episode").click()
         assert page.get_by_role("combobox", name="Episode").input_value() == "1"
         page.keyboard.press("[")

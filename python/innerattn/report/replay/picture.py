@@ -136,7 +136,7 @@ def _frames(
             figure.text(
                 where,
                 0.38,
-                f"wide arrows: attention\nof {_plain(whose)}\nblack arrows: velocity",
+                f"wide arrows: attention\nof {_plain(whose)}",
                 va="top",
             )
         canvas.draw()  # type: ignore[no-untyped-call]

@@ -156,6 +156,8 @@ class App {
     this.episode = episode;
     this.setPlaying(false);
     $("episode").value = String(episode);
+    $("previous-episode").disabled = episode === this.order[0];
+    $("next-episode").disabled = episode === this.order[this.order.length - 1];
     $("scrubber").max = this.last;
     this.showRun();
     this.goTo(0);
