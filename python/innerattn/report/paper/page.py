@@ -118,8 +118,9 @@ def _fig4(findings: Findings) -> str:
     return (
         f"{title}![Entropy of attention in training](fig4.png)\n\n"
         f"{markdown(entropy_table(courses))}\n"
-        "Black: mean over robots and heads with its band over runs. Colours: robots. Dots at the "
-        "right: every head of every run, mean over the last tenth of training. Uniform attention "
+        "Black: mean over robots and heads with its band over runs. Colours: kinds of robots, with "
+        "a dash for a second robot of a kind. Dots at the right: every head of every run, mean "
+        "over the last tenth of training. Uniform attention "
         f"stays at ln(N − 1). Logged at {logged(courses)} env-steps.{_made_of(findings)}\n"
     )
 

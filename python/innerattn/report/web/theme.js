@@ -25,5 +25,7 @@ function startTheme(changed = () => {}) {
   });
   button.addEventListener("click", () => setTheme(root.dataset.theme === "dark" ? "light" : "dark"));
   setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-  if (isFramed) new ResizeObserver(tellHeight).observe(root);
+  if (!isFramed) return;
+  root.dataset.framed = "true";
+  new ResizeObserver(tellHeight).observe(root);
 }
