@@ -20,14 +20,30 @@ def plain(text: str) -> str:
 
 def one_line(error: BaseException) -> str:
     """What an error says, in one plain line; of one that lacked memory, first of all that."""
-    text = plain(" ".join(str(error).split()))
-    return f"out of memory: {text}" if lacked_memory(error) else text
+    while isinstance(error, ImportError) and isinstance(error.__cause__, ImportError):
+        error = error.__cause__  # NumPy wraps the reason in a page of advice
+    text = _of_system(error) if isinstance(error, OSError) else str(error)
+    text = plain(" ".join(text.split()))
+    if lacked_memory(error):
+        return f"out of memory: {text}" if text else "out of memory"
+    return text
+
+
+def _of_system(error: OSError) -> str:
+    """The files that a system call failed for, and why."""
+    names = [str(name) for name in (error.filename, error.filename2) if name is not None]
+    if error.strerror is None:
+        return str(error)
+    return ": ".join([" -> ".join(names), error.strerror] if names else [error.strerror])
 
 
 def lacked_memory(error: BaseException) -> bool:
-    """Whether memory was lacking; PyTorch says so by a `RuntimeError`."""
-    if isinstance(error, RuntimeError):
-        return "can't allocate memory" in str(error) or "out of memory" in str(error)
+    """Whether memory was lacking: also in PyTorch, and while a library was loaded."""
+    if isinstance(error, RuntimeError | ImportError):
+        signs = ("can't allocate memory", "out of memory", "annot allocate memory", "failed to map")
+        return any(sign in str(error) for sign in signs)
+    if isinstance(error, OSError):
+        return error.errno == errno.ENOMEM
     return isinstance(error, MemoryError)
 
 

@@ -87,6 +87,22 @@ def test_create_leaves_nothing_when_it_fails(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_who_begins_second_hears_that_the_first_is_in_training(
+    small_config: Configure, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = checkpoint.write_toml
+
+    def begun_by_another(config: RunConfig, path: Path) -> None:
+        monkeypatch.setattr(checkpoint, "write_toml", write)
+        RunFolder.create(tmp_path / "other", config, threads=1).path.rename(tmp_path / "run")
+        write(config, path)
+
+    monkeypatch.setattr(checkpoint, "write_toml", begun_by_another)
+    with pytest.raises(RunError, match="exists already, and is in training or was killed"):
+        RunFolder.create(tmp_path / "run", small_config(), threads=1)
+    assert [one.name for one in tmp_path.iterdir()] == ["run"]
+
+
 def test_create_below_a_file_is_refused(small_config: Configure, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
     with pytest.raises(RunError, match="cannot make the run folder"):

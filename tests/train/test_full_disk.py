@@ -175,17 +175,23 @@ for share in map(float, sys.argv[4:]):
 
 def progress(now):
     if now.env_steps == FULL_AT:
-        fill(0)
-run = disk / "stays-full"
-try:
-    train(config, run, progress=progress)
-except OSError as error:
-    end = f"{error.strerror}: {error.filename}"
-old = read_saved(run).number
-(disk / "filler").unlink()
-resume(run)
-print(json.dumps({"said": said, "end": end, "old": old, "state":
-    json.loads((run / "run.json").read_text())["state"]}))
+        fill(left)
+def state():
+    return json.loads((run / "run.json").read_text())["state"]
+
+ends = []
+for left in (0, 20480):
+    run = disk / "stays-full"
+    try:
+        train(config, run, progress=progress)
+    except OSError as error:
+        end = f"{error.strerror}: {error.filename}"
+    ends.append([end, state(), read_saved(run).number])
+    (disk / "filler").unlink()
+    resume(run)
+    ends[-1].append(state())
+    subprocess.run(["rm", "-r", run], check=True)
+print(json.dumps({"said": said, "ends": ends}))
 """
 
 
@@ -225,5 +231,6 @@ def test_on_a_small_file_system(
     assert len(found["said"]) == len(shares)
     for said in found["said"]:
         said_once(said, disk / "run", "No space left on device")
-    assert found["end"].startswith(f"No space left on device: {disk}/stays-full/")
-    assert (found["old"], found["state"]) == (SAVED_BEFORE, "done")
+    for end, state, old, state_after in found["ends"]:
+        assert end.startswith(f"No space left on device: {disk}/stays-full/")
+        assert (state, old, state_after) == ("interrupted", SAVED_BEFORE, "done")

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from innerattn.cli.streams import fill_missing_streams
-from innerattn.errors import missing_library
+from innerattn.errors import lacked_memory, missing_library, one_line
 from innerattn.signals import (
     end_at_once,
     handle_requests,
@@ -20,14 +20,14 @@ from innerattn.signals import (
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command, or say in one line which of its libraries is not installed.
+    """Run the command, or say in one line why it cannot start: a library or memory is lacking.
 
     Args:
         argv: the arguments; none: those of the process, which then ends at once if a signal asked
             for it.
 
     Returns:
-        The exit code, as of `innerattn.cli.main.main`; 1 if a library is missing.
+        The exit code, as of `innerattn.cli.main.main`; 1 if it cannot start.
     """
     fill_missing_streams()
     handle_requests(leave)
@@ -44,6 +44,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         if missing is None:
             raise
         print(f"innerattn: error: {missing}", file=sys.stderr)
+        return 1
+    except (ImportError, MemoryError) as error:
+        if not lacked_memory(error):
+            raise
+        print(f"innerattn: error: {one_line(error)}", file=sys.stderr)
         return 1
     handle_requests(interrupt)
     code = run(arguments)

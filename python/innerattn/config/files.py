@@ -96,10 +96,25 @@ def write_whole(path: Path, data: bytes) -> None:
         os.replace(partial, path)
     except BaseException as error:
         partial.unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            error.filename, error.filename2 = str(path), None  # what the user knows
+        if isinstance(error, OSError):  # the user knows no partial file
+            raise OSError(error.errno, error.strerror, str(path)) from error
         raise
     sync_folder(path.parent)
+
+
+def write_in_place(path: Path, data: bytes) -> None:
+    """Put ``data`` over the small file at ``path``, where a full disk has no room for a new one.
+
+    A loss of power in the midst of it may damage the file.
+
+    Raises:
+        OSError: there is no such file, it is a link, or it cannot be written.
+    """
+    descriptor = os.open(path, os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0))
+    with os.fdopen(descriptor, "wb", buffering=0) as file:
+        if file.write(data) < len(data):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        file.truncate()
 
 
 def sync_folder(folder: Path) -> None:
@@ -116,7 +131,7 @@ def sync_folder(folder: Path) -> None:
     except OSError as error:
         unable = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EBADF)
         if error.errno not in unable:  # not every file system can
-            raise
+            raise OSError(error.errno, error.strerror, str(folder)) from error
     finally:
         os.close(descriptor)
 

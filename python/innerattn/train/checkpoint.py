@@ -5,6 +5,7 @@ A folder is made whole or not at all.
 
 from __future__ import annotations
 
+import errno
 import os
 import platform
 import subprocess
@@ -18,7 +19,7 @@ from pathlib import Path
 from torch import Tensor
 
 from innerattn.config import RunConfig, write_toml
-from innerattn.config.files import write_whole
+from innerattn.config.files import write_in_place, write_whole
 from innerattn.errors import RunError, UnsealedRunWarning
 from innerattn.records.run_files import info_text, seal
 from innerattn.records.run_folder import (
@@ -76,6 +77,8 @@ class RunFolder:
                 (partial / "checkpoints").mkdir()
                 os.rename(partial, path)
         except OSError as error:
+            if error.errno in (errno.ENOTEMPTY, errno.EEXIST):  # another training was faster
+                refuse_existing(path)
             raise RunError(f"{path}: cannot make the run folder ({error.strerror})") from error
         return cls(path, info)
 
@@ -122,7 +125,12 @@ class RunFolder:
         self.info = replace(self.info, weights_sha256=checkpoints.save(content))
 
     def mark(self, state: State, env_steps: int, updates: int, seconds: float) -> None:
-        """Write down how far the run has come; at its end, seal it with a manifest."""
+        """Write down how far the run has come; at its end, seal it with a manifest.
+
+        Raises:
+            OSError: a file cannot be written. Where the run ended, ``run.json`` says so if it can:
+                a full disk has room for that, and none for a manifest.
+        """
         self.info = replace(
             self.info,
             state=state,
@@ -133,8 +141,12 @@ class RunFolder:
         )
         if state == "running":
             _write_info(self.path, self.info)
-        else:
+            return
+        try:
             self.info = seal(self.path, self.info)
+        except OSError:
+            write_in_place(self.path / "run.json", info_text(self.info))
+            raise
 
 
 def refuse_existing(path: Path) -> None:

@@ -73,7 +73,10 @@ class MetricsFile:
         self._write()
         if self.bytes:
             with self.path.open("rb") as file:
-                os.fsync(file.fileno())
+                try:
+                    os.fsync(file.fileno())
+                except OSError as error:
+                    raise OSError(error.errno, error.strerror, str(self.path)) from error
 
     def go_on_after(self, length: int, sha256: str) -> Metrics | None:
         """Cut the file after its first ``length`` bytes, and append there.
@@ -116,8 +119,7 @@ class MetricsFile:
                         file.truncate(before)
                         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
                 except OSError as error:
-                    error.filename = str(self.path)
-                    raise
+                    raise OSError(error.errno, error.strerror, str(self.path)) from error
             self._digest.update(line)
             self.bytes += len(line)
             del self._unwritten[0]
