@@ -131,7 +131,13 @@ def cannot_lock(error: OSError) -> bool:
 
     Then nothing keeps others out, as on Windows.
     """
-    return error.errno in (errno.ENOLCK, errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP)
+    return error.errno in (
+        errno.ENOLCK,
+        errno.ENOSYS,
+        errno.EINVAL,
+        errno.EOPNOTSUPP,
+        errno.EPERM,
+    )
 
 
 class UnsealedRunWarning(UserWarning):

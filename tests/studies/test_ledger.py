@@ -1,5 +1,6 @@
 """Claims of runs: who gets them, who loses them, and what is left when workers are killed."""
 
+import errno
 import json
 import os
 import random
@@ -130,9 +131,10 @@ def test_other_names_are_refused(key: str, tmp_path: Path) -> None:
         Ledger(tmp_path).claim([key])
 
 
-def test_without_hard_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("number", [errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL])
+def test_without_hard_links(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*_: object, **__: object) -> None:
-        raise PermissionError(1, "Operation not permitted")
+        raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(os, "link", refused)
     ledger = Ledger(tmp_path)

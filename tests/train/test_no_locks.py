@@ -10,14 +10,16 @@ import pytest
 
 from innerattn.config import RunConfig
 from innerattn.config.files import sync_folder
+from innerattn.errors import RunError
 from innerattn.experiments.lock import StudyLock
 from innerattn.records.run_folder import read_info
 from innerattn.train import Progress, resume, train
+from innerattn.train.run_lock import only_training_in
 
 Configure = Callable[..., RunConfig]
 
 
-@pytest.fixture(params=[errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+@pytest.fixture(params=[errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EPERM])
 def no_locks(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise OSError(request.param, os.strerror(request.param))
@@ -55,8 +57,10 @@ def test_other_errors_of_a_lock_are_not_taken_for_that(
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
     monkeypatch.setattr(fcntl, "flock", fail)
-    with pytest.raises(OSError, match="Input/output error"):
+    with pytest.raises(RunError, match=r"study: cannot be locked \(Input/output error\)"):
         StudyLock.take(tmp_path / "study")
+    with pytest.raises(RunError, match=r"cannot be locked"), only_training_in(tmp_path):
+        pass
 
 
 @pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EBADF])

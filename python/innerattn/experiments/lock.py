@@ -56,18 +56,20 @@ class StudyLock:
             raise RunError(f"{out}: cannot hold a study ({error.strerror})") from error
         try:
             _lock(file)
-        except (BlockingIOError, PermissionError) as error:
+        except OSError as error:
+            if cannot_lock(error):
+                text = (
+                    "innerattn: warning: %s: its file system has no locks (%s); run one study in it"
+                )
+                _log.warning(text, out, error.strerror)
+                return cls(file)
             os.close(file)
+            if not isinstance(error, BlockingIOError | PermissionError):
+                raise RunError(f"{out}: cannot be locked ({error.strerror})") from error
             raise RunError(
                 f"{out}: another study is at work here, or its last runs are still ending; "
                 "wait for it, or choose another folder"
             ) from error
-        except OSError as error:
-            if not cannot_lock(error):
-                os.close(file)
-                raise
-            text = "innerattn: warning: %s: its file system has no locks (%s); run one study in it"
-            _log.warning(text, out, error.strerror)
         return cls(file)
 
     def __enter__(self) -> Self:

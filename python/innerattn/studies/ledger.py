@@ -43,6 +43,7 @@ SILENT_AFTER_S = 60.0
 _KEY = re.compile(r"[A-Za-z0-9_-]{1,128}")
 _CLAIM = re.compile(r"([A-Za-z0-9_-]{1,128})\.([1-9][0-9]{0,8})(\.free|\.failed)?")
 _GROWING = "metrics.jsonl"
+_NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS, errno.EINVAL)
 _MOST_REASON_BYTES = 1 << 16
 _COPIES = 3
 _MOST_OWNER_BYTES = 1 << 10
@@ -296,7 +297,7 @@ def _linked(path: Path) -> bool:
         # Over NFS a link may be made although its answer was lost and it was asked for again.
         return os.stat(own).st_nlink == 2
     except OSError as error:
-        if error.errno not in (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS):
+        if error.errno not in _NO_LINKS:
             raise
         return _made_alone(path)  # a file system without hard links
     finally:

@@ -27,7 +27,7 @@ def only_training_in(run: Path) -> Iterator[None]:
     The lock is that of the open folder. It ends with the process, however that ends.
 
     Raises:
-        RunError: another process trains in it, or there is no such folder.
+        RunError: another process trains in it, there is no such folder, or it cannot be locked.
     """
     if sys.platform == "win32":
         yield
@@ -43,7 +43,7 @@ def only_training_in(run: Path) -> Iterator[None]:
             raise RunError(f"{run}: another process is training in it") from error
         except OSError as error:
             if not cannot_lock(error):
-                raise
+                raise RunError(f"{run}: cannot be locked ({error.strerror})") from error
             text = "innerattn: warning: %s: its file system has no locks (%s); train in it but once"
             _log.warning(text, run, error.strerror)
         yield

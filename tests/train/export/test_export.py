@@ -1,6 +1,8 @@
 """What `innerattn export` writes, how it checks that, and what it refuses."""
 
+import errno
 import json
+import os
 from contextlib import closing
 from hashlib import sha256
 from pathlib import Path
@@ -149,6 +151,24 @@ def test_what_differs_is_refused(framed: Made) -> None:
         dict(actor.named_parameters())["output.parametrizations.bias.original"][1, 2] += 0.001
     with pytest.raises(ExportError, match=r"navigation_0: the exported policy \(onnxruntime\) dif"):
         check_export(config, learner, actor, *teams)
+
+
+@pytest.mark.parametrize("call", ["rename", "replace", "fsync", "mkdir"])
+@pytest.mark.parametrize("number", [errno.EPERM, errno.ENOTSUP, errno.ENOSPC])
+def test_what_a_file_system_refuses_leaves_nothing(
+    call: str, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = make_run(tmp_path / "run", run_config("td-inner"))
+
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, call, refuse)
+    before = sorted(run.rglob("*"))
+    with pytest.raises(ExportError) as caught:
+        export_run(run)
+    assert str(caught.value) == f"{run}/export: cannot be made ({os.strerror(number)})"
+    assert sorted(run.rglob("*")) == before
 
 
 def test_a_folder_that_is_there_is_left_alone(tmp_path: Path) -> None:

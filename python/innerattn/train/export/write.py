@@ -68,7 +68,7 @@ def export_run(run: str | Path, out: str | Path | None = None) -> tuple[Path, Co
         ExportError: the folder is already there or cannot be made, the run's policy is not one of
             this package, or the exported one differs from it.
         RunError, ConfigError: there is no readable run, or it holds no weights.
-        OSError: a file cannot be written.
+        OSError: the run's manifest cannot be written.
     """
     needed_libraries()
     source = Path(run)
@@ -79,12 +79,14 @@ def export_run(run: str | Path, out: str | Path | None = None) -> tuple[Path, Co
     if not target.parent.is_dir():
         raise ExportError(f"{target.parent}: no such folder")
     partial = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(8)}")
-    partial.mkdir()
     try:
+        partial.mkdir()
         contract = _write(source, newest.config, newest.learner, newest.env_steps, partial)
         os.rename(partial, target)
-    except BaseException:
+    except BaseException as error:
         shutil.rmtree(partial, ignore_errors=True)
+        if isinstance(error, OSError):  # the user knows no partial folder
+            raise ExportError(f"{target}: cannot be made ({error.strerror})") from error
         raise
     sync_folder(target.parent)
     if target.resolve().is_relative_to(source.resolve()):
