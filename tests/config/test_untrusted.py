@@ -1,13 +1,14 @@
 """Hostile text is refused in no time, and only plain files are read."""
 
 import os
+import sys
 import time
 from pathlib import Path
 
 import pytest
 
 from innerattn.config import Scenario, load_run_config, read_toml, write_toml
-from innerattn.config.files import write_whole
+from innerattn.config.files import write_in_place, write_whole
 from innerattn.config.untrusted import parse_json, parse_toml, read_plain
 from innerattn.errors import ConfigError, RunError
 
@@ -132,3 +133,28 @@ def test_a_planted_file_beside_the_one_that_is_written_is_left_alone(
     write_whole(tmp_path / "summary.json", b"{}")
     assert mine.read_text() == "mine"
     assert (tmp_path / "summary.json").read_bytes() == b"{}"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limits")
+def test_what_has_no_room_in_place_leaves_the_file_as_it_was(tmp_path: Path) -> None:
+    import resource
+
+    file = tmp_path / "state"
+    file.write_bytes(b"a" * 60)
+    write_in_place(file, b"b" * 80)
+    assert file.read_bytes() == b"b" * 80
+    write_in_place(file, b"c" * 60)
+    assert file.read_bytes() == b"c" * 60
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for room in (30, 70):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, before[1]))
+        try:
+            with pytest.raises(OSError, match="state"):
+                write_in_place(file, b"d" * 80)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        assert file.read_bytes() == b"c" * 60
+    link = tmp_path / "link"
+    link.symlink_to(file)
+    with pytest.raises(OSError, match="link"):
+        write_in_place(link, b"e")

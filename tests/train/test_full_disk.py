@@ -141,6 +141,7 @@ def test_a_disk_that_stays_full_ends_with_the_old_checkpoint(
 
     with limits_restored() as limit, pytest.raises(OSError, match=re.escape(str(run))):
         train(small_config(**OFTEN), run, progress=progress)
+    assert read_info(run).state == "running"  # no room for a word: run.json is as it was
     assert read_saved(run).number == SAVED_BEFORE
     assert resume(run) == run
     assert read_info(run).state == "done"

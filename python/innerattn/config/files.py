@@ -108,11 +108,18 @@ def write_in_place(path: Path, data: bytes) -> None:
     A loss of power in the midst of it may damage the file.
 
     Raises:
-        OSError: there is no such file, it is a link, or it cannot be written.
+        OSError: there is no such file, it is a link, or there is no room for all of ``data``; the
+            file is as it was.
     """
-    descriptor = os.open(path, os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0))
-    with os.fdopen(descriptor, "wb", buffering=0) as file:
-        if file.write(data) < len(data):
+    descriptor = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
+    with os.fdopen(descriptor, "r+b", buffering=0) as file:
+        before = file.read()
+        file.seek(0)
+        written = file.write(data)
+        if written < len(data):
+            file.seek(0)
+            file.write(before[:written])
+            file.truncate(len(before))
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
         file.truncate()
 

@@ -32,6 +32,7 @@ from typing import Literal
 
 from innerattn.config.files import sync_folder, write_whole
 from innerattn.errors import RunError
+from innerattn.records.logged import METRICS
 from innerattn.studies.owner import is_gone, this_process
 
 State = Literal["planned", "claimed", "done", "failed"]
@@ -42,7 +43,6 @@ SILENT_AFTER_S = 60.0
 
 _KEY = re.compile(r"[A-Za-z0-9_-]{1,128}")
 _CLAIM = re.compile(r"([A-Za-z0-9_-]{1,128})\.([1-9][0-9]{0,8})(\.free|\.failed)?")
-_GROWING = "metrics.jsonl"
 _NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS, errno.EINVAL)
 _MOST_REASON_BYTES = 1 << 16
 _COPIES = 3
@@ -317,7 +317,7 @@ def _made_alone(path: Path) -> bool:
 
 def _link_or_copy(source: str, target: str) -> None:
     """A hard link where the file is only ever replaced; a copy of one that grows."""
-    if os.path.basename(source) != _GROWING:
+    if os.path.basename(source) != METRICS:
         try:
             os.link(source, target, follow_symlinks=False)
             return

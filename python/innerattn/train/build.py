@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from pkgutil import resolve_name
 
@@ -56,18 +56,21 @@ def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -
     return FramedLearner(learner, symmetry, config.train.seed) if training else learner
 
 
-def refuse_larger_networks(config: RunConfig, weights: Mapping[str, Tensor], path: Path) -> None:
+def refuse_larger_networks(
+    config: RunConfig, env: BatchEnv, weights: Mapping[str, Tensor], path: Path
+) -> None:
     """Refuse networks that the weights of a run cannot fill, before memory is spent on them.
 
     Args:
         config: the run, as it says of itself.
+        env: worlds of its scenario.
         weights: everything learnt, by name.
         path: of the weights, for messages.
 
     Raises:
         RunError: the configuration asks for larger networks.
     """
-    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env, torch.device("meta"):
+    with torch.device("meta"):
         team = team_of(config, env)  # tensors on "meta" have a shape and no memory
         networks = draw_networks(team, config.network, torch.Generator("cpu"), critic_outputs=1)
     least = sum(one.numel() for network in networks for one in network.parameters())

@@ -21,6 +21,7 @@ from torch import Tensor
 from innerattn.config import RunConfig, write_toml
 from innerattn.config.files import write_in_place, write_whole
 from innerattn.errors import RunError, UnsealedRunWarning
+from innerattn.records.logged import METRICS
 from innerattn.records.run_files import info_text, seal
 from innerattn.records.run_folder import (
     SCHEMA_VERSION,
@@ -92,7 +93,7 @@ class RunFolder:
             OSError: something cannot be removed or written.
         """
         Checkpoints(path, config.digest(), config.train.keep_checkpoints).clear()
-        (path / "metrics.jsonl").unlink(missing_ok=True)
+        (path / METRICS).unlink(missing_ok=True)
         info = _first_info(config, before.threads, compiled, matmul_backend)
         info = replace(info, resumed=before.resumed + 1)
         _write_info(path, info)
@@ -145,7 +146,8 @@ class RunFolder:
         try:
             self.info = seal(self.path, self.info)
         except OSError:
-            write_in_place(self.path / "run.json", info_text(self.info))
+            with suppress(OSError):  # the first error says more
+                write_in_place(self.path / "run.json", info_text(self.info))
             raise
 
 

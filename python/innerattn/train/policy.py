@@ -89,8 +89,8 @@ def _load(files: RunFiles, name: str, device: str) -> NewestPolicy:
     weights = files.path / name
     known = files.info.weights_sha256 if files.info.state != "running" else None
     tensors = weights_in(files.read(name, MOST_BYTES), weights, known)
-    refuse_larger_networks(config, tensors, weights)
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
+        refuse_larger_networks(config, env, tensors, weights)
         learner = build_learner(config.model_copy(update={"train": train}), env)
     try:
         if (files.path / CARD).is_file():  # a team of the zoo comes without moments

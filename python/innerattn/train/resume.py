@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from innerattn.config import RunConfig
+from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.learn.resume import State
+from innerattn.records.logged import METRICS
 from innerattn.records.run_files import RunFiles
 from innerattn.records.run_folder import RunInfo, config_of
 from innerattn.train.build import refuse_larger_networks
@@ -120,7 +123,7 @@ def read_saved(run: Path) -> Saved:
                 (f"{name}/state.safetensors", STATE_FORMAT, info.state_sha256),
             )
         }
-        MetricsFile(run / "metrics.jsonl").verified(info.metrics_bytes, info.metrics_sha256)
+        MetricsFile(run / METRICS).verified(info.metrics_bytes, info.metrics_sha256)
     except RunError as error:
         raise _damaged(str(error), folder, whole_checkpoints(folder)) from error
     if info.config_sha256 != config.digest():
@@ -129,7 +132,8 @@ def read_saved(run: Path) -> Saved:
             "on as it began"
         )
     weights, state = read.values()
-    refuse_larger_networks(config, weights, run / name / "weights.safetensors")
+    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
+        refuse_larger_networks(config, env, weights, run / name / "weights.safetensors")
     return Saved(run, config, files.info, number, info, weights, state)
 
 
@@ -156,7 +160,7 @@ def verify_checkpoints(run: Path) -> set[str]:
         for part, (form, sha256) in parts.items():
             if part not in found:  # checkpoints share rows
                 tensors_in(files.read(part, MOST_BYTES), run / part, form, sha256)
-        MetricsFile(run / "metrics.jsonl").verified(info.metrics_bytes, info.metrics_sha256)
+        MetricsFile(run / METRICS).verified(info.metrics_bytes, info.metrics_sha256)
         found |= {name, *parts}
     return found
 

@@ -17,6 +17,7 @@ from innerattn.errors import RunError
 from innerattn.learn.compiled import CompilerError
 from innerattn.learn.divergence import DivergenceError
 from innerattn.learn.types import Transitions
+from innerattn.records.logged import METRICS
 from innerattn.records.run_folder import State
 from innerattn.train.checkpoint import RunFolder
 from innerattn.train.checkpoint_info import Best, CheckpointInfo, Counters, Stage
@@ -50,7 +51,7 @@ class Stages:
         self._checkpoints = Checkpoints(
             folder.path, parts.config.digest(), self._config.keep_checkpoints
         )
-        self._file = MetricsFile(folder.path / "metrics.jsonl")
+        self._file = MetricsFile(folder.path / METRICS)
         self._metrics: Metrics | None = None
         self._best_weights: Mapping[str, Tensor] | None = None
         first: Stage = "training" if parts.imitation is None else "imitating"
