@@ -40,8 +40,13 @@ def _of_system(error: OSError) -> str:
 def lacked_memory(error: BaseException) -> bool:
     """Whether memory was lacking: also in PyTorch, and while a library was loaded."""
     if isinstance(error, RuntimeError | ImportError):
-        signs = ("can't allocate memory", "out of memory", "annot allocate memory", "failed to map")
-        return any(sign in str(error) for sign in signs)
+        signs = (
+            "can't allocate memory",
+            "cannot allocate memory",
+            "out of memory",
+            "failed to map",
+        )
+        return any(sign in str(error).lower() for sign in signs)
     if isinstance(error, OSError):
         return error.errno == errno.ENOMEM
     return isinstance(error, MemoryError)
