@@ -1,5 +1,5 @@
-//! Worlds at the extremes of every key: whatever scenario is taken, its robots start apart, stay inside, and
-//! never overlap by more than the pages promise.
+//! Worlds with keys of motion at their extremes: whatever scenario is taken, its robots start apart, stay
+//! inside, and never overlap by more than the pages promise. No faults are drawn.
 //!
 //! `INNERATTN_FUZZ_SECONDS` says how long it goes on.
 
@@ -50,7 +50,7 @@ fn obstacle(source: &mut Stream, half: f64) -> Obstacle {
     }
 }
 
-/// A scenario with every key of motion at random, more often than not at its extremes.
+/// A scenario with the keys of motion at random, more often than not at its extremes.
 fn extreme(source: &mut Stream) -> Scenario {
     let engine = one_of(source, &ENGINES);
     let half = scaled(source, 0.2, 100.0);
