@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import torch
 from hypothesis import HealthCheck, settings
 
 sys.path.insert(0, str(Path(__file__).parent / "support"))
@@ -30,6 +31,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(3_600))
+
+
+@pytest.fixture(autouse=True)
+def same_draws() -> None:
+    """Each test's draws from torch's own generator are the same in every run and any order."""
+    torch.manual_seed(0)
 
 
 @pytest.fixture(scope="session")
