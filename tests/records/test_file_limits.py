@@ -1,5 +1,6 @@
 """Files at the limits of what is read: no time, memory or message grows out of proportion."""
 
+import hashlib
 import json
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from innerattn.errors import ConfigError, RunError, UnsealedRunWarning
 from innerattn.experiments.live import read_live
 from innerattn.records.logged import logged_lines
 from innerattn.records.run_folder import config_in
+from innerattn.train.checkpoint_info import MOST_BYTES, checkpoint_info
 
 TIMES = 20
 """Most bytes of memory for each byte of a file, past what is free."""
@@ -131,6 +133,48 @@ def test_a_line_of_metrics_has_a_length(run_dir: Path, tmp_path: Path) -> None:
         pytest.raises(RunError, match="not the metrics of a run"),
     ):
         read_live(tmp_path)
+
+
+SEGMENT = {"first": 0, "count": 1, "sha256": "0" * 64}
+CHECKPOINTS: dict[str, tuple[dict[str, object], str]] = {
+    "segments": ({"rows": {"replay": {"seen": 1, "segments": [SEGMENT] * 49_000}}}, ""),
+    "bad segments": (
+        {"rows": {"replay": {"seen": 1, "segments": [{"a": 1}] * 49_000}}},
+        "rows.replay.segments.0.first: Field required",
+    ),
+    "memories": (
+        {"rows": {f"r{n}": {"seen": 1, "segments": [SEGMENT]} for n in range(50_000)}},
+        "50,000 keys in one place: must be at most 1,000",
+    ),
+    "metrics": (
+        {"counters": {"step_metrics": {f"m{n}": "a" for n in range(300_000)}}},
+        "300,000 keys in one place",
+    ),
+    "unknown": ({f"k{n}": 1 for n in range(300_000)}, "keys in one place"),
+}
+
+
+@pytest.mark.parametrize("what", CHECKPOINTS)
+def test_checkpoints_at_their_limits_take_their_share(what: str) -> None:
+    changed, message = CHECKPOINTS[what]
+    zeros = {f"{name}_sha256": "0" * 64 for name in ("config", "weights", "state", "metrics")}
+    document = {"schema_version": 1, "counters": {}, "rows": {}, "metrics_bytes": 0, **zeros}
+    document |= changed
+    text = json.dumps(document, sort_keys=True)
+    document["sha256"] = hashlib.sha256(text.encode()).hexdigest()
+    data = json.dumps(document).encode()
+    assert len(data) <= MOST_BYTES
+    tracemalloc.start()
+    try:
+        checkpoint_info(data)
+        said = ""
+    except ValueError as error:
+        said = str(error)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert message in said
+    assert bool(message) == bool(said)
+    assert most <= max(FREE, TIMES * len(data))
 
 
 LOAD = """

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from innerattn.config import Scenario
+from innerattn.config import Scenario, load_run_config
 from innerattn.errors import ConfigError, RunError
+from innerattn.experiments.plan import of_seed
 from innerattn.studies.folder import begin_study, open_study
 from innerattn.studies.plan import PlannedRun, plan_study
 from innerattn.studies.study import study_in
@@ -79,6 +80,38 @@ TWO = GRID + "methods = ['td-inner', 'td-uniform']\n"
 ASKED = TWO + "[[contrasts]]\nname = 'x'\nmargin = 0.1\n"
 
 
+def test_a_run_is_the_one_that_its_keys_make(folder: Path) -> None:
+    """Only the first seed is checked as a whole; the others are its copies."""
+    text = """
+[grid]
+scenarios = ["mixed", "flood.toml"]
+methods = ["ppo-inner", "td-uniform"]
+seeds = [3, 0, 7]
+[[variants]]
+name = "plain"
+[[variants]]
+name = "same worlds"
+evaluate.seed = 5
+train.threads = 2
+"""
+    for run in planned(text.replace("same worlds", "same_worlds"), folder):
+        scenario, method, same = (
+            run.place["scenario"],
+            run.place["method"],
+            run.place["variant"] == "same_worlds",
+        )
+        given = {"evaluate.seed": 5, "train.threads": 2} if same else {}
+        slow = load_run_config(
+            "mixed",
+            str(method),
+            "fast",
+            overrides={**of_seed(run.seed), **given},
+            scenario_file=folder / "flood.toml" if scenario == "flood" else None,
+        )
+        assert run.config == slow
+        assert run.digest == slow.digest()
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -95,6 +128,14 @@ ASKED = TWO + "[[contrasts]]\nname = 'x'\nmargin = 0.1\n"
         ("[grid]\nseeds = '0..1000'", "must be 1 to 1,000 seeds"),
         ("[grid]\nseeds = '0-4'", "must be a range such as '0..4'"),
         ("[grid]\nseeds = [1, 1]", "grid.seeds: 1 stands twice"),
+        ("[grid]\nseeds = [0, -1]", "grid.seeds: -1: must be in 0..="),
+        (f"[grid]\nseeds = [0, {2**63}]", f"grid.seeds: {2**63}: must be in 0..="),
+        (
+            "[grid]\nseeds = '0..999'\nmethods = ['mappo', 'td-inner']\n"
+            "train.num_envs = [1, 2, 3, 4, 5, 6]",
+            "grid: has 12,000 runs: must be at most 10,000",
+        ),
+        ("[[contrasts]]\n" * 201, "contrasts"),
         ("[grid]\nppo.gamma = 0.9", "grid.ppo.gamma = 0.9: must be a list of values"),
         ("[grid]\ngamma = [0.9]", "grid: gamma: unknown key"),
         ("[grid]\nppo.gama = [0.9]", "did you mean gamma?"),

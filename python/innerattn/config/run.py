@@ -96,11 +96,14 @@ class RunConfig(Model):
         Keys that were added after runs had been published count only where they are not at their
         default; see `innerattn.config.model.ADDED_LATER`.
         """
+        return digest_of(self.digest_values())
+
+    def digest_values(self) -> dict[str, Any]:
+        """The values that `digest` is of, by section and key."""
         values = values_for_digest(self)
         for section in self._unused() & values.keys():
             del values[section]
-        text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return values
 
     def _unused(self) -> set[str]:
         """Sections that the run does not depend on."""
@@ -235,3 +238,9 @@ def _registered_section(name: str, given: object, run: type[RunConfig]) -> Algor
         return algorithm.config.model_validate(given)
     except ValidationError as error:
         raise ValueError(str(config_error(error, name, model=algorithm.config))) from error
+
+
+def digest_of(values: Mapping[str, Any]) -> str:
+    """SHA-256, in hexadecimal, of JSON values with sorted keys."""
+    text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 from innerattn.errors import RunError
 
-MOST_JSON_BYTES = 64 << 20
+MOST_JSON_BYTES = 16 << 20
 MOST_TOML_BYTES = 1 << 20
 _MOST_DEPTH = 64
 _MOST_KEYS = 20_000

@@ -40,6 +40,7 @@ FILE = "archive.parquet"
 _SHA256 = "sha256"
 _TEXTS = ("situation", "method", "variant", "name", "config", "info", "summary")
 _COMPRESSION_LEVEL = 19
+_MOST_RUNS = 10_000
 
 
 def write_archive(runs: Iterable[FinishedRun], path: Path) -> None:
@@ -151,10 +152,13 @@ def read_archive(path: Path) -> list[FinishedRun]:
         warnings.warn(text, UnsealedRunWarning, stacklevel=1)
     elif not _fits(table, head):
         raise RunError(f"{path}: does not fit its own digest; it was altered")
+    if len(table) > _MOST_RUNS:
+        raise RunError(f"{path}: has {len(table):,} runs: must be at most {_MOST_RUNS:,}")
     try:
         reward_names = tuple(head["reward_names"])
         texts = table.select([*_TEXTS, "seed"]).to_pylist()
-        return [_run(path, table, i, row, reward_names) for i, row in enumerate(texts)]
+        configs: dict[str, RunConfig] = {}
+        return [_run(path, table, i, row, reward_names, configs) for i, row in enumerate(texts)]
     except (LookupError, ValueError, TypeError, AttributeError, pa.ArrowException) as error:
         raise RunError(f"{path}: runs do not fit their description ({error})") from error
 
@@ -197,10 +201,18 @@ def _row(run: FinishedRun) -> dict[str, Any]:
 
 
 def _run(
-    path: Path, table: pa.Table, index: int, row: dict[str, Any], reward_names: tuple[str, ...]
+    path: Path,
+    table: pa.Table,
+    index: int,
+    row: dict[str, Any],
+    reward_names: tuple[str, ...],
+    configs: dict[str, RunConfig],
 ) -> FinishedRun:
     case = Case(row["situation"], row["method"], row["seed"], row["variant"])
-    config = RunConfig.model_validate(parse_json(row["config"]))
+    text = row["config"]
+    if text not in configs:  # one text may stand in many rows
+        configs[text] = RunConfig.model_validate(parse_json(text))
+    config = configs[text]
     where = Path(f"{path}: {row['name']}")
     return FinishedRun(
         case=case,

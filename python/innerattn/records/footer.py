@@ -1,8 +1,8 @@
-"""How large the columns of a Parquet file say that they are, read from its footer alone.
+"""How large a Parquet file is when it is unpacked, by its footer and the heads of its pages.
 
-pyarrow ends the whole process on some damaged footers when it is asked for a column's sizes, so
-they are read here. The footer is one struct in Thrift's compact protocol
-(https://github.com/apache/parquet-format, FileMetaData).
+pyarrow ends the whole process on some damaged footers when it is asked for a column's sizes, and
+believes a page whose size is not that of the footer, so they are read here. Footer and heads are
+structs in Thrift's compact protocol (https://github.com/apache/parquet-format).
 """
 
 from __future__ import annotations
@@ -13,20 +13,27 @@ from typing import Any
 _MAGIC = b"PAR1"
 _MOST_DEPTH = 16
 _MOST_DIGITS = 10  # of seven bits: 64 bits
-_ROW_GROUPS, _COLUMNS, _META_DATA, _NUM_VALUES, _UNCOMPRESSED = 4, 1, 3, 5, 6
+_MOST_FIELDS = 500_000
+"""Fields and values of lists that are read, which take up to a second."""
+_NUM_ROWS, _ROW_GROUPS, _COLUMNS, _META_DATA = 3, 4, 1, 3
+_NUM_VALUES, _UNCOMPRESSED, _COMPRESSED, _DATA_PAGE, _DICTIONARY_PAGE = 5, 6, 7, 9, 11
+_PAGE_UNCOMPRESSED, _PAGE_COMPRESSED = 2, 3
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """What a footer says.
+    """What a file says of itself.
 
     Attributes:
+        rows: their number.
         row_groups: their number.
         columns: of all row groups together.
         values: of all columns together.
-        unpacked_bytes: of all columns together.
+        unpacked_bytes: of all columns together, by the footer or by the heads of their pages,
+            whichever says more.
     """
 
+    rows: int
     row_groups: int
     columns: int
     values: int
@@ -34,13 +41,14 @@ class Sizes:
 
 
 def sizes_of(data: bytes) -> Sizes:
-    """What the footer of a Parquet file says.
+    """What a Parquet file says of its sizes.
 
     Args:
         data: the whole file.
 
     Raises:
-        ValueError: it has no footer, or one that is damaged.
+        ValueError: it has no footer, one that is damaged or has over 500,000 fields, or pages that
+            are not where it says.
     """
     end = len(data) - 8
     if end < 4 or data[-4:] != _MAGIC:
@@ -48,16 +56,36 @@ def sizes_of(data: bytes) -> Sizes:
     length = int.from_bytes(data[end : end + 4], "little")
     if length > end - 4:
         raise ValueError("a footer longer than the file")
-    footer = _Compact(data[end - length : end]).struct(0)
+    reader = _Compact(data, end - length, end)
+    footer = reader.struct(0)
     groups = _list(footer, _ROW_GROUPS)
     columns = [column for group in groups for column in _list(group, _COLUMNS)]
     sizes = [_struct(column, _META_DATA) for column in columns]
+    claimed = sum(_number(one, _UNCOMPRESSED) for one in sizes)
     return Sizes(
+        rows=_number(footer, _NUM_ROWS),
         row_groups=len(groups),
         columns=len(columns),
         values=sum(_number(one, _NUM_VALUES) for one in sizes),
-        unpacked_bytes=sum(_number(one, _UNCOMPRESSED) for one in sizes),
+        unpacked_bytes=max(claimed, sum(_pages_bytes(reader, one, end - length) for one in sizes)),
     )
+
+
+def _pages_bytes(reader: _Compact, column: dict[int, Any], end: int) -> int:
+    """Unpacked bytes of a column's pages, by their heads."""
+    if not _number(column, _NUM_VALUES):  # its pages are not read
+        return 0
+    at = _number(column, _DATA_PAGE)
+    if _DICTIONARY_PAGE in column:
+        at = min(at, _number(column, _DICTIONARY_PAGE) or at)
+    last, found = at + _number(column, _COMPRESSED), 0
+    if last > end:
+        raise ValueError("a column beyond the end")
+    while at < last:
+        head, at = reader.struct_at(at, last)
+        found += _number(head, _PAGE_UNCOMPRESSED)
+        at += _number(head, _PAGE_COMPRESSED)
+    return found
 
 
 def _list(fields: Any, key: int) -> list[Any]:
@@ -82,11 +110,20 @@ def _number(fields: dict[int, Any], key: int) -> int:
 
 
 class _Compact:
-    """A reader of Thrift's compact protocol: structs become dicts by number of field."""
+    """A reader of Thrift's compact protocol: structs become dicts by number of field.
 
-    def __init__(self, data: bytes) -> None:
+    It reads ``data`` between two places, and at most `_MOST_FIELDS` fields in all.
+    """
+
+    def __init__(self, data: bytes, at: int, end: int) -> None:
         self._data = data
-        self._at = 0
+        self._at, self._end = at, end
+        self._fields = 0
+
+    def struct_at(self, at: int, end: int) -> tuple[dict[int, Any], int]:
+        """The struct that begins at a place, and where it ends."""
+        self._at, self._end = at, end
+        return self.struct(0), self._at
 
     def struct(self, depth: int) -> dict[int, Any]:
         if depth > _MOST_DEPTH:
@@ -100,6 +137,9 @@ class _Compact:
         return fields
 
     def _value(self, kind: int, depth: int) -> Any:
+        self._fields += 1
+        if self._fields > _MOST_FIELDS:
+            raise ValueError(f"more than {_MOST_FIELDS:,} fields")
         if kind == 3:
             return self._byte()
         if kind in (4, 5, 6):
@@ -119,9 +159,10 @@ class _Compact:
         count, kind = head >> 4, head & 0x0F
         if count == 15:
             count = self._varint()
-        if count > len(self._data) - self._at:
+        if count > self._end - self._at:
             raise ValueError("a list longer than the footer")
         if kind in (1, 2):
+            self._fields += count
             return [self._byte() == 1 for _ in range(count)]
         return [self._value(kind, depth + 1) for _ in range(count)]
 
@@ -129,7 +170,7 @@ class _Compact:
         return self._bytes(1)[0]
 
     def _bytes(self, count: int) -> bytes:
-        found = self._data[self._at : self._at + count]
+        found = self._data[self._at : min(self._at + count, self._end)]
         if len(found) != count:
             raise ValueError("the footer is cut")
         self._at += count

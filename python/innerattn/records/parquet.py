@@ -5,9 +5,10 @@ One file has a row per episode, the other a row per rescue. It computes no figur
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ RECORD_FILES = _EPISODES, _RESCUES = "episodes.parquet", "rescues.parquet"
 
 _SUMS = ("record", "episode", "steps", "rescues", "reward")
 """Columns of ``episodes.parquet`` that every record needs; the others are labels and steps."""
+_MOST_RECORDS = 1_000
 
 
 def write_records(records: Sequence[Record], folder: Path) -> None:
@@ -78,10 +80,11 @@ def read_records(
     if heads != others:
         raise RunError(f"{folder}: {_EPISODES} and {_RESCUES} are of different episodes")
     try:
-        lengths = _lengths(heads, episodes)
+        rows, events = (_by_record(table, len(heads)) for table in (episodes, rescues))
+        lengths = _lengths(heads, rows)
         scenarios: dict[str, Scenario] = {}
         return [
-            _record(i, head, lengths[i], episodes, rescues, steps, scenarios)
+            _record(head, lengths[i], rows[i], events[i], steps, scenarios)
             for i, head in enumerate(heads)
             if policy in (None, head["policy"])
         ]
@@ -188,15 +191,25 @@ def _read(
     records = head.get("records")
     if not isinstance(records, list) or not all(isinstance(one, dict) for one in records):
         raise RunError(f"{path}: not a file of {FORMAT}")
+    if len(records) > _MOST_RECORDS:
+        raise RunError(f"{path}: has {len(records):,} records: must be at most {_MOST_RECORDS:,}")
     return table, records
 
 
-def _of_record(table: pa.Table, index: int) -> pa.Table:
-    """The rows of one record."""
-    return table.filter(pa.array(_numbers(table["record"]) == index))
+def _by_record(table: pa.Table, count: int) -> list[pa.Table]:
+    """The rows of each record.
+
+    Raises:
+        ValueError: they do not stand in the order of the records.
+    """
+    numbers = _numbers(table["record"])
+    if (np.diff(numbers) < 0).any():
+        raise ValueError("rows must stand in the order of their records")
+    ends = np.searchsorted(numbers, np.arange(count + 1))
+    return [table.slice(a, b - a) for a, b in itertools.pairwise(ends.tolist())]
 
 
-def _lengths(heads: Sequence[dict[str, Any]], episodes: pa.Table) -> list[Length]:
+def _lengths(heads: Sequence[dict[str, Any]], episodes: Sequence[pa.Table]) -> list[Length]:
     """Which length of an evaluation each record is of.
 
     Files that are older than this label hold, of each policy, the standard length first: a record
@@ -204,9 +217,8 @@ def _lengths(heads: Sequence[dict[str, Any]], episodes: pa.Table) -> list[Length
     """
     begun: set[str] = set()
     lengths: list[Length] = []
-    for index, head in enumerate(heads):
+    for head, rows in zip(heads, episodes, strict=True):
         name = head["policy"]
-        rows = _of_record(episodes, index)
         again = name in begun and int(_numbers(rows["episode"])[0]) == 0
         lengths.append(head.get("length", "long" if again else "standard"))
         begun.add(name)
@@ -214,16 +226,13 @@ def _lengths(heads: Sequence[dict[str, Any]], episodes: pa.Table) -> list[Length
 
 
 def _record(
-    index: int,
     head: dict[str, Any],
     length: Length,
-    episodes: pa.Table,
-    rescues: pa.Table,
+    rows: pa.Table,
+    events: pa.Table,
     steps: bool,
     scenarios: dict[str, Scenario],
 ) -> Record:
-    rows = _of_record(episodes, index)
-    events = _of_record(rescues, index)
     described = json.dumps(head["scenario"])
     if described not in scenarios:
         scenarios[described] = Scenario.model_validate(head["scenario"])
@@ -276,12 +285,24 @@ def _events(rows: pa.Table, scenario: Scenario, robot_names: tuple[str, ...]) ->
     tasks = {task.name: i for i, task in enumerate(scenario.tasks)}
     for name in events.dtype.names or ():
         if name.startswith("helper_"):
-            events[name] = [numbers[robot] for robot in rows[name].to_pylist()]
+            events[name] = _numbered(rows[name], numbers)
         elif name == "task":
-            events[name] = [tasks[task] for task in rows[name].to_pylist()]
+            events[name] = _numbered(rows[name], tasks)
         else:
             events[name] = _numbers(rows[name])
     return events
+
+
+def _numbered(column: pa.ChunkedArray, numbers: Mapping[Any, int]) -> NDArray[np.int64]:
+    """The number of each text; each text is looked up once.
+
+    Raises:
+        KeyError: a text that has no number.
+    """
+    packed = column.combine_chunks().dictionary_encode("encode")
+    known = np.array([numbers[text] for text in packed.dictionary.to_pylist()], np.int64)
+    places: NDArray[np.int64] = packed.indices.to_numpy(zero_copy_only=False).astype(np.int64)
+    return known[places]
 
 
 def _numbers(column: pa.ChunkedArray) -> NDArray[Any]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from innerattn.config.untrusted import parse_json
@@ -18,9 +19,10 @@ _LEAST_LIMIT_BYTES = 64 << 20
 """A table may always take this much."""
 _MOST_RATIO = 200
 """A larger table may take this many times the size of its file."""
-_MOST_COLUMNS = 10_000
-_MOST_ROW_GROUPS = 100_000
-_MOST_TEXT_BYTES = 64 << 20
+_MOST_COLUMNS = 4_000
+"""In all row groups together."""
+_MOST_TEXT_BYTES = 16 << 20
+_TEXT = "BYTE_ARRAY"
 
 
 def read_table(
@@ -39,13 +41,16 @@ def read_table(
         RunError: it is no Parquet, of another format or version, or would unpack to more than 64
             MiB and 200 times its size.
     """
+    _refuse_large(data, path)
     try:
         with _opened(data) as file:
-            _refuse_large(file.metadata.num_rows, data, path)
             found = file.schema_arrow.metadata or {}
             head = parse_json(found[form.encode()])
             known = head["schema_version"]
-            table = file.read(columns)
+            texts = _texts(file.schema)
+        # Texts are read as numbers of a list of texts: one may stand in millions of rows.
+        with _opened(data, read_dictionary=texts) as file:
+            table = _written_out(file.read(columns), _most_bytes(data), path)
     except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
         raise RunError(f"{path}: not a file of {form}") from error
     if known != version:
@@ -79,36 +84,71 @@ def refuse_damaged(data: bytes, path: Path) -> None:
     Raises:
         RunError: they are none.
     """
+    _refuse_large(data, path)
     try:
-        with _opened(data) as file:
-            _refuse_large(file.metadata.num_rows, data, path)
+        with _opened(data):
+            pass
     except (OSError, pa.ArrowException) as error:
         raise RunError(f"{path}: not a whole Parquet file") from error
 
 
-def _opened(data: bytes) -> pq.ParquetFile:
+def _opened(data: bytes, **options: Any) -> pq.ParquetFile:
     return pq.ParquetFile(
         pa.BufferReader(data),
-        thrift_string_size_limit=_MOST_TEXT_BYTES,
-        thrift_container_size_limit=_MOST_ROW_GROUPS * 10,
+        thrift_string_size_limit=2 * _MOST_TEXT_BYTES,  # pyarrow keeps them a second time
+        thrift_container_size_limit=10 * _MOST_COLUMNS,
+        **options,
     )
 
 
-def _refuse_large(rows: int, data: bytes, path: Path) -> None:
+def _texts(schema: pq.ParquetSchema) -> list[str]:
+    """Names of the columns of texts.
+
+    Raises:
+        ValueError: texts lie in lists.
+    """
+    columns = [schema.column(place) for place in range(len(schema))]
+    texts = [one for one in columns if one.physical_type == _TEXT]
+    for one in texts:
+        if one.max_repetition_level:
+            raise ValueError(f"column {one.path}: lists of texts")
+    return [one.path for one in texts]
+
+
+def _written_out(table: pa.Table, most: int, path: Path) -> pa.Table:
+    """The table with each text in its row, if that has room."""
+    needed = 0
+    for place, field in enumerate(table.schema):
+        if not pa.types.is_dictionary(field.type):
+            continue
+        column = table.column(place)
+        lengths = (pc.binary_length(one.dictionary).take(one.indices) for one in column.chunks)
+        needed += sum(pc.sum(one).as_py() or 0 for one in lengths)
+        if needed > most:
+            raise RunError(f"{path}: texts unpack to over {most} bytes: must be at most that many")
+        table = table.set_column(
+            place, pa.field(field.name, field.type.value_type), column.cast(field.type.value_type)
+        )
+    return table
+
+
+def _most_bytes(data: bytes) -> int:
+    return max(_LEAST_LIMIT_BYTES, _MOST_RATIO * len(data))
+
+
+def _refuse_large(data: bytes, path: Path) -> None:
     """Refuse a table that would be much larger than its file, by what the file says of it."""
     try:
         sizes = sizes_of(data)
     except ValueError as error:
         raise RunError(f"{path}: not a whole Parquet file ({error})") from error
-    columns, groups = sizes.columns // max(1, sizes.row_groups), sizes.row_groups
-    if columns > _MOST_COLUMNS or groups > _MOST_ROW_GROUPS:
+    if sizes.columns > _MOST_COLUMNS:
         raise RunError(
-            f"{path}: has {columns} columns in {groups} row groups: must have at most "
-            f"{_MOST_COLUMNS} in {_MOST_ROW_GROUPS}"
+            f"{path}: has {sizes.columns} columns in {sizes.row_groups} row groups: must have at "
+            f"most {_MOST_COLUMNS} in all of them together"
         )
-    size = len(data)
-    most = max(_LEAST_LIMIT_BYTES, _MOST_RATIO * size)
+    most = _most_bytes(data)
     # Repeated values take no room in a file; a number takes eight bytes in memory.
-    needed = max(sizes.unpacked_bytes, 8 * sizes.values, 8 * rows)
+    needed = max(sizes.unpacked_bytes, 8 * sizes.values, 8 * sizes.rows)
     if needed > most:
-        raise RunError(f"{path}: {size} bytes unpack to {needed}: must be at most {most}")
+        raise RunError(f"{path}: {len(data)} bytes unpack to {needed}: must be at most {most}")

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 from innerattn.config import SCENARIOS, RunConfig, load_run_config
+from innerattn.config.run import digest_of
 from innerattn.errors import ConfigError
 from innerattn.experiments.plan import of_seed
 from innerattn.measures.registry import MEASURES
@@ -17,6 +20,7 @@ from innerattn.studies.study import Study, StudyContrast, Value
 
 MEASURES_OF_ALL = ("score", "rescues_per_episode")
 """What every evaluation holds beside the registered measures."""
+MOST_RUNS = 10_000
 _NAMED_BY_THE_GRID = {"train.seed": "seeds", "train.method": "methods"}
 
 
@@ -29,11 +33,13 @@ class PlannedRun:
             study has variants, and each key that the grid varies.
         seed: of training.
         config: what it is trained and measured with.
+        digest: of ``config``.
     """
 
     place: Mapping[str, Value]
     seed: int
     config: RunConfig
+    digest: str
 
     @cached_property
     def key(self) -> str:
@@ -41,7 +47,7 @@ class PlannedRun:
         train = self.config.train
         words = (self.config.scenario.situation, train.method, f"s{train.seed}")
         name = re.sub(r"[^A-Za-z0-9_-]", "_", "-".join(words))
-        return f"{name}-{self.config.digest()[:16]}"
+        return f"{name}-{self.digest[:16]}"
 
     def __str__(self) -> str:
         words = [str(value) for key, value in self.place.items() if key != "budget"]
@@ -56,8 +62,8 @@ def plan_study(study: Study, find: Callable[[str], Path]) -> list[PlannedRun]:
         find: where a scenario's file is, by its name in the study.
 
     Raises:
-        ConfigError: a combination cannot be run, two are the same run, or a contrast names runs
-            that are not in the grid.
+        ConfigError: there are over 10,000 runs, a combination cannot be run, two are the same run,
+            or a contrast names runs that are not in the grid.
     """
     variants = {one.name: one.changes for one in study.variants} or {"": {}}
     keys = study.grid.keys
@@ -69,37 +75,75 @@ def plan_study(study: Study, find: Callable[[str], Path]) -> list[PlannedRun]:
     names = [Path(scenario).stem for scenario in study.grid.scenarios]
     if len(set(names)) < len(names):
         raise ConfigError("grid.scenarios: two files have the same name; rename one")
-    planned, known = [], dict[str, PlannedRun]()
-    for seed, scenario, method, budget, variant, *values in product(
-        study.grid.numbers,
-        study.grid.scenarios,
-        study.grid.methods,
-        study.grid.budgets,
-        variants,
-        *keys.values(),
-    ):
+    grid, found = study.grid, list[_OfAllSeeds]()
+    axes: list[Sequence[Any]] = [grid.scenarios, grid.methods, grid.budgets, list(variants)]
+    axes += keys.values()
+    count = math.prod(map(len, axes)) * len(grid.numbers)
+    if count > MOST_RUNS:
+        raise ConfigError(f"grid: has {count:,} runs: must be at most {MOST_RUNS:,}")
+    for scenario, method, budget, variant, *values in product(*axes):
         chosen = dict(zip(keys, values, strict=True))
         place = {"scenario": Path(scenario).stem, "method": method, "budget": budget}
         place |= ({"variant": variant} if variant else {}) | chosen
-        overrides = {**of_seed(seed), **chosen, **variants[variant]}
+        given = {**chosen, **variants[variant]}
         try:
-            config = _config(scenario, find, method, budget, overrides)
+            config = _config(scenario, find, method, budget, {**of_seed(grid.numbers[0]), **given})
         except ConfigError as error:
             named = ", ".join(f"{key} = {value}" for key, value in place.items())
             raise ConfigError(f"grid ({named}): {error}") from error
-        run = PlannedRun(place, seed, config)
+        found.append(_OfAllSeeds(place, given, config, config.digest_values()))
+    planned = [one.run(seed) for seed in grid.numbers for one in found]
+    known = dict[str, PlannedRun]()
+    for run in planned:
         if (other := known.setdefault(run.key, run)) is not run:
             raise ConfigError(f"grid: {run} and {other} are the same run")
-        planned.append(run)
+    places = [one.place for one in found]
     for contrast in study.contrasts:
-        pairs(contrast, [run.place for run in planned])
+        pairs(contrast, places)
     return planned
+
+
+@dataclass(frozen=True)
+class _OfAllSeeds:
+    """The runs of one place, which differ in their seed alone.
+
+    Attributes:
+        place: as of `PlannedRun`.
+        given: values by dotted key that the study gives all of them.
+        first: configuration of the first one.
+        values: what its digest is of.
+    """
+
+    place: Mapping[str, Value]
+    given: Mapping[str, object]
+    first: RunConfig
+    values: Mapping[str, Any]
+
+    def run(self, seed: int) -> PlannedRun:
+        """The run with a seed, without checking anew all that does not depend on it."""
+        sections: dict[str, dict[str, object]] = {}
+        for key, value in of_seed(seed).items():
+            section, name = key.split(".")
+            if key not in self.given:
+                sections.setdefault(section, {})[name] = value
+        config = self.first.model_copy(
+            update={
+                section: getattr(self.first, section).model_copy(update=values)
+                for section, values in sections.items()
+            }
+        )
+        own = {section: self.values[section] | values for section, values in sections.items()}
+        return PlannedRun(self.place, seed, config, digest_of({**self.values, **own}))
 
 
 def pairs(
     contrast: StudyContrast, places: list[Mapping[str, Value]]
 ) -> list[tuple[Mapping[str, Value], Mapping[str, Value]]]:
     """The places of a contrast's two sides that are alike in all that neither side names.
+
+    Args:
+        contrast: what is compared.
+        places: of the grid, each once.
 
     Raises:
         ConfigError: a side names what is not in the grid, or no two places belong together, or a
@@ -109,15 +153,14 @@ def pairs(
     if contrast.measure not in (*MEASURES_OF_ALL, *MEASURES):
         known = ", ".join((*MEASURES_OF_ALL, *MEASURES))
         raise ConfigError(f"{where}: measure = {contrast.measure!r}: must be one of {known}")
-    distinct = list({tuple(place.items()): place for place in places}.values())
     sides = []
     for name, side in zip("ab", contrast.sides, strict=True):
         for key, value in side.items():
-            values = list(dict.fromkeys(place[key] for place in distinct if key in place))
+            values = list(dict.fromkeys(place[key] for place in places if key in place))
             if value not in values:
                 of = f"must be one of {', '.join(map(repr, values))}" if values else "is no key"
                 raise ConfigError(f"{where}: {name}.{key} = {value!r}: {of} of the grid")
-        sides.append([one for one in distinct if side.items() <= one.items()])
+        sides.append([one for one in places if side.items() <= one.items()])
     free = set().union(*contrast.sides)
     others = {_rest(place, free): place for place in sides[1]}
     if len({_rest(place, free) for place in sides[0]}) < len(sides[0]):

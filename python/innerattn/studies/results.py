@@ -138,8 +138,9 @@ def compare(
     for one in results:
         by_place.setdefault(tuple(one.run.place.items()), {})[one.run.seed] = one
     found = []
+    places = list({tuple(run.place.items()): run.place for run in planned}.values())
     for wanted in study.contrasts:
-        for a, b in pairs(wanted, [run.place for run in planned]):
+        for a, b in pairs(wanted, places):
             of_a, of_b = (by_place.get(tuple(place.items()), {}) for place in (a, b))
             found.append(_compared(wanted, a, b, of_a, of_b))
     for family in dict.fromkeys(one.contrast.family for one in found):

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -13,11 +11,14 @@ from pydantic import ConfigDict, Field, ValidationError, field_validator, model_
 
 from innerattn.config.files import toml_table_in
 from innerattn.config.model import Model, config_error
+from innerattn.config.run import digest_of
 from innerattn.errors import ConfigError
 
 _WORD = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
 _SEEDS = re.compile(r"([0-9]{1,18})\.\.([0-9]{1,18})")
 _MOST_SEEDS = 1_000
+_MOST_SEED = 2**62
+_MOST_CONTRASTS = 200
 
 Name = Annotated[str, Field(pattern=rf"^{_WORD}$")]
 Value = str | int | float | bool
@@ -58,6 +59,9 @@ class Grid(Model):
             seeds = given
         if not 1 <= len(seeds) <= _MOST_SEEDS:
             raise ValueError(f"grid.seeds = {given!r}: must be 1 to {_MOST_SEEDS:,} seeds")
+        for seed in seeds:
+            if not 0 <= seed <= _MOST_SEED:
+                raise ValueError(f"grid.seeds: {seed}: must be in 0..={_MOST_SEED}")
         return seeds
 
     @model_validator(mode="after")
@@ -70,9 +74,8 @@ class Grid(Model):
             **self.keys,
         }
         for key, values in listed.items():
-            twice = [one for n, one in enumerate(values) if one in values[:n]]
-            if twice:
-                raise ValueError(f"grid.{key}: {twice[0]!r} stands twice")
+            if (twice := _first_twice(values)) is not None:
+                raise ValueError(f"grid.{key}: {twice!r} stands twice")
         return self
 
     @property
@@ -142,7 +145,9 @@ class Study(Model):
     variants: tuple[Variant, ...] = Field(
         (), description="named changes; each is combined with the whole grid"
     )
-    contrasts: tuple[StudyContrast, ...] = Field((), description="what is compared")
+    contrasts: tuple[StudyContrast, ...] = Field(
+        (), max_length=_MOST_CONTRASTS, description="what is compared"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -150,16 +155,14 @@ class Study(Model):
             ("variants", [one.name for one in self.variants]),
             ("contrasts", [one.name for one in self.contrasts]),
         ):
-            twice = [name for n, name in enumerate(names) if name in names[:n]]
-            if twice:
-                raise ValueError(f"{what}: the name {twice[0]!r} stands twice")
+            if (twice := _first_twice(names)) is not None:
+                raise ValueError(f"{what}: the name {twice!r} stands twice")
         return self
 
     def digest(self) -> str:
         """SHA-256, in hexadecimal, of its values; comments and order in its file do not count."""
         values = self.model_dump(mode="json")
-        text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return digest_of(values)
 
 
 def study_in(data: bytes, path: str | Path) -> Study:
@@ -173,6 +176,16 @@ def study_in(data: bytes, path: str | Path) -> Study:
         return Study.model_validate(table)
     except ValidationError as error:
         raise config_error(error, source=str(path), model=Study) from error
+
+
+def _first_twice(values: Iterable[Any]) -> Any | None:
+    """The first value that stands there a second time."""
+    seen = set[str]()
+    for one in values:
+        if (text := repr(one)) in seen:
+            return one
+        seen.add(text)
+    return None
 
 
 def _coordinates(side: Mapping[str, Any]) -> dict[str, Value]:

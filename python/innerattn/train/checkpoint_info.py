@@ -7,12 +7,13 @@ import json
 from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, StringConstraints, TypeAdapter, ValidationError
+from pydantic import ConfigDict, FailFast, Field, StringConstraints, TypeAdapter, ValidationError
 
 from innerattn.config.untrusted import parse_json
 
 SCHEMA_VERSION = 1
 MOST_BYTES = 8 << 20
+_MOST_KEYS = 1_000
 Stage = Literal["imitating", "training"]
 
 _Count = Annotated[int, Field(ge=0, lt=2**62)]
@@ -83,7 +84,7 @@ class RowsInfo:
     __pydantic_config__ = _STRICT
 
     seen: _Count
-    segments: Annotated[tuple[Segment, ...], Field(max_length=50_000)]
+    segments: Annotated[tuple[Segment, ...], Field(max_length=50_000), FailFast()]
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,7 @@ def checkpoint_info(data: bytes) -> CheckpointInfo:
     document: Any = parse_json(data)
     if not isinstance(document, dict) or "schema_version" not in document:
         raise ValueError("not a checkpoint")
+    _refuse_many(document)
     if document["schema_version"] != SCHEMA_VERSION:
         version = document["schema_version"]
         raise ValueError(f"schema version {version}, only {SCHEMA_VERSION} is known")
@@ -135,6 +137,16 @@ def checkpoint_info(data: bytes) -> CheckpointInfo:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         raise ValueError(f"{place}: {first['msg']}") from error
+
+
+def _refuse_many(document: dict[str, Any]) -> None:
+    """Refuse more keys than a checkpoint has, before each of them is an error of its own."""
+    level: list[Any] = [document]
+    while level:
+        for part in level:
+            if len(part) > _MOST_KEYS:
+                raise ValueError(f"{len(part):,} keys in one place: must be at most {_MOST_KEYS:,}")
+        level = [one for part in level for one in part.values() if isinstance(one, dict)]
 
 
 def _digest(document: dict[str, Any]) -> str:
