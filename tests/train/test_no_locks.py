@@ -63,6 +63,18 @@ def test_other_errors_of_a_lock_are_not_taken_for_that(
         pass
 
 
+def test_a_folder_that_cannot_be_locked_is_none(
+    small_config: Configure, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(fcntl, "flock", fail)
+    with pytest.raises(RunError, match=r"cannot make the run folder \(Input/output error\)"):
+        train(small_config(), tmp_path / "run")
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EBADF])
 def test_a_folder_that_cannot_be_synced_is_left(
     number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -14,6 +14,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from innerattn.train.run_lock import FolderLock
+
 if sys.platform != "win32":
     import fcntl
 
@@ -33,29 +35,18 @@ def being_made(folder: Path) -> Iterator[None]:
     If the block raises, the folder is removed.
 
     Raises:
-        OSError: it cannot be made.
+        OSError: it cannot be made, or not locked though its file system has locks.
     """
     folder.mkdir()
     try:
-        with _locked(folder):
+        lock = FolderLock(folder)
+        try:
             yield
+        finally:
+            lock.release()
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    if sys.platform == "win32":
-        yield
-        return
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        with suppress(OSError):  # not every file system has locks
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def sweep_orphans(parent: Path) -> None:
