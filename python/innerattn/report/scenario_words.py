@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from innerattn.config import Fault, Scenario
+from innerattn.report.reachability import closed_off
 
 _WHAT = {
     "motor_gain": "has {percent} of its force",
@@ -62,6 +63,7 @@ def _doubts(scenario: Scenario) -> Iterator[str]:
             "victims in a corner: a robot as large as the largest cannot reach them; "
             f"wall_clearance_m = {largest:g} would do"
         )
+    yield from closed_off(scenario)
 
 
 def _fault(fault: Fault) -> str:

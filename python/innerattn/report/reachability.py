@@ -1,0 +1,107 @@
+"""Where robots can drive between walls and obstacles that have a place of their own, on a grid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.config import Robot, Scenario
+
+_CELLS = 201
+_LEAST_SHARE = 0.01
+"""Smaller parts of an area are within the error of the grid."""
+
+Mask = NDArray[np.bool_]
+
+
+def closed_off(scenario: Scenario) -> Iterator[str]:
+    """What obstacles keep from every robot that a task needs, a sentence each.
+
+    Robots with a start can drive where their start is connected to; others may start anywhere. A
+    place counts as closed only if it is so by more than a cell of the grid, a hundredth of
+    ``arena_half_width_m``.
+    """
+    if all(one.position_m is None for one in scenario.obstacles):
+        return
+    needs = dict.fromkeys(need for task in scenario.tasks for need in task.needs)
+    for need in needs:
+        able = [robot for robot in scenario.robots if need in robot.abilities]
+        near = np.any([_near(scenario, robot) for robot in able], axis=0)
+        for x, y in scenario.victim_places_m:
+            if not near[_cell(scenario, x, y)]:
+                yield f"place ({x:g}, {y:g}): obstacles keep every robot with {need} away from it"
+        if not scenario.victim_places_m:
+            area = _area(scenario)
+            share = float((area & ~near).sum() / max(1, area.sum()))
+            if share > _LEAST_SHARE:
+                yield (
+                    f"victims: obstacles keep every robot with {need} away from "
+                    f"{100.0 * share:.0f} % of their area"
+                )
+
+
+def _near(scenario: Scenario, robot: Robot) -> Mask:
+    """Cells from which a place is within reach of where a robot can drive."""
+    from scipy.ndimage import distance_transform_edt, label
+
+    x, y = _grid(scenario)
+    step = _step(scenario)
+    radius = robot.radius_m - step
+    half = scenario.arena_half_width_m
+    inside = np.maximum(np.abs(x), np.abs(y)) <= half - radius
+    free = inside & (_clearance(scenario, x, y) >= radius)
+    if robot.start_m is not None:
+        parts, _ = label(free, np.ones((3, 3)))
+        free = free & (parts == parts[_cell(scenario, *robot.start_m)])
+    if not free.any():
+        return free
+    away = distance_transform_edt(~free) * step
+    return np.asarray(away <= scenario.rescue_radius_m + step)
+
+
+def _area(scenario: Scenario) -> Mask:
+    """Cells where victims may appear."""
+    x, y = _grid(scenario)
+    half = scenario.arena_half_width_m - scenario.wall_clearance_m
+    x_min, y_min, x_max, y_max = scenario.victim_area_m or (-half, -half, half, half)
+    inside = (x_min <= x) & (x <= x_max) & (y_min <= y) & (y <= y_max)
+    return inside & (_clearance(scenario, x, y) > 0.0)
+
+
+def _clearance(
+    scenario: Scenario, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distance to the nearest obstacle that has a place, below 0 inside one [m]."""
+    nearest = np.full(x.shape, math.inf)
+    for one in scenario.obstacles:
+        if one.position_m is None:
+            continue
+        dx, dy = np.abs(x - one.position_m[0]), np.abs(y - one.position_m[1])
+        if one.radius_m is not None:
+            found = np.hypot(dx, dy) - one.radius_m
+        else:
+            assert one.half_extents_m is not None  # a box
+            px, py = dx - one.half_extents_m[0], dy - one.half_extents_m[1]
+            outside = np.hypot(np.maximum(px, 0.0), np.maximum(py, 0.0))
+            found = outside + np.minimum(np.maximum(px, py), 0.0)
+        nearest = np.minimum(nearest, found)
+    return nearest
+
+
+def _grid(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    half = scenario.arena_half_width_m
+    ticks = np.linspace(-half, half, _CELLS)
+    x, y = np.meshgrid(ticks, ticks, indexing="ij")
+    return x, y
+
+
+def _step(scenario: Scenario) -> float:
+    return 2.0 * scenario.arena_half_width_m / (_CELLS - 1)
+
+
+def _cell(scenario: Scenario, x: float, y: float) -> tuple[int, int]:
+    half, step = scenario.arena_half_width_m, _step(scenario)
+    return round((x + half) / step), round((y + half) / step)
