@@ -77,13 +77,13 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
 @pytest.mark.parametrize(
     ("target", "budget", "options"),
     [
-        ("swapped", "short", "--seeds 10 --situations single,mixed"),
+        ("swapped", "short", "--seeds 10 --presets single,mixed"),
         ("learning-ablations", "fast", "--seeds 3"),
-        ("attention", "fast", "--seeds 10 --situations mixed,mixed-8,mixed-16"),
+        ("attention", "fast", "--seeds 10 --presets mixed,mixed-8,mixed-16"),
         (
             "attention",
             "strong",
-            "--seeds 10 --situations mixed,mixed-8 --methods ppo-inner,ppo-uniform,mappo",
+            "--seeds 10 --presets mixed,mixed-8 --methods ppo-inner,ppo-uniform,mappo",
         ),
         ("learning", "strong", "--methods ppo-inner --seeds 5"),
         ("learning-long", "strong", "--seeds 5"),
@@ -91,7 +91,7 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
         (
             "learning-warm-start",
             "strong",
-            "--methods ppo-inner --seeds 3 --situations single,mixed",
+            "--methods ppo-inner --seeds 3 --presets single,mixed",
         ),
     ],
 )

@@ -18,7 +18,7 @@ def command(monkeypatch: pytest.MonkeyPatch, small: dict[str, object]) -> Comman
     def run(target: str, out: Path, methods: str, *options: str, **values: object) -> int:
         plan = partial(TARGETS[target].plan, overrides={**small, **values})
         monkeypatch.setitem(TARGETS, target, replace(TARGETS[target], plan=plan))
-        given = ["--out", str(out), "--methods", methods, "--situations", "mixed"]
+        given = ["--out", str(out), "--methods", methods, "--presets", "mixed"]
         return main(["reproduce", target, *given, *options])
 
     return run

@@ -255,7 +255,8 @@ def test_a_measurement_that_fails_is_named(
     ("options", "message"),
     [
         (["fig5", "--methods", "td-uniform"], "--methods = 'td-uniform': must be all or of td-i"),
-        (["all", "--situations", "mixed,x"], "--situations = 'x': must be all or of single, "),
+        (["all", "--presets", "mixed,x"], "--presets = 'x': must be all or of single, "),
+        (["all", "--situations", "mixed,x"], "--presets = 'x': must be all or of single, "),
         (["all", "--seeds", "0"], "--seeds = 0: must be 1 to 1,000"),
     ],
 )

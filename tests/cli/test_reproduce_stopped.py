@@ -119,7 +119,7 @@ if __name__ == "__main__":
     plan = partial(TARGETS["fig4"].plan, overrides={overrides!r})
     TARGETS["fig4"] = replace(TARGETS["fig4"], plan=plan)
     main(["reproduce", "fig4", "--seeds", "1", "--out", sys.argv[1], "--methods",
-          "td-inner,td-uniform", "--situations", "mixed"])
+          "td-inner,td-uniform", "--presets", "mixed"])
 """
 
 

@@ -192,7 +192,7 @@ BRIEF: Mapping[str, Brief] = {
             ),
             ("--seeds N", "how many seeds ({seeds})"),
             ("--methods LIST", "methods, separated by commas ({methods})"),
-            ("--situations LIST", "situations, separated by commas ({situations})"),
+            ("--presets LIST", "built-in scenarios, separated by commas ({presets})"),
             ("--out FOLDER", "folder of the study (studies/BUDGET)"),
             ("--device NAME", "where networks are trained: cpu, cuda, cuda:0 ({device})"),
             ("--report-only", "train nothing; report on the runs that are finished"),

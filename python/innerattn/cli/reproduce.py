@@ -55,8 +55,8 @@ class Reproduce(LongCommand):
     """Folder of the study, its runs in runs; None: studies/BUDGET or studies/crossed-BUDGET."""
     methods: str = "all"
     """Methods, separated by commas; all: what the target needs."""
-    situations: str = "all"
-    """Situations, separated by commas; all: what the target needs."""
+    presets: Annotated[str, tyro.conf.arg(aliases=["--situations"])] = "all"
+    """Built-in scenarios, separated by commas; all: what the target needs."""
     device: str = "cpu"
     """Where networks are trained: cpu, cuda, cuda:0, ... Runs from any device are reported."""
     report_only: tyro.conf.FlagCreatePairsOff[bool] = False
@@ -156,13 +156,13 @@ class Reproduce(LongCommand):
         methods = target.methods
         if self.methods != "all":
             methods = _chosen("methods", self.methods, (*target.methods, *target.further))
-        situations = target.situations
-        if self.situations != "all":
+        presets = target.situations
+        if self.presets != "all":
             known = tuple(dict.fromkeys((*target.situations, *SITUATIONS)))
-            situations = _chosen("situations", self.situations, known)
+            presets = _chosen("presets", self.presets, known)
         if not 1 <= self.seeds <= _MOST_SEEDS:
             raise UsageError(f"--seeds = {self.seeds}: must be 1 to {_MOST_SEEDS:,}")
-        planned = target.plan(methods, situations, range(self.seeds), self.budget, out)
+        planned = target.plan(methods, presets, range(self.seeds), self.budget, out)
         return on_device(planned, self.device)
 
     def _print_plan(self, console: Console, found: Sequence[RunStatus], out: Path) -> None:
