@@ -1,5 +1,6 @@
 """The documentation names everything that it should."""
 
+import pkgutil
 import re
 from importlib.util import find_spec
 from pathlib import Path
@@ -90,3 +91,17 @@ def test_the_page_about_training_says_what_the_budgets_do() -> None:
         assert schedule.entropy_weight == Ramp(first=0.015, last=0.0003)
         for key in ("network.symmetry", "train.engine", "train.episode_steps", "ppo.gamma"):
             assert f"`{key}`" in text
+
+
+def test_every_equation_has_the_function_and_the_test_that_its_page_names() -> None:
+    text = (ROOT / "docs" / "equations.md").read_text("utf-8")
+    functions = set(re.findall(r"`(innerattn\.[\w.]+)`", text))
+    tests = set(re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", text))
+    assert len(functions) > 15
+    assert len(tests) > 15
+    for name in functions:
+        assert callable(pkgutil.resolve_name(name)), name
+    for file, test in tests:
+        assert f"def {test}(" in (ROOT / file).read_text("utf-8"), test
+    for number in range(1, 11):
+        assert re.search(rf"\beqs?\. (\d (to|and) )?{number}\b", text) or number == 6, number

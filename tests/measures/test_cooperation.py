@@ -36,7 +36,7 @@ def test_no_rescue_is_zero() -> None:
     }
 
 
-def test_equation_5_by_hand() -> None:
+def test_equation_10_by_hand() -> None:
     pairs = count_pairs(SOME, 4)
     expected = [[0, 0, 1, 2], [0, 0, 3, 1], [1, 3, 0, 0], [2, 1, 0, 0]]
     np.testing.assert_array_equal(pairs, expected)

@@ -80,7 +80,9 @@ def test_discs_close_a_corner() -> None:
         {"shape": "disc", "radius_m": 0.2, "position_m": [x, y]}
         for x, y in ((0.5, 0.85), (0.5, 0.5), (0.85, 0.5))
     ]
-    found = list(closed_off(scenario(0.0, obstacles=discs, victim_places_m=[[0.8, 0.8], [0.9, 0.9]])))
+    found = list(
+        closed_off(scenario(0.0, obstacles=discs, victim_places_m=[[0.8, 0.8], [0.9, 0.9]]))
+    )
     assert len(found) == 4
     assert [line.partition(":")[0] for line in found] == [
         f"place ({at:g}, {at:g})" for _ in ("lift", "water") for at in (0.8, 0.9)

@@ -1,4 +1,4 @@
-"""Who rescues with whom, counted from rescue events (eq. 5); arrivals play no part."""
+"""Who rescues with whom, counted from rescue events (eq. 10); arrivals play no part."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def count_cooperation(rescues: NDArray[np.void], scenario: Scenario) -> dict[str
 
 
 def count_pairs(rescues: NDArray[np.void], num_robots: int) -> NDArray[np.int64]:
-    """``Num_ij`` of eq. 5: rescues in which robots i and j both helped.
+    """``Num_ij`` of eq. 10: rescues in which robots i and j both helped.
 
     Args:
         rescues: (N,) structured events; fields helper_0, helper_1, ... are used, -1 is nobody.
@@ -64,7 +64,7 @@ def count_pairs(rescues: NDArray[np.void], num_robots: int) -> NDArray[np.int64]
 
 
 def pair_rates(pairs: NDArray[np.int64]) -> NDArray[np.float64]:
-    """``rate_ij = Num_ij / sum_k Num_ik`` (eq. 5).
+    """``rate_ij = Num_ij / sum_k Num_ik`` (eq. 10).
 
     Args:
         pairs: (R, R) what `count_pairs` gives.

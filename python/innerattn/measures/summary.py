@@ -67,7 +67,7 @@ class Summary:
         standard: results at the scenario's own length.
         long: results at the second length.
         cooperation: rescues by task and robot, where there was a choice of robots.
-        cooperation_rates: eq. 5 by robot i and teammate j, for i that ever helped with another.
+        cooperation_rates: eq. 10 by robot i and teammate j, for i that ever helped with another.
         attention_entropy: by robot and head [nats]; empty where there is no attention.
         attention_entropy_share: the same as a share of ln(R - 1); None below three robots.
         warm_start: the scripted policy that training began by imitating, or "none".

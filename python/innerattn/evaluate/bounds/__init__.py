@@ -1,1 +1,1 @@
-"""How far a disturbed teammate can move attention: the bounds of eqs. 6-10, and measurements."""
+"""How far a disturbed teammate can move attention: the bounds of eqs. 5-9, and measurements."""

@@ -1,4 +1,4 @@
-"""The robustness bounds of eqs. 6-10, held against trained networks in states of their own play.
+"""The robustness bounds of eqs. 5-9, held against trained networks in states of their own play.
 
 The inequalities and their proofs are in docs/attention-bound.md. It measures networks; what the
 team achieves with a faulty robot is not measured here.

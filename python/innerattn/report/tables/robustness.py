@@ -236,7 +236,7 @@ def _bounds(name: str, bounds: Bounds) -> Table:
         if (level.changed, level.direction) == ("observation", "gradient")
     ]
     checked = f"{bounds.violations} violations in {count:,} checks"
-    title = f"{name}: bounds on attention (eqs. 6-10), {checked}"
+    title = f"{name}: bounds on attention (eqs. 5-9), {checked}"
     table = plain_table(columns(["radius"], heads), rows, title, _BOUNDS)
     return _explained(
         table, f"{NONE}: this critic does not rate each action, so it has no best one"
