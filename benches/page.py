@@ -48,9 +48,9 @@ def system(*packages: str) -> str:
         ]
         processor = names[0] if names else processor
     cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count()
-    versions = ", ".join(f"{name} {version(name)}" for name in packages)
-    python = platform.python_version()
-    return f"{processor}, {cores} cores, Python {python}, {versions}"
+    versions = [f"Python {platform.python_version()}"]
+    versions += [f"{name} {version(name)}" for name in packages]
+    return ", ".join([processor, f"{cores} cores", *versions])
 
 
 def publish(part: str, text: str, page: Path = PERFORMANCE) -> None:

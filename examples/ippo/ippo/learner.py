@@ -83,6 +83,7 @@ class IPPO(ActorCritic):
         """Store one control step of all worlds."""
         if self.actor_frozen != self._frozen:  # a rollout belongs to one policy
             self._buffer.clear()
+            self._scale.forget_open_returns()
             self._frozen = self.actor_frozen
         self._buffer.add(batch, truncated, None)
 
@@ -95,7 +96,8 @@ class IPPO(ActorCritic):
         self._buffer.clear()
         for _ in range(config.epochs):
             order = torch.randperm(rollout.obs.shape[1], generator=self._shuffle)
-            for chosen in torch.split(order, config.minibatch_size):
+            # Parts of nearly one size: the rows of a short last one would weigh more.
+            for chosen in order.tensor_split(-(-len(order) // config.minibatch_size)):
                 rows = rollout.take(chosen.to(self._device))
                 self._do_update(len(chosen), partial(self.update, rows))
         return self._take_metrics()
@@ -131,7 +133,8 @@ class IPPO(ActorCritic):
             obs=steps.obs,
             actions=steps.actions,
             log_prob=losses.gather_actions(log_prob, steps.actions),
-            advantage=standardised(rows_of(advantage)),
+            # Rewards that never differ say nothing: advantages are then errors of the critic.
+            advantage=standardised(rows_of(advantage)) * self._scale.has_spread().unsqueeze(1),
             target=rows_of(advantage + value),
         )
 

@@ -24,7 +24,7 @@ class Outcome:
     """What became of one claim of a run.
 
     Attributes:
-        run: the run.
+        run: which run the worker had claimed.
         state: done; failed; given back, because the worker's time was up; or lost to another
             worker, which has it now.
         reason: why, if it failed.

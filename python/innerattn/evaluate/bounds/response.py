@@ -67,7 +67,7 @@ def respond_to_observation(
 
     Args:
         critic: float64, as everything here.
-        states: the states.
+        states: B states of the same worlds, with the actions taken in them.
         change: (R, M, B, D) added to the observation of robot j.
     """
     actions, available = _repeated(states, change)
@@ -81,7 +81,7 @@ def respond_to_embedding(critic: Critic, states: States, change: Tensor) -> Resp
 
     Args:
         critic: float64, as everything here.
-        states: the states.
+        states: B states of the same worlds, with the actions taken in them.
         change: (R, M, B, W) added to the state-action encoding of robot j.
     """
     _, available = _repeated(states, change)

@@ -26,7 +26,7 @@ def study_page(
     """The page as Markdown.
 
     Args:
-        study: the study.
+        study: with its rules over time, which the page prints.
         states: of its runs.
         found: means by place in the grid.
         compared: its contrasts.
