@@ -117,8 +117,9 @@ site: setup ## the documentation as a site, in build/site; it needs no network t
 	sphinx-build --quiet --fail-on-warning --keep-going -c docs -d build/doctrees . build/site
 	@echo "build/site/index.html"
 
-schemas: setup ## write the JSON Schemas of the scenario's file and of the run's file
+schemas: setup ## write the JSON Schemas of the files of scenarios, runs and studies
 	python -m innerattn.config.schema
+	python -m innerattn.studies.schema
 
 dist: $(VENV)/.installed ## wheel for manylinux2014 and source archive, into dist/
 	rm -rf dist

@@ -138,15 +138,15 @@ BRIEF: Mapping[str, Brief] = {
         ("runs/old",),
     ),
     "new": Brief(
-        "scenario NAME",
+        "scenario|study NAME",
         (("NAME", "the file is NAME.toml here"),),
-        ("scenario flood",),
+        ("scenario flood", "study sharing"),
     ),
     "info": Brief(
         "[OPTIONS]",
         (
             ("--scenario FILE", "check a scenario, print it with all defaults, draw it"),
-            ("--schema NAME", "print the JSON Schema of a file: scenario or run"),
+            ("--schema NAME", "print the JSON Schema of a file: scenario, run or study"),
         ),
         ("", "--scenario flood.toml"),
     ),

@@ -25,8 +25,8 @@ class Info(Command):
 
     scenario: Path | None = None
     """TOML file with a scenario: check it, print it with all defaults, and draw its arena."""
-    schema: Literal["scenario", "run"] | None = None
-    """Print the JSON Schema of a scenario's file or a run's file, for editors."""
+    schema: Literal["scenario", "run", "study"] | None = None
+    """Print the JSON Schema of the file of a scenario, a run or a study, for editors."""
 
     def run(self) -> int:
         """Print the answer.
@@ -37,6 +37,11 @@ class Info(Command):
         Raises:
             ConfigError: the scenario file is not valid.
         """
+        if self.schema == "study":
+            from innerattn.studies.schema import study_schema_text
+
+            print(study_schema_text(), end="")
+            return 0
         if self.schema is not None:
             from innerattn.config.schema import schema_text
 

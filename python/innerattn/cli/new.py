@@ -1,4 +1,4 @@
-"""`innerattn new scenario NAME`: a commented scenario file to begin with."""
+"""`innerattn new scenario|study NAME`: a commented file to begin with."""
 
 from __future__ import annotations
 
@@ -18,12 +18,15 @@ from innerattn.errors import RunError
 
 @dataclass(kw_only=True)
 class New(Command):
-    """Write a scenario file with every key, its meaning and its default."""
+    """Write the file of a scenario or of a study, with comments, to begin with."""
 
-    what: Annotated[tyro.conf.Positional[Literal["scenario"]], tyro.conf.arg(metavar="scenario")]
+    what: Annotated[
+        tyro.conf.Positional[Literal["scenario", "study"]],
+        tyro.conf.arg(metavar="scenario|study"),
+    ]
     """What to begin."""
     name: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="NAME")]
-    """Name of the scenario; the file is NAME.toml here."""
+    """Name of the scenario or study; the file is NAME.toml here."""
 
     def run(self) -> int:
         """Write the file and say what to do with it.
@@ -42,6 +45,13 @@ class New(Command):
         if os.path.lexists(path):
             raise RunError(f"{path}: is there already; nothing was written")
         check_target(path)
+        if self.what == "study":
+            from innerattn.studies.new_study import new_study
+
+            write_whole(path, new_study(name, path.name).encode())
+            print(f"{path}: a study of one scenario and one method; edit it, then")
+            print(f"  innerattn study run {path}    trains, measures and compares its runs")
+            return 0
         write_whole(path, new_scenario(name, path.name).encode())
         print(f"{path}: a scenario with all defaults; edit it, then")
         print(f"  innerattn info --scenario {path}     checks and draws it")

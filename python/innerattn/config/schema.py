@@ -22,7 +22,7 @@ from innerattn.config.scenario import Scenario
 COPIES = Path(__file__).parent / "schemas"
 """Folder of the copies, ``NAME.schema.json``."""
 
-_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def scenario_schema() -> dict[str, Any]:
@@ -35,7 +35,7 @@ def scenario_schema() -> dict[str, Any]:
         "properties": {"scenario": {"$ref": "#/$defs/Scenario"}},
     }
     forms = [{"$ref": "#/$defs/Scenario"}, section]
-    return {"$schema": _DIALECT, "title": "Scenario of innerattn", "anyOf": forms, "$defs": parts}
+    return {"$schema": DIALECT, "title": "Scenario of innerattn", "anyOf": forms, "$defs": parts}
 
 
 def run_schema() -> dict[str, Any]:
@@ -50,7 +50,7 @@ def run_schema() -> dict[str, Any]:
     for key in ("required", "description"):
         schema.pop(key, None)
     schema["additionalProperties"] = False
-    return {"$schema": _DIALECT, **schema, "title": "Run of innerattn"}
+    return {"$schema": DIALECT, **schema, "title": "Run of innerattn"}
 
 
 SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {

@@ -1,0 +1,64 @@
+"""A study's file to begin with: every part with its meaning, as commented TOML."""
+
+from __future__ import annotations
+
+_TEXT = """\
+# The study {name}.
+#
+#   innerattn study run {file}        trains, measures and compares its runs
+#   innerattn study status {file}     says how far it is
+#
+# A line that begins with # and a key is an example: remove the # to use it. docs/studies.md
+# explains every part. Rules are dated: the report says how many runs were done when they changed.
+
+# What the study asks; the first line of its report.
+question = "Does parameter sharing matter?"
+
+# Each combination of these lists is a run.
+[grid]
+# built-in scenarios, or TOML files with one, from the folder of this file
+scenarios = ["mixed"]
+# values of train.method
+methods = ["ppo-inner"]
+# built-in recipes of training: quick is a smoke test and gives no result
+budgets = ["fast"]
+# seeds of training, both ends; or a list; three or more decide
+seeds = "0..4"
+# any key of a run, with a list of values
+#ppo.learning_rate = [0.001, 0.002]
+
+# Each variant is a name and the keys of a run that it changes; all are combined with the grid.
+[[variants]]
+name = "own"
+network.parameter_sharing = "none"
+
+[[variants]]
+name = "kind"
+network.parameter_sharing = "kind"
+
+# A difference a - b over the same seeds, for each combination that both sides leave open.
+[[contrasts]]
+name = "sharing"
+a = {{ variant = "kind" }}
+b = {{ variant = "own" }}
+# score, rescues_per_episode or a registered measure
+measure = "score"
+# length of the measured episodes: standard or long
+length = "standard"
+# differences that are smaller count as none
+margin = 0.03
+# two-sided, greater or less
+direction = "two-sided"
+# contrasts whose p-values are adjusted together (Holm)
+family = "all"
+"""
+
+
+def new_study(name: str, file: str) -> str:
+    """The text of a study's file; `innerattn.studies.study.study_in` reads it.
+
+    Args:
+        name: what the head of the file calls the study.
+        file: the name of the file, for the commands in its head.
+    """
+    return _TEXT.format(name=name, file=file)
