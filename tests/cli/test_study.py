@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -39,7 +41,17 @@ def test_a_study_from_file_to_report(file: Path, capsys: pytest.CaptureFixture[s
     assert main(["study", "run", str(folder), "-q"]) == 0
     assert (folder / "report.json").read_bytes() == before  # nothing was repeated
     assert main(["study", "status", str(folder)]) == 0
-    assert "6 runs: 6 done, 0 running, 0 waiting, 0 failed" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "6 runs: 6 done, 0 running, 0 waiting, 0 failed" in said
+    assert "rescues/episode" in said  # the table so far
+    shutil.rmtree(next((folder / "runs").iterdir()))
+    assert main(["study", "status", str(folder)]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"A run takes \d+ s; one worker will need about \d+ s more\.", said)
+    summary = next((folder / "runs").glob("*/evaluation/summary.json"))
+    summary.write_text(summary.read_text() + " ")
+    assert main(["study", "status", str(folder)]) == 1
+    assert "summary.json: is not the file that manifest.json names" in capsys.readouterr().err
 
 
 def test_everything_is_killed_and_goes_on(file: Path) -> None:

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from innerattn.studies.ledger import MOST_FAILURES, Claim, ClaimLostError, Ledger
+from innerattn.studies.ledger import MOST_DEATHS, MOST_FAILURES, Claim, ClaimLostError, Ledger
 from innerattn.studies.owner import is_gone, this_process
 
 KEYS = [f"run-{number}" for number in range(4)]
@@ -123,6 +123,34 @@ def test_a_run_that_fails_is_tried_three_times(tmp_path: Path) -> None:
     assert ledger.states(["run-0"]) == {"run-0": "failed"}
     assert ledger.failures("run-0") == [rf"diverged {n} \udce9" for n in range(MOST_FAILURES)]
     assert claimed(ledger).key == "run-1"  # it stops no other
+
+
+def test_a_run_that_ends_its_workers_is_given_up(tmp_path: Path) -> None:
+    clock = Clock(0.0)
+    ledger = Ledger(tmp_path, clock=clock, silent_after_s=SILENT)
+    for death in range(MOST_DEATHS):
+        claim = claimed(ledger, "run-0")
+        assert claim.number == death + 1
+        assert ledger.claim(["run-0"]) is None  # it is watched from now on
+        clock.now += SILENT
+    assert ledger.claim(["run-0"]) is None
+    assert ledger.states(["run-0"]) == {"run-0": "failed"}
+    assert len(ledger.failures("run-0")) == MOST_DEATHS
+    assert "ended without a word" in ledger.failures("run-0")[-1]
+
+
+def test_workers_that_save_something_are_no_sign_of_a_bad_run(tmp_path: Path) -> None:
+    clock = Clock(0.0)
+    ledger = Ledger(tmp_path, clock=clock, silent_after_s=SILENT)
+    for step in range(2 * MOST_DEATHS):
+        claim = claimed(ledger, "run-0")
+        (claim.folder / "checkpoints").mkdir(parents=True, exist_ok=True)
+        (claim.folder / "checkpoints/latest").unlink(missing_ok=True)  # a link to the earlier one
+        (claim.folder / "checkpoints/latest").write_text(f"{step}\n")
+        assert ledger.claim(["run-0"]) is None
+        clock.now += SILENT
+    assert ledger.states(["run-0"]) == {"run-0": "claimed"}
+    assert ledger.failures("run-0") == []
 
 
 @pytest.mark.parametrize("key", ["", "../a", "a.1", "a/b", "a b", "x" * 129])
@@ -243,7 +271,8 @@ while set(ledger.states(keys).values()) != {"done"}:
     claim.folder.mkdir(exist_ok=True)
     try:
         while True:
-            path = claim.folder / "progress"
+            path = claim.folder / "checkpoints" / "latest"
+            path.parent.mkdir(exist_ok=True)
             done = json.loads(path.read_text()) if path.exists() else []
             if len(done) == steps:
                 claim.finish()
@@ -280,5 +309,7 @@ def test_workers_that_are_killed_lose_and_repeat_nothing(tmp_path: Path) -> None
             worker.wait()
     assert killed > 3
     for key in keys:
-        assert json.loads((tmp_path / "runs" / key / "progress").read_text()) == list(range(steps))
+        assert json.loads((tmp_path / "runs" / key / "checkpoints/latest").read_text()) == list(
+            range(steps)
+        )
     assert sorted(os.listdir(tmp_path / "runs")) == sorted(keys)

@@ -81,7 +81,7 @@ BRIEF: Mapping[str, Brief] = {
         (
             ("run", "begin or continue a study, with a worker for each core"),
             ("work", "be one worker, here or on another machine"),
-            ("status", "how many runs are done"),
+            ("status", "what is done, the time left and the scores so far"),
             ("report", "write report.md and report.json again"),
             ("slurm", "print a script for sbatch whose jobs are workers"),
             ("STUDY", "the study's file (.toml), or its folder"),

@@ -24,12 +24,14 @@ if TYPE_CHECKING:
     from innerattn.studies.work import Outcome
 
 _TIME = re.compile(r"([0-9]{1,6})([smh])")
+_MOST_SHOWN = 500
+"""Finished runs whose scores `status` reads, in about a second."""
 _UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 Action = Literal["run", "work", "status", "report", "slurm"]
 _WHAT = """What to do.
 - run: begin or go on with the study in a file, with a worker for each core.
 - work: be one worker for a study that has begun.
-- status: how many runs are done.
+- status: how many runs are done, how long the others will take, and their scores so far.
 - report: write report.md and report.json again.
 - slurm: print a script for sbatch whose jobs are workers."""
 
@@ -101,6 +103,11 @@ class Study(LongCommand):
         return 0
 
     def _status(self) -> int:
+        from innerattn.report.study.page import means_table
+        from innerattn.report.table import print_table
+        from innerattn.studies.duration import duration_of, in_words
+        from innerattn.studies.results import means, read_summaries
+
         study = self._opened()
         states = study.ledger().states(run.key for run in study.planned)
         counts = Counter(states.values())
@@ -108,6 +115,19 @@ class Study(LongCommand):
         words = {"claimed": "running", "planned": "waiting"}
         told = ", ".join(f"{counts[name]} {words.get(name, name)}" for name in names)
         print(f"{study.path}: {len(states)} runs: {told}")
+        found = duration_of(study.path, states)
+        if found is not None and found.left_s:
+            workers = "one worker" if found.workers < 2 else f"{found.workers} workers"
+            print(
+                f"A run takes {in_words(found.run_s)}; {workers} will need about "
+                f"{in_words(found.left_s)} more."
+            )
+        if 0 < counts["done"] <= _MOST_SHOWN:
+            print_table(
+                self.console(), means_table(means(read_summaries(study.runs, study.planned)))
+            )
+        elif counts["done"]:
+            print(f"innerattn study report {study.path} writes their table.")
         self._print_failures(study, states)
         return int(counts["failed"] > 0)
 

@@ -8,6 +8,7 @@ all of them see: no server, no lock, no common clock.
     claims/KEY.N.beat   a number that its worker changes as long as it works
     claims/KEY.N.free   the worker gave the claim back
     claims/KEY.N.failed why the run failed
+    claims/KEY.N.died   the worker ended without a word, and had saved nothing of its own
     work/KEY.N/KEY      where the worker of that claim writes, and nobody else
 
 A claim is made by a hard link, which one of several workers gets. It is taken over by a claim with
@@ -38,11 +39,14 @@ from innerattn.studies.owner import is_gone, this_process
 State = Literal["planned", "claimed", "done", "failed"]
 MOST_FAILURES = 3
 """Failures after which a run is not tried again."""
+MOST_DEATHS = 5
+"""Workers after which a run is not tried again that all ended without a word and saved nothing, as
+where its memory is more than there is."""
 SILENT_AFTER_S = 60.0
 """How long a claim's beat may stand still before others take the run over."""
 
 _KEY = re.compile(r"[A-Za-z0-9_-]{1,128}")
-_CLAIM = re.compile(r"([A-Za-z0-9_-]{1,128})\.([1-9][0-9]{0,8})(\.free|\.failed)?")
+_CLAIM = re.compile(r"([A-Za-z0-9_-]{1,128})\.([1-9][0-9]{0,8})(\.free|\.failed|\.died)?")
 _NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS, errno.EINVAL)
 _MOST_REASON_BYTES = 1 << 16
 _COPIES = 3
@@ -61,6 +65,12 @@ class _Run:
     over: int = 0
     """Number of the last claim that was given back or failed."""
     failures: int = 0
+    deaths: int = 0
+
+    @property
+    def given_up(self) -> bool:
+        """Whether it is not tried again."""
+        return self.failures >= MOST_FAILURES or self.deaths >= MOST_DEATHS
 
 
 class Claim:
@@ -177,12 +187,14 @@ class Ledger:
         return {key: _state(key in done, runs.get(key)) for key in keys}
 
     def failures(self, key: str) -> list[str]:
-        """Why the tries of a run failed, the last one last.
+        """Why the tries of a run failed or ended without a word, the last one last.
 
         Raises:
             OSError: the ledger cannot be read.
         """
-        paths = self.folder.glob(f"claims/{key}.*.failed")
+        paths = (
+            path for end in ("failed", "died") for path in self.folder.glob(f"claims/{key}.*.{end}")
+        )
         ordered = sorted(paths, key=lambda path: int(path.name.split(".")[1]))
         return [path.read_text("utf-8", "replace") for path in ordered]
 
@@ -204,14 +216,28 @@ class Ledger:
             if not _KEY.fullmatch(key):
                 raise ValueError(f"key = {key!r}: must be letters, digits, '-' and '_'")
             run = runs.get(key, _Run())
-            if key in done or run.failures >= MOST_FAILURES:
+            if key in done or run.given_up:
                 continue
-            if run.number > run.over and not self._silent(key, run.number):
+            silent = run.number > run.over
+            if silent and not self._silent(key, run.number):
+                continue
+            if silent and self._died_for_nothing(key, run.number) and run.deaths + 1 >= MOST_DEATHS:
                 continue
             claim = self._claimed(key, run.number + 1)
             if claim is not None:
                 return claim
         return None
+
+    def _died_for_nothing(self, key: str, number: int) -> bool:
+        """Note a claim whose worker is gone, and whether it has saved nothing since it began."""
+        before, after = (
+            _read(self.folder / "work" / f"{key}.{one}" / key / "checkpoints" / "latest")
+            for one in (number - 1, number)
+        )
+        if before == after:
+            reason = "its worker ended without a word, and had saved nothing of its own"
+            write_whole(self.folder / "claims" / f"{key}.{number}.died", reason.encode())
+        return before == after
 
     def _claimed(self, key: str, number: int) -> Claim | None:
         """The claim with that number, unless another worker gets it."""
@@ -265,6 +291,7 @@ class Ledger:
             else:
                 run.over = max(run.over, int(found[2]))
                 run.failures += found[3] == ".failed"
+                run.deaths += found[3] == ".died"
         return set(os.listdir(self.folder / "runs")), runs
 
 
@@ -273,7 +300,7 @@ def _state(done: bool, run: _Run | None) -> State:
         return "done"
     if run is None:
         return "planned"
-    if run.failures >= MOST_FAILURES:
+    if run.given_up:
         return "failed"
     return "claimed" if run.number > run.over else "planned"
 
@@ -283,7 +310,7 @@ def _read(path: Path) -> str:
     try:
         with path.open("rb") as file:
             return file.read(_MOST_OWNER_BYTES).decode("utf-8", "replace")
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return ""
 
 

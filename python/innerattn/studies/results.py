@@ -8,8 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json
+from innerattn.errors import RunError
 from innerattn.experiments.plan import Case
-from innerattn.experiments.run import read_run
+from innerattn.experiments.run import check_summary, read_run
+from innerattn.records.run_files import RunFiles
 from innerattn.stats import Estimate
 from innerattn.stats.comparison import ALPHA, Contrast, contrast, holm
 from innerattn.stats.seeds import seed_estimate
@@ -107,6 +110,25 @@ def read_results(folder: Path, planned: Iterable[PlannedRun]) -> list[Result]:
         if path.exists():
             case = Case(run.config.scenario.situation, run.config.train.method, run.seed)
             found.append(Result(run, read_run(case, path, steps=False).summary))
+    return found
+
+
+def read_summaries(folder: Path, planned: Iterable[PlannedRun]) -> list[Result]:
+    """As `read_results`, but only summaries are read, so that many runs take little time.
+
+    Raises:
+        RunError: a summary cannot be read, or is none of the run.
+    """
+    found = []
+    for run in planned:
+        path = folder / run.key
+        if path.exists():
+            data = RunFiles(path).read("evaluation/summary.json", MOST_JSON_BYTES)
+            try:
+                document = parse_json(data)
+            except ValueError as error:
+                raise RunError(f"{path / 'evaluation/summary.json'}: {error}") from error
+            found.append(Result(run, check_summary(path, document, run.config)))
     return found
 
 
