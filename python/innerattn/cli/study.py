@@ -21,6 +21,7 @@ from innerattn.config.files import write_whole
 if TYPE_CHECKING:
     from innerattn.studies.folder import StudyFolder
     from innerattn.studies.ledger import State
+    from innerattn.studies.study import Length
     from innerattn.studies.work import Outcome
 
 _TIME = re.compile(r"([0-9]{1,6})([smh])")
@@ -132,8 +133,16 @@ class Study(LongCommand):
         return int(counts["failed"] > 0)
 
     def _report(self, study: StudyFolder | None = None) -> int:
-        from innerattn.report.study.page import means_table, sentence, study_document, study_page
+        from innerattn.report.study.exports import marl_eval_document, rliable_document
+        from innerattn.report.study.page import (
+            algorithm_names,
+            means_table,
+            sentences,
+            study_document,
+            study_page,
+        )
         from innerattn.report.table import print_table
+        from innerattn.studies.aggregates import aggregate
         from innerattn.studies.results import compare, means, read_results
 
         study = study or self._opened()
@@ -146,17 +155,26 @@ class Study(LongCommand):
             for key, state in states.items()
             if state == "failed"
         }
-        page = study_page(study, states, found, compared, failures)
+        lengths: tuple[Length, ...] = ("standard", "long")
+        aggregates = {length: algorithm_names(aggregate(results, length)) for length in lengths}
+        page = study_page(study, states, found, compared, failures, aggregates)
+        documents = {
+            "report.json": study_document(study, states, found, compared, aggregates),
+            "scores.json": rliable_document(aggregates["standard"]),
+            "marl_eval.json": marl_eval_document(aggregates["standard"], results, study.runs),
+        }
         write_whole(study.path / "report.md", page.encode())
-        document = json.dumps(study_document(study, states, found, compared), allow_nan=False)
-        write_whole(study.path / "report.json", f"{document}\n".encode())
+        for name, document in documents.items():
+            text = json.dumps(document, allow_nan=False)
+            write_whole(study.path / name, f"{text}\n".encode())
         console = self.console()
         if found:
             print_table(console, means_table(found))
-        for one in compared:
-            console.print(sentence(one).replace("**", ""), soft_wrap=True)
+        for text in sentences(compared):
+            console.print(text.replace("**", ""), soft_wrap=True)
         self._print_failures(study, states)
-        console.print(f"Written: {study.path / 'report.md'}, report.json", soft_wrap=True)
+        written = f"Written: {study.path / 'report.md'}, {', '.join(documents)}"
+        console.print(written, soft_wrap=True)
         done = sum(state == "done" for state in states.values())
         self.say_result(f"{study.path}: {done} of {len(states)} runs done")
         return int("failed" in states.values())

@@ -14,6 +14,7 @@ from innerattn.experiments.plan import Case
 from innerattn.experiments.run import check_summary, read_run
 from innerattn.records.run_files import RunFiles
 from innerattn.stats import Estimate
+from innerattn.stats.aggregate import improvement_interval
 from innerattn.stats.comparison import ALPHA, Contrast, contrast, holm
 from innerattn.stats.seeds import seed_estimate
 from innerattn.studies.plan import MEASURES_OF_ALL, PlannedRun, pairs
@@ -77,6 +78,8 @@ class Compared:
         seeds: those that have a value of both.
         mean: mean difference a - b; None without seeds.
         found: None with fewer than `LEAST_SEEDS` seeds, or where all seeds differ alike.
+        improvement: how probably a run of a has a larger value than one of b, whatever their
+            seeds; None with fewer than `LEAST_SEEDS` seeds.
         p: of the test that the contrast asks for.
         holm_p: adjusted within its family.
         verdict: by `RULES`.
@@ -88,6 +91,7 @@ class Compared:
     seeds: tuple[int, ...]
     mean: float | None
     found: Contrast | None
+    improvement: Estimate | None = None
     p: float | None = None
     holm_p: float | None = None
     verdict: Verdict = "undecided"
@@ -193,7 +197,9 @@ def _compared(
     enough = len(values) >= LEAST_SEEDS
     found = contrast(list(values.values()), (1.0, -1.0), wanted.margin) if enough else None
     p = None if found is None else one_sided(found, wanted.direction)
-    return Compared(wanted, a, b, tuple(values), mean, found, p)
+    sides = ([x for x, _ in values.values()], [y for _, y in values.values()])
+    improvement = improvement_interval([sides[0]], [sides[1]], seed=0) if enough else None
+    return Compared(wanted, a, b, tuple(values), mean, found, improvement, p)
 
 
 def one_sided(found: Contrast, direction: Direction) -> float:

@@ -1,0 +1,89 @@
+"""Scores of a study in the forms that rliable and marl-eval read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from innerattn.errors import RunError
+from innerattn.records.logged import METRICS, MOST_METRICS_BYTES, logged_lines, logged_rescues
+from innerattn.records.run_files import RunFiles
+from innerattn.studies.aggregates import TASK, Aggregate, algorithm_of
+from innerattn.studies.results import Result
+
+ENVIRONMENT = "innerattn"
+_MOST_STEPS = 100
+"""Lines of a training's log that are exported at most."""
+
+
+def rliable_document(found: Mapping[str, Aggregate]) -> dict[str, Any]:
+    """Matrices of scores, runs by tasks, of the seeds that an algorithm has in all tasks.
+
+    `numpy.array(document["scores"][algorithm])` is what rliable calls the scores of an algorithm.
+
+    Args:
+        found: algorithms by name; those that lack a task are left out.
+    """
+    tasks = list(dict.fromkeys(task for one in found.values() for task in one.scores))
+    scores, seeds = {}, {}
+    for name, one in found.items():
+        if one.scores.keys() == set(tasks):
+            shared = sorted(set.intersection(*(set(values) for values in one.scores.values())))
+            seeds[name] = shared
+            scores[name] = [[one.scores[task][seed] for task in tasks] for seed in shared]
+    return {"schema_version": 1, "tasks": tasks, "seeds": seeds, "scores": scores}
+
+
+def marl_eval_document(
+    found: Mapping[str, Aggregate], results: Sequence[Result], runs: Path
+) -> dict[str, Any]:
+    """Evaluations by task, algorithm and seed, in the form of marl-eval's raw data.
+
+    Metrics are ``rescues`` per episode and ``score``. Its steps are lines of the training's log,
+    whose score is that of the rescues in training between those of the scripts as they were
+    measured; ``absolute_metrics`` are those of the evaluation.
+
+    Args:
+        found: algorithms by name.
+        results: finished runs; those without a score are left out.
+        runs: folder of the runs.
+
+    Raises:
+        RunError: the metrics of a run are missing, altered or damaged.
+    """
+    names = {tuple(one.algorithm.items()): name for name, one in found.items()}
+    tasks: dict[str, Any] = {}
+    for one in results:
+        name = names.get(tuple(algorithm_of(one).items()))
+        if name is not None:
+            task = tasks.setdefault(str(one.run.place[TASK]), {})
+            task.setdefault(name, {})[f"seed_{one.run.seed}"] = _of_run(one, runs / one.run.key)
+    return {ENVIRONMENT: tasks}
+
+
+def _of_run(one: Result, folder: Path) -> dict[str, Any]:
+    scripts = one.summary["scripted"]
+    low, high = (float(scripts[name]["mean"]) for name in ("random", "hungarian"))
+
+    def metrics(rescues: float) -> dict[str, list[float]]:
+        span = high - low
+        return {"rescues": [rescues]} | ({"score": [(rescues - low) / span]} if span > 0.0 else {})
+
+    try:
+        data = RunFiles(folder).read(METRICS, MOST_METRICS_BYTES)
+        logged = [
+            (int(line["env_steps"]), rescues)
+            for line in logged_lines(data)
+            if (rescues := logged_rescues(one.run.config, line)) is not None
+        ]
+    except (ValueError, KeyError, TypeError) as error:
+        raise RunError(f"{folder / METRICS}: not the metrics of a run") from error
+    every = max(1, -(-len(logged) // _MOST_STEPS))
+    kept = logged[::-1][::every][::-1]  # the last line is among them
+    steps = {
+        f"step_{number}": {"step_count": env_steps, **metrics(rescues)}
+        for number, (env_steps, rescues) in enumerate(kept, 1)
+    }
+    measured = float(one.summary["rescues_per_episode"]["mean"])
+    return {**steps, "absolute_metrics": metrics(measured)}

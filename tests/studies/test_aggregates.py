@@ -1,0 +1,104 @@
+"""Scores over all scenarios, and the forms that other tools read."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made_run import LOGGED, made_run
+
+from innerattn.config import RunConfig
+from innerattn.report.study.exports import marl_eval_document, rliable_document
+from innerattn.report.study.page import aggregates_table, algorithm_names
+from innerattn.report.table import markdown
+from innerattn.stats.aggregate import interquartile_mean
+from innerattn.studies.aggregates import THRESHOLDS, aggregate, performance_profile
+from innerattn.studies.plan import PlannedRun
+from innerattn.studies.results import Result
+
+SCORES = {
+    ("mixed", "mappo"): {0: 0.9, 1: 0.95, 2: 0.2},
+    ("single", "mappo"): {0: 1.1, 1: 0.5, 2: 0.8},
+    ("mixed", "td-inner"): {0: 0.1, 1: 0.3},
+    ("single", "td-inner"): {1: 0.6, 2: 0.7},
+    ("single", "td-uniform"): {1: 0.6},
+}
+
+
+def results() -> list[Result]:
+    return [
+        Result(
+            PlannedRun({"scenario": task, "method": name, "budget": "fast"}, seed, RunConfig(), ""),
+            {"score": {"mean": score}, "long": {"score": None}},
+        )
+        for (task, name), scores in SCORES.items()
+        for seed, score in scores.items()
+    ]
+
+
+@given(st.lists(st.lists(st.floats(-1, 2), min_size=1, max_size=5), min_size=1, max_size=4))
+def test_profiles_against_a_plain_loop(tasks: list[list[float]]) -> None:
+    found = performance_profile(dict(enumerate(scores)) for scores in tasks)
+    for threshold, share in zip(THRESHOLDS, found, strict=True):
+        plain = [sum(score > threshold for score in scores) / len(scores) for scores in tasks]
+        assert share == pytest.approx(sum(plain) / len(plain))
+
+
+def test_algorithms_over_their_tasks() -> None:
+    found = algorithm_names(aggregate(results(), "standard"))
+    assert list(found) == ["mappo", "td-inner", "td-uniform"]
+    mappo = found["mappo"]
+    assert mappo.algorithm == {"method": "mappo", "budget": "fast"}
+    every = [score for task in ("mixed", "single") for score in SCORES[task, "mappo"].values()]
+    assert mappo.iqm is not None
+    assert mappo.iqm.mean == pytest.approx(interquartile_mean(every))
+    assert mappo.above == pytest.approx((1.0, 5 / 6, 4 / 6, 4 / 6, 2 / 6, 1 / 6))
+    assert found["td-uniform"].iqm is None  # a single run
+    assert aggregate(results(), "long") == []  # no scripts, no score
+    table = markdown(aggregates_table({"standard": found}))
+    assert "| mappo | standard | 6 | 0.79 [" in table
+    assert "| 100 % | 83 % | 67 % | 67 % | 33 % | 17 % |" in table
+
+
+def test_matrices_hold_the_seeds_that_all_tasks_share() -> None:
+    document = rliable_document(algorithm_names(aggregate(results(), "standard")))
+    assert document["tasks"] == ["mixed", "single"]
+    assert document["seeds"] == {"mappo": [0, 1, 2], "td-inner": [1]}
+    np.testing.assert_array_equal(
+        np.array(document["scores"]["mappo"]), [[0.9, 1.1], [0.95, 0.5], [0.2, 0.8]]
+    )
+    assert document["scores"]["td-inner"] == [[0.3, 0.6]]
+
+
+def test_raw_data_of_marl_eval(tmp_path: Path) -> None:
+    made = [made_run(tmp_path / "made", "mixed", "td-inner", seed) for seed in (0, 1)]
+    (tmp_path / "runs").mkdir()
+    found: list[Result] = []
+    for run in made:
+        place = {"scenario": "mixed", "method": "td-inner", "budget": "quick"}
+        planned = PlannedRun(place, run.seed, run.config, run.config.digest())
+        (tmp_path / "runs" / planned.key).symlink_to(run.folder)
+        found.append(Result(planned, run.summary))
+    names = algorithm_names(aggregate(found, "standard"))
+    document: Any = marl_eval_document(names, found, tmp_path / "runs")
+    task = document["innerattn"]["mixed"]
+    assert list(task) == ["td-inner"]
+    assert list(task["td-inner"]) == ["seed_0", "seed_1"]
+    for run in made:
+        of_run = task["td-inner"][f"seed_{run.seed}"]
+        *steps, last = of_run
+        assert last == "absolute_metrics"
+        assert steps == [f"step_{number}" for number in range(1, len(steps) + 1)]
+        counts = [of_run[step]["step_count"] for step in steps]
+        assert counts == sorted(set(counts))
+        assert counts[-1] == 100 * LOGGED
+        measured = of_run["absolute_metrics"]
+        assert measured["score"] == [pytest.approx(run.summary["score"]["mean"])]
+        assert measured["rescues"] == [run.summary["rescues_per_episode"]["mean"]]
+        scripts = {name: run.summary["scripted"][name]["mean"] for name in ("random", "hungarian")}
+        span = scripts["hungarian"] - scripts["random"]
+        for step in steps:
+            (rescues,) = of_run[step]["rescues"]
+            assert of_run[step]["score"] == [pytest.approx((rescues - scripts["random"]) / span)]
