@@ -21,6 +21,7 @@ from innerattn.train.resume import read_saved
 from innerattn.train.saved import whole_checkpoints
 
 pytestmark = pytest.mark.usefixtures("interruptible")
+ENDLESS = ("--train.env-steps", "100000000", "--train.compile", "off")
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 PARTIAL = re.compile(r"\..+\.([0-9a-f]{16}|[0-9]+)")
 
@@ -114,8 +115,7 @@ def test_as_soon_as_a_page_is_served(
 @pytest.mark.parametrize("sent", SIGNALS)
 def test_in_training(sent: signal.Signals, tiny: list[str], tmp_path: Path) -> None:
     run = tmp_path / "run"
-    endless = [*tiny, "--train.env-steps", "100000000"]
-    with begin(run, endless) as process:
+    with begin(run, [*tiny, *ENDLESS]) as process:
         while not (run / "metrics.jsonl").exists():
             assert process.poll() is None
             time.sleep(0.05)
@@ -127,7 +127,7 @@ def test_in_training(sent: signal.Signals, tiny: list[str], tmp_path: Path) -> N
 
 def test_a_second_one_ends_at_once(tiny: list[str], tmp_path: Path) -> None:
     run = tmp_path / "run"
-    with begin(run, [*tiny, "--train.env-steps", "100000000"]) as process:
+    with begin(run, [*tiny, *ENDLESS]) as process:
         while not (run / "metrics.jsonl").exists():
             assert process.poll() is None
             time.sleep(0.05)

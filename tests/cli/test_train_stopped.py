@@ -23,7 +23,8 @@ def logged(path: Path, tiny: list[str], hangup: signal.Handlers) -> Iterator[sub
 
     ``hangup`` is what the process finds set for the end of its terminal.
     """
-    options = ["--run-dir", str(path), *tiny, "--train.env-steps", "100000000"]
+    long = ["--train.env-steps", "100000000", "--train.compile", "off"]
+    options = ["--run-dir", str(path), *tiny, *long]
     command = [sys.executable, "-m", "innerattn", "train", *options]
     streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
     before = signal.signal(signal.SIGHUP, hangup)

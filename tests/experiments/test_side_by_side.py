@@ -129,7 +129,7 @@ def test_ctrl_c_saves_every_run_and_leaves_no_process(
     on_change(press_ctrl_c)
     monkeypatch.setattr(command, "usable_cores", lambda: 2)
     path = tmp_path / "run"
-    long = [*tiny, "--train.env-steps", "10000000"]
+    long = [*tiny, "--train.env-steps", "10000000", "--train.compile", "off"]
     assert main(["train", "--seeds", "0..2", "--run-dir", str(path), *long]) == 130
     kept = [
         f"innerattn: what was learnt is kept in {path}-s{seed}; go on with: "

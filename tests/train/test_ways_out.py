@@ -32,7 +32,7 @@ OFTEN = {
     "train.env_steps": 1200,
     "td.replay_capacity": 300,
 }
-ENDLESS = {**OFTEN, "train.env_steps": 10**9}
+ENDLESS = {**OFTEN, "train.env_steps": 10**9, "train.compile": "off"}
 CHILD = """
 import sys
 from innerattn.config import read_toml
