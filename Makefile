@@ -13,7 +13,7 @@ export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train robot test test-pool test-asan test-gpu test-slow examples reliability soak lint format bench lock docs site schemas dist smoke bounds setup clean
+.PHONY: train robot test test-pool test-asan test-gpu test-slow examples study-kill reliability soak lint format bench lock docs site schemas dist smoke bounds setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -52,6 +52,10 @@ test-slow: setup test-pool ## the long checks: ten million env-steps of contacts
 
 examples: setup ## train a little with each outside library, in an environment of its own; EXAMPLES='NAME ...' takes some of them
 	python examples/run_all.py $(EXAMPLES)
+
+study-kill: setup ## kill workers of studies again and again, on this machine and on a Ray cluster of two nodes; some 20 minutes
+	pip install 'ray>=2.40,<3'
+	INNERATTN_RAY_REQUIRED=1 pytest -m slow tests/studies/test_killed.py
 
 reliability: setup ## every row of docs/reliability.md in full; fills its table
 	cargo test --quiet --locked --no-run --test worlds

@@ -94,6 +94,7 @@ EXTRA_OF = {
     "onnxruntime": "deploy",
     "onnxscript": "deploy",
     "pettingzoo": "gym",
+    "ray": "ray",
     "rich": "train",
     "safetensors": "train",
     "tensordict": "torchrl",

@@ -87,6 +87,7 @@ BRIEF: Mapping[str, Brief] = {
             ("STUDY", "the study's file (.toml), or its folder"),
             ("--out FOLDER", "folder of the study (studies/NAME)"),
             ("--workers N", "workers, or jobs of slurm"),
+            ("--ray ADDRESS", "run workers on a Ray cluster; local: of this machine"),
             ("--until TIME", "when a worker saves its run and ends: 90s, 55m, 2h"),
             ("--minutes N", "time limit of a job of slurm ({minutes})"),
             _QUIET,

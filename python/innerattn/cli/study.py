@@ -47,7 +47,12 @@ class Study(LongCommand):
     out: Path | None = None
     """Folder of the study in a file; None: studies/NAME for NAME.toml."""
     workers: int | None = None
-    """How many workers (run) or jobs (slurm); None: one for each core, or 10 jobs."""
+    """How many workers (run) or jobs (slurm); None: one for each core, also of a cluster, or 10
+    jobs."""
+    ray: str | None = None
+    """Run workers on a Ray cluster (run): its address, or local for one of this machine alone."""
+    gpus: float = 0.0
+    """What each worker on Ray has of a GPU (run)."""
     until: str | None = None
     """Time after which a worker saves its run and ends: 90s, 55m, 2h."""
     minutes: int = 60
@@ -69,7 +74,10 @@ class Study(LongCommand):
     def _run(self) -> int:
         from innerattn.experiments.processes import places
         from innerattn.studies.launch.local import run_workers
+        from innerattn.studies.launch.ray import run_workers_on_ray
 
+        if not 0.0 <= self.gpus <= 64.0:
+            raise UsageError(f"--gpus = {self.gpus:g}: must be 0 to 64")
         if self.workers is not None and not 1 <= self.workers <= 256:
             raise UsageError(f"--workers = {self.workers}: must be 1 to 256")
         study = self._begun()
@@ -77,15 +85,25 @@ class Study(LongCommand):
         over = Counter(ledger.states(keys).values())
         left = len(keys) - over["done"] - over["failed"]
         workers = self.workers or places(left)
+        by = f" by {workers} workers" if self.ray is None else f" by workers on Ray, {self.ray}"
         console = self.console()
         console.print(
             f"{study.path}: {len(keys)} runs, {over['done']} done, {over['failed']} failed, "
-            f"{left} to do" + (f" by {workers} workers" if left else ""),
+            f"{left} to do" + (by if left else ""),
             soft_wrap=True,
         )
         if left:
             with _Progress(self.progress_console()) as progress:
-                run_workers(study.path, workers, left=lambda: progress(ledger.states(keys)))
+
+                def now_left() -> int:
+                    return progress(ledger.states(keys))
+
+                if self.ray is None:
+                    run_workers(study.path, workers, left=now_left)
+                else:
+                    run_workers_on_ray(
+                        study.path, self.workers, self.ray, gpus=self.gpus, left=now_left
+                    )
         return self._report(study)
 
     def _work(self) -> int:

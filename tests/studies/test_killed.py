@@ -1,0 +1,67 @@
+"""Studies whose workers are killed, on this machine and on a Ray cluster of two nodes."""
+
+import os
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from study_kill import INTERVAL_ENV_STEPS, LONG, SHORT, on_ray, on_this_machine
+from tiny_study import TINY
+
+from innerattn.cli.main import main
+from innerattn.studies.launch.ray import run_workers_on_ray
+
+REQUIRED = os.environ.get("INNERATTN_RAY_REQUIRED")  # as in CI
+needs_ray = pytest.mark.skipif(
+    find_spec("ray") is None and not REQUIRED, reason="ray is not installed"
+)
+
+
+@needs_ray
+def test_a_killed_worker_changes_nothing(tmp_path: Path) -> None:
+    text = TINY.replace("train.env_steps = 192", "train.env_steps = 4_800")
+    killed = on_ray(tmp_path, text, every_s=4.0, for_s=9.0)
+    assert killed.count > 0
+
+
+@needs_ray
+@pytest.mark.slow
+def test_a_worker_is_killed_every_20_s_for_five_minutes(
+    tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    """24 runs on two nodes."""
+    killed = on_ray(tmp_path, LONG, every_s=20.0, for_s=300.0)
+    assert killed.count > 8
+    assert max(killed.lost, default=0) <= INTERVAL_ENV_STEPS
+    record_property("workers killed on Ray", killed.count)
+    for lost in killed.lost:
+        record_property("env-steps worked again after a kill", lost)
+
+
+@pytest.mark.slow
+def test_240_runs_of_which_everything_is_killed_in_the_middle(tmp_path: Path) -> None:
+    on_this_machine(tmp_path, SHORT)
+
+
+@needs_ray
+def test_a_cluster_that_is_not_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tiny.toml").write_text(TINY)
+    assert main(["study", "run", "tiny.toml", "--ray", "127.0.0.1:9"]) == 1
+    said = capsys.readouterr().err
+    assert said == ("innerattn: error: --ray 127.0.0.1:9: cannot be reached (Connection refused)\n")
+    assert not any((tmp_path / "studies/tiny/runs").iterdir())
+
+
+def test_without_ray_the_message_names_its_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(name: str) -> object:
+        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+    monkeypatch.setattr("innerattn.studies.launch.ray.import_module", missing)
+    with pytest.raises(ImportError, match=r"--ray needs ray: pip install 'innerattn\[ray\]'"):
+        run_workers_on_ray(tmp_path, 1, "local", gpus=0.0, left=lambda: 1)
