@@ -9,10 +9,13 @@ from pathlib import Path
 import pytest
 
 from innerattn.config import EvaluateConfig, Scenario
+from innerattn.errors import ConfigError
 from innerattn.evaluate import evaluate_policy, scripted_policy
 from innerattn.experiments.paper.competence import competence_units
 from innerattn.measures import MEASURES, measure_of
 from innerattn.stats.estimate import as_json
+from innerattn.studies.plan import plan_study
+from innerattn.studies.study import study_in
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending" / "measure.md"
 
@@ -67,3 +70,12 @@ def test_the_measure_is_stored_and_shown(travel: types.ModuleType) -> None:
     assert document["measures"]["greedy"][name] == as_json(measure_of(name, recorded))
     assert document["measures"]["hungarian"][name]["mean"] > 0.0
     assert competence_units()[name] == "m"
+
+
+def test_a_study_asks_for_the_measure(request: pytest.FixtureRequest) -> None:
+    (text,) = re.findall(r"```toml\n(.*?)```", PAGE.read_text("utf-8"), re.S)
+    study = study_in(text.encode(), "travel.toml")
+    with pytest.raises(ConfigError, match="measure = 'travel_per_rescue_m': must be one of score"):
+        plan_study(study, Path)
+    request.getfixturevalue("travel")
+    assert len(plan_study(study, Path)) == 10

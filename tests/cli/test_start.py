@@ -111,7 +111,7 @@ def test_worlds_scripts_records_and_statistics_need_no_extra() -> None:
 def test_every_extra_brings_what_its_message_promises() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     extras = project["optional-dependencies"]
-    asked = {"deploy", "gym", "log", "report", "torchrl", "train"}
+    asked = {"deploy", "gym", "log", "ray", "report", "torchrl", "train"}
     assert asked | {"all", "dev"} <= extras.keys()
     for library, extra in EXTRA_OF.items():
         brought = " ".join(extras[extra]).replace("-", "_")

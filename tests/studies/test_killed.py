@@ -1,6 +1,7 @@
 """Studies whose workers are killed, on this machine and on a Ray cluster of two nodes."""
 
 import os
+import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -59,9 +60,6 @@ def test_a_cluster_that_is_not_there(
 def test_without_ray_the_message_names_its_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def missing(name: str) -> object:
-        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-
-    monkeypatch.setattr("innerattn.studies.launch.ray.import_module", missing)
+    monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(ImportError, match=r"--ray needs ray: pip install 'innerattn\[ray\]'"):
         run_workers_on_ray(tmp_path, 1, "local", gpus=0.0, left=lambda: 1)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -42,9 +41,10 @@ def run_workers_on_ray(
         KeyboardInterrupt: after all workers were asked to save their runs.
     """
     try:
-        ray: Any = import_module("ray")
+        import ray as library
     except ModuleNotFoundError as error:
         raise missing_library("--ray", error) or error from error
+    ray: Any = library
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     options: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
     if address == LOCAL:
