@@ -1,7 +1,9 @@
 """Studies whose workers are killed, on this machine and on a Ray cluster of two nodes."""
 
 import os
+import subprocess
 import sys
+import time
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,6 +15,8 @@ from tiny_study import TINY
 from innerattn.cli.main import main
 from innerattn.studies.launch.ray import run_workers_on_ray
 
+LOOPBACK = ("0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000")
+"""127.0.0.1, the same in IPv6, and ::1."""
 REQUIRED = os.environ.get("INNERATTN_RAY_REQUIRED")  # as in CI
 needs_ray = pytest.mark.skipif(
     find_spec("ray") is None and not REQUIRED, reason="ray is not installed"
@@ -43,6 +47,32 @@ def test_a_worker_is_killed_every_20_s_for_five_minutes(
 @pytest.mark.slow
 def test_240_runs_of_which_everything_is_killed_in_the_middle(tmp_path: Path) -> None:
     on_this_machine(tmp_path, SHORT)
+
+
+def open_to_others() -> set[str]:
+    """Places at which this machine listens for others, as Linux lists them."""
+    rows = [
+        row.split()
+        for name in ("tcp", "tcp6")
+        for row in Path(f"/proc/net/{name}").read_text().splitlines()[1:]
+    ]
+    return {row[1] for row in rows if row[3] == "0A" and not row[1].startswith(LOOPBACK)}
+
+
+@needs_ray
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_cluster_of_this_machine_listens_to_nobody_else(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY)
+    before = open_to_others()
+    words = [sys.executable, "-m", "innerattn", "study", "run", "tiny.toml", "--ray", "local", "-q"]
+    with subprocess.Popen(words, cwd=tmp_path) as command:
+        runs = tmp_path / "studies/tiny/runs"
+        while not (runs.exists() and any(runs.iterdir())):
+            assert command.poll() is None
+            time.sleep(0.05)
+        during = open_to_others()
+    assert command.returncode == 0
+    assert during <= before
 
 
 @needs_ray

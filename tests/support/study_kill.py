@@ -57,7 +57,7 @@ class Killed:
 @contextmanager
 def cluster(nodes: int) -> Iterator[str]:
     """The address of a Ray cluster on loopback whose nodes have a core each."""
-    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+    os.environ |= {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
     from ray.cluster_utils import Cluster
 
     found = Cluster(

@@ -18,6 +18,8 @@ from innerattn.errors import RunError, missing_library, one_line
 LOCAL = "local"
 """The address that stands for a cluster of this machine alone, which ends with the study."""
 _LOOPBACK = "127.0.0.1"
+_LOOPBACK_ONLY = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
+"""With this, Ray binds to loopback on any system; it reads it when it is imported."""
 _LOOK_EVERY_S = 1.0
 _CONNECT_S = 10.0
 
@@ -40,16 +42,17 @@ def run_workers_on_ray(
         RunError: the cluster cannot be reached, or its workers cannot work.
         KeyboardInterrupt: after all workers were asked to save their runs.
     """
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    if address == LOCAL or address.startswith(f"{_LOOPBACK}:"):
+        os.environ.update(_LOOPBACK_ONLY)
     try:
         import ray as library
     except ModuleNotFoundError as error:
         raise missing_library("--ray", error) or error from error
     ray: Any = library
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     options: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
     if address == LOCAL:
         options |= {"num_cpus": count or usable_cores(), "include_dashboard": False}
-        options |= {"_node_ip_address": _LOOPBACK}
     else:
         options |= {"address": address}
     try:
