@@ -11,13 +11,16 @@ import pytest
 from made_export import made_export
 
 from innerattn.cli.main import main
-from innerattn.config import RunConfig, load_run_config
+from innerattn.config import RunConfig, Scenario, load_run_config
 from innerattn.errors import EXTRA_OF, ExportError
 from innerattn.policies import Exported
 from innerattn.train import load_policy
+from innerattn.train.checkpoint_info import Best
+from innerattn.train.saved import best_name
 from innerattn.zoo import read_card, zoo_names
 
-DOCS = Path(__file__).parents[2] / "docs"
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS))
 from reference_directives import range_of  # noqa: E402
 
@@ -181,6 +184,29 @@ def test_a_team_with_a_file_of_another_is_exported_again(tmp_path: Path) -> None
         Exported(folder, backend="numpy")
     assert main(["export", str(run), "-o", str(tmp_path / "again")]) == 0
     Exported(tmp_path / "again", backend="numpy")
+
+
+def test_what_a_team_that_does_not_learn_is_advised_can_be_given() -> None:
+    """Options with a value, keys of files, messages and files that the page names."""
+    page = (DOCS / "not_learning.md").read_text("utf-8")
+    given = {
+        "train.env_steps": 400_000,
+        "ppo.learning_rate": 0.001,
+        "train.on_divergence": "skip",
+        "network.parameter_sharing": "kind",
+        "train.warm_start": "hungarian",
+    }
+    for key in given:
+        option = "--" + key.replace("_", "-").replace("train.warm", "warm")
+        assert option in page, option
+        load_run_config("mixed", "ppo-inner", "fast", overrides={key: given[key]})
+    assert Scenario.model_validate({"shaping": "progress"}).shaping == "progress"
+    assert 'shaping = "progress"' in page
+    assert "Rescues still rose at the end" in page
+    source = (ROOT / "python/innerattn/cli/train.py").read_text("utf-8")
+    assert "escues still rose at the end" in source
+    assert best_name(Best(0.1, 5)) == "best-5.safetensors"
+    assert "checkpoints/best-N.safetensors" in page
 
 
 def test_every_remedy_of_the_page_is_tried() -> None:
