@@ -50,11 +50,14 @@ def run_workers_on_ray(
     except ModuleNotFoundError as error:
         raise missing_library("--ray", error) or error from error
     ray: Any = library
-    options: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
+    # Ray knows the word "local", too: a cluster of its own, whatever else runs here.
+    options: dict[str, Any] = {
+        "address": address,
+        "log_to_driver": False,
+        "logging_level": "ERROR",
+    }
     if address == LOCAL:
         options |= {"num_cpus": count or usable_cores(), "include_dashboard": False}
-    else:
-        options |= {"address": address}
     try:
         _refuse_unreachable(address)
         ray.init(**options)
