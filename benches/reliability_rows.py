@@ -78,8 +78,9 @@ ROWS: tuple[Row, ...] = (
     Row(
         "worker killed",
         "Of 24 runs on a Ray cluster of two nodes, of which a worker is killed every 20 s, and of "
-        "240 on this machine, where everything is killed in the middle, each is done once, at most one interval of checkpoints (16,384 env-steps) is worked again, and "
-        "weights, evaluations and report are those of an undisturbed study.",
+        "240 on this machine, where everything is killed in the middle, each is done once, at most "
+        "one interval of checkpoints (16,384 env-steps) is worked again, and weights, evaluations "
+        "and report are those of an undisturbed study.",
         ("tests/studies/test_ledger.py", "tests/studies/test_killed.py"),
     ),
     Row(
