@@ -99,6 +99,15 @@ def test_texts_in_lists_are_refused(tmp_path: Path) -> None:
     assert "lists of texts" in str(caught.value.__cause__)
 
 
+def test_values_of_a_fixed_size_are_refused(tmp_path: Path) -> None:
+    """One of a megabyte could stand in each of thousands of rows, too."""
+    wide = pa.array([b"x" * 1000] * 5, pa.binary(1000))
+    data = written(pa.table({"c": wide}), tmp_path / "table")
+    with pytest.raises(RunError, match="not a file of form") as caught:
+        read_table(data, Path("table"), FORM, 1)
+    assert "values of type FIXED_LEN_BYTE_ARRAY" in str(caught.value.__cause__)
+
+
 def varint(number: int, length: int = 0) -> bytes:
     """A number of Thrift, zigzag, of at least some bytes."""
     number, found = number << 1, bytearray()

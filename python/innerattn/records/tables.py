@@ -23,6 +23,8 @@ _MOST_COLUMNS = 4_000
 """In all row groups together."""
 _MOST_TEXT_BYTES = 16 << 20
 _TEXT = "BYTE_ARRAY"
+_NUMBERS = frozenset({"BOOLEAN", "INT32", "INT64", "FLOAT", "DOUBLE"})
+"""Physical types of at most eight bytes a value."""
 
 
 def read_table(
@@ -105,9 +107,12 @@ def _texts(schema: pq.ParquetSchema) -> list[str]:
     """Names of the columns of texts.
 
     Raises:
-        ValueError: texts lie in lists.
+        ValueError: texts lie in lists, or a column holds neither numbers nor texts.
     """
     columns = [schema.column(place) for place in range(len(schema))]
+    for one in columns:
+        if one.physical_type not in (_TEXT, *_NUMBERS):
+            raise ValueError(f"column {one.path}: values of type {one.physical_type}")
     texts = [one for one in columns if one.physical_type == _TEXT]
     for one in texts:
         if one.max_repetition_level:
