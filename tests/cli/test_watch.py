@@ -21,7 +21,7 @@ from innerattn.records.run_files import seal
 from innerattn.records.run_folder import run_info
 
 FRAME = "document.querySelector('#episodes')"
-INSIDE = f"{FRAME}.contentDocument.documentElement"
+INSIDE = f"{FRAME}.contentDocument?.documentElement?"
 
 
 def mark(run: Path, **values: Any) -> None:

@@ -14,7 +14,7 @@ from innerattn.report.paper.fig5 import shift_sentence
 from innerattn.report.runs.page import runs_page
 
 FRAME = "document.querySelector('iframe')"
-INSIDE = f"{FRAME}.contentDocument.documentElement"
+INSIDE = f"{FRAME}.contentDocument?.documentElement?"
 
 
 @pytest.fixture(scope="module")
