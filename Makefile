@@ -53,7 +53,7 @@ test-slow: setup test-pool ## the long checks: ten million env-steps of contacts
 examples: setup ## train a little with each outside library, in an environment of its own; EXAMPLES='NAME ...' takes some of them
 	python examples/run_all.py $(EXAMPLES)
 
-study-kill: setup ## kill workers of studies again and again, on this machine and on a Ray cluster of two nodes; some 20 minutes
+study-kill: setup ## kill workers of studies again and again, on this machine and on a Ray cluster of two nodes; some ten minutes
 	pip install 'ray>=2.40,<3'
 	INNERATTN_RAY_REQUIRED=1 pytest -m slow tests/studies/test_killed.py
 

@@ -82,7 +82,7 @@ BRIEF: Mapping[str, Brief] = {
             ("run", "begin or continue a study, with a worker for each core"),
             ("work", "be one worker, here or on another machine"),
             ("status", "what is done, the time left and the scores so far"),
-            ("report", "write report.md and report.json again"),
+            ("report", "write the report and the scores for other tools again"),
             ("slurm", "print a script for sbatch whose jobs are workers"),
             ("STUDY", "the study's file (.toml), or its folder"),
             ("--out FOLDER", "folder of the study (studies/NAME)"),

@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
 _TIME = re.compile(r"([0-9]{1,6})([smh])")
 _MOST_SHOWN = 500
-"""Finished runs whose scores `status` reads, in about a second."""
+"""Finished runs whose scores `status` reads; more would make it slow."""
 _UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 Action = Literal["run", "work", "status", "report", "slurm"]
 _WHAT = """What to do.
 - run: begin or go on with the study in a file, with a worker for each core.
 - work: be one worker for a study that has begun.
 - status: how many runs are done, how long the others will take, and their scores so far.
-- report: write report.md and report.json again.
+- report: write the report again, as Markdown and JSON, and the scores for other tools.
 - slurm: print a script for sbatch whose jobs are workers."""
 
 

@@ -32,8 +32,7 @@ def run_workers_on_ray(
     Args:
         folder: of the study, by a path that all nodes see.
         count: how many workers, each with a core; None: as many as there are cores.
-        address: of the cluster, ``HOST:PORT`` or ``ray://HOST:PORT``; ``"local"``: one is started
-            here, bound to loopback.
+        address: of the cluster, ``HOST:PORT``; ``"local"``: one is started here, bound to loopback.
         gpus: what each worker has of a GPU.
         left: gives the number of runs that are neither done nor failed; called often.
 
