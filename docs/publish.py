@@ -1,33 +1,29 @@
-"""Puts what `innerattn reproduce` made last in a study into the documentation.
+"""Puts the report of a study of `innerattn reproduce` into the documentation.
 
-`python docs/publish.py STUDY` fills the marked parts of a page. Of the paper's figures and of the
-crossed design this is the whole report: figures go to `docs/images`, the tables that it links to a
-folder of the page in `docs/tables`, and its runs to an archive in `docs/records`. Of learning and
-robustness it is the tables, and where `KEPT` says so the runs. It makes no number and no figure.
+`python docs/publish.py studies/BUDGET/TARGET` fills the marked parts of a page. Of the paper's
+figures and of the crossed design this is the whole report: figures go to `docs/images`, the tables
+that it links to a folder of the page in `docs/tables`, and its runs to an archive in
+`docs/records`. Of other studies it is the tables, and where `KEPT` says so the runs. It makes no
+number and no figure.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import re
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from innerattn.errors import InnerattnError, RunError
-from innerattn.experiments.archive import FILE, read_archive, write_archive
-from innerattn.experiments.plan import Case
-from innerattn.experiments.run import FinishedRun, read_run
-from innerattn.report.attention import page as attention
+from innerattn.experiments.archive import read_archive, write_archive
 from innerattn.report.crossed import swapped
-from innerattn.report.learning import ablations
-from innerattn.report.learning.page import ATTENTION, SCORES
 from innerattn.report.marks import fill, marked
 from innerattn.report.robustness import page as robustness
+from innerattn.report.targets import TARGETS
+from innerattn.studies.folder import open_study
+from innerattn.studies.results import read_results
 
 DOCS = Path(__file__).parent
 PLACES = {
@@ -49,33 +45,28 @@ KEPT = {
 """Names of archives of runs, which several targets may share; runs are added to what is there."""
 Parts = Mapping[str, tuple[str, ...]]
 """Headings of a report by the part of a page that the text below them makes."""
+SCORES = ("Scores", "Contrasts")
+ASKED = SCORES[::-1]
+"""Headings of the report that every study has; of one without contrasts, the first alone."""
 TABLES: dict[tuple[str, str], tuple[Path, tuple[Parts, ...]]] = {
-    (target, budget): (DOCS / "learning.md", ({part: (SCORES, ATTENTION)},))
-    for target, budget, part in (
-        ("learning", "fast", "learning_fast"),
-        ("learning", "strong", "learning_strong"),
-        ("learning", "quick", "learning_quick"),
-        ("learning", "short", "learning_short"),
-        ("learning-entities", "short", "learning_short_entities"),
-        ("learning-continuous", "fast", "learning_fast_continuous"),
-        ("learning-warm-start", "quick", "warm_start_quick"),
-        ("learning-warm-start", "strong", "warm_start_strong"),
-        ("learning-long", "strong", "learning_strong_long"),
-        ("learning-afterstates", "strong", "learning_strong_afterstates"),
+    (target, budget): (DOCS / page, ({part: ASKED if target == "attention" else SCORES},))
+    for target, budget, page, part in (
+        ("learning", "fast", "learning.md", "learning_fast"),
+        ("learning", "strong", "learning.md", "learning_strong"),
+        ("learning", "quick", "learning.md", "learning_quick"),
+        ("learning", "short", "learning.md", "learning_short"),
+        ("learning-entities", "short", "learning.md", "learning_short_entities"),
+        ("learning-continuous", "fast", "learning.md", "learning_fast_continuous"),
+        ("learning-warm-start", "quick", "learning.md", "warm_start_quick"),
+        ("learning-warm-start", "strong", "learning.md", "warm_start_strong"),
+        ("learning-long", "strong", "learning.md", "learning_strong_long"),
+        ("learning-afterstates", "strong", "learning.md", "learning_strong_afterstates"),
+        ("learning-ablations", "fast", "learning.md", "ablations_fast"),
+        ("attention", "fast", "attention.md", "attention_fast"),
+        ("attention", "strong", "attention.md", "attention_strong"),
     )
 } | {
     ("swapped", "short"): (DOCS / "swapped.md", ({"swapped": (swapped.ANSWER, swapped.SHARES)},)),
-    ("learning-ablations", "fast"): (
-        DOCS / "learning.md",
-        ({"ablations_fast": (ablations.DIFFERENCES,)},),
-    ),
-    **{
-        ("attention", budget): (
-            DOCS / "attention.md",
-            ({f"attention_{budget}": (attention.COMPARISONS, attention.SCORES)},),
-        )
-        for budget in ("fast", "strong")
-    },
     ("robustness", "short"): (
         DOCS / "robustness.md",
         (
@@ -100,35 +91,47 @@ A report has all parts of a group, or none where a study leaves out what the gro
 def main() -> None:
     """Publish the study that is named on the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("study", type=Path, help="folder of the study")
-    study = parser.parse_args().study
+    parser.add_argument(
+        "study", type=Path, help="folder of the study, such as studies/fast/learning"
+    )
     try:
-        account = json.loads((study / "runs.json").read_text())
-    except FileNotFoundError:
-        sys.exit(f"{study}: no study; `innerattn reproduce` makes one")
-    made = account["target"], account["budget"]
-    name = report_name(account["target"])
-    if made not in PLACES.keys() | TABLES.keys() or name not in account["outputs"]:
-        sys.exit(
-            f"{study}: last made {made[0]} of budget {made[1]!r}, for which no page has a place, "
-            f"or was interrupted; there are places for {_listed()}"
-        )
-    try:
-        if made in TABLES:
-            publish_tables(study / name, *TABLES[made])
-            if made in KEPT:
-                _add(account["runs"], study, DOCS / "records" / f"{KEPT[made]}.parquet")
-        else:
-            page, figures = PLACES[made]
-            _archive(account["runs"], study, DOCS / "records" / f"{page.stem}.parquet")
-            publish_report(study / name, page, figures)
+        publish(parser.parse_args().study)
     except InnerattnError as error:
         sys.exit(str(error))
 
 
+def publish(folder: Path) -> None:
+    """Put the report of a study into its page, and its runs into an archive.
+
+    Raises:
+        InnerattnError: there is no such study, report or place; nothing is changed then.
+    """
+    study = open_study(folder)
+    made = folder.name, study.study.grid[0].budgets[0]
+    report = folder / report_name(folder.name)
+    if made not in PLACES.keys() | TABLES.keys():
+        places = ", ".join(f"{target} of {budget}" for target, budget in (*PLACES, *TABLES))
+        raise RunError(f"{folder}: there is no place for {made[0]} of {made[1]}, only for {places}")
+    if not report.exists():
+        raise RunError(f"{report}: missing; `innerattn reproduce {made[0]}` writes it")
+    runs = read_results(study).runs
+    if made in TABLES:
+        publish_tables(report, *TABLES[made])
+        if made in KEPT:
+            archive = DOCS / "records" / f"{KEPT[made]}.parquet"
+            known = {run.folder.name: run for run in read_archive(archive)}
+            found = known | {run.folder.name: run for run in runs}
+            write_archive((found[name] for name in sorted(found)), archive)
+    else:
+        page, figures = PLACES[made]
+        write_archive(runs, DOCS / "records" / f"{page.stem}.parquet")
+        publish_report(report, page, figures)
+
+
 def report_name(target: str) -> str:
     """The file of a target's report."""
-    return "report.md" if target == "all" else f"{target.replace('-', '_')}.md"
+    own = TARGETS[target].report
+    return "report.md" if own is None or target == "all" else f"{target}.md"
 
 
 def publish_tables(report: Path, page: Path, groups: Sequence[Parts]) -> None:
@@ -185,40 +188,6 @@ def by_heading(report: str) -> dict[str, str]:
     """What stands below each heading of the second level."""
     parts = (part.partition("\n") for part in re.split("^## ", report, flags=re.MULTILINE)[1:])
     return {heading: text.strip() for heading, _, text in parts}
-
-
-def _listed() -> str:
-    return ", ".join(f"{target} of {budget}" for target, budget in (*PLACES, *TABLES))
-
-
-def _archive(runs: list[dict[str, Any]], study: Path, path: Path) -> None:
-    """Write the runs that a report is made of into one file."""
-    write_archive(_finished(runs, study), path)
-
-
-def _add(runs: list[dict[str, Any]], study: Path, path: Path) -> None:
-    """Write the runs that a report is made of into a file that keeps the others it has."""
-    known = {run.folder.name: run for run in read_archive(path)} if path.exists() else {}
-    found = known | {run.folder.name: run for run in _finished(runs, study)}
-    write_archive((found[name] for name in sorted(found)), path)
-
-
-def _finished(runs: list[dict[str, Any]], study: Path) -> list[FinishedRun]:
-    """The finished runs of an account, from their folders or from the study's archive."""
-    archive = study / FILE
-    archived = read_archive(archive) if os.path.lexists(archive) else []
-    by_name = {run.folder.name: run for run in archived}
-    finished = []
-    for run in runs:
-        if run["state"] != "finished":
-            continue
-        folder = study / run["folder"]
-        case = Case(run["situation"], run["method"], run["seed"], run["variant"])
-        if os.path.lexists(folder):
-            finished.append(read_run(case, folder, steps=False))
-        else:
-            finished.append(by_name[folder.name])
-    return finished
 
 
 if __name__ == "__main__":

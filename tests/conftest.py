@@ -14,12 +14,13 @@ sys.path.insert(0, str(Path(__file__).parent / "support"))
 
 from in_turn import do_in_turn
 from made_run import made_run
+from small_study import begin_small
 
 from innerattn.cli.main import main
-from innerattn.experiments.crossed.arms import plan_crossed
-from innerattn.experiments.plan import plan
+from innerattn.experiments.crossed.arms import ARMS
+from innerattn.experiments.plan import Case
 from innerattn.experiments.run import FinishedRun, read_run
-from innerattn.experiments.side_by_side import Run
+from innerattn.studies.work import work
 
 # A slow machine fails no property.
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -90,16 +91,16 @@ def small() -> dict[str, object]:
 @pytest.fixture
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trains the runs of a study one after the other, in this process."""
-    monkeypatch.setattr("innerattn.experiments.train.train_side_by_side", do_in_turn)
+    monkeypatch.setattr("innerattn.studies.launch.local.run_side_by_side", do_in_turn)
 
 
 @pytest.fixture(scope="session")
 def finished_study(tmp_path_factory: pytest.TempPathFactory, small: dict[str, object]) -> Path:
-    """A study's folder with two finished runs, td-inner and td-uniform; not to be changed."""
+    """Folder of two finished runs, td-inner and td-uniform, seed 0; not to be changed."""
     out = tmp_path_factory.mktemp("studies") / "finished"
-    planned = plan(("td-inner", "td-uniform"), ("mixed",), (0,), "quick", out, small)
-    runs = [Run(one.config, one.folder) for one in planned]
-    do_in_turn(runs, 1, changed=lambda _: None, failed=lambda run: pytest.fail(str(run)))
+    study = begin_small("paper", out, ("td-inner", "td-uniform"), 1, small)
+    work(study.ledger(), study.to_do)
+    shutil.rmtree(study.path)
     return out
 
 
@@ -123,15 +124,14 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[FinishedRun]:
 @pytest.fixture(scope="session")
 def crossed_study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[FinishedRun]]:
     """Runs of all arms in mixed, two of each, in a study's folder."""
-    out = tmp_path_factory.mktemp("crossed")
-    found = []
-    planned = plan_crossed(("td-inner", "td-uniform"), ("mixed",), range(2), "quick", out)
-    for number, one in enumerate(planned):  # no two runs alike
-        case = one.case
+    out, found = tmp_path_factory.mktemp("crossed"), []
+    cases = [Case("mixed", arm.method, seed, arm.variant) for seed in range(2) for arm in ARMS]
+    for number, case in enumerate(cases):  # no two runs alike
         made = made_run(out / "made", "mixed", case.method, case.seed, chance=number)
-        one.folder.parent.mkdir(exist_ok=True)
-        made.folder.rename(one.folder)
-        found.append(read_run(one.case, one.folder))
+        folder = out / "runs" / f"mixed-{case.method}-{case.variant}-quick-s{case.seed}"
+        folder.parent.mkdir(exist_ok=True)
+        made.folder.rename(folder)
+        found.append(read_run(case, folder))
     return out, found
 
 

@@ -29,37 +29,10 @@ import multiprocessing.reduction, types
 import numpy, pettingzoo, pyarrow.parquet, pydantic, rich.progress, scipy.stats, tyro
 sys.modules["msvcrt"] = types.SimpleNamespace()
 sys.platform = "win32"
-import innerattn.cli.main, innerattn.experiments.lock, innerattn.experiments.side_by_side
+import innerattn.cli.main, innerattn.cli.study, innerattn.experiments.side_by_side
 print("started")
 """
     assert python(WITHOUT_POSIX + code, folder=tmp_path) == "started\n"
-
-
-def test_a_study_is_locked_on_windows_by_its_own_means(tmp_path: Path) -> None:
-    code = """
-import multiprocessing.reduction, pickle, types
-from pathlib import Path
-from innerattn.errors import RunError
-
-locked = []
-def locking(file, mode, size):
-    if locked:
-        raise PermissionError(13, "Permission denied")
-    locked.append((mode, size))
-
-sys.modules["msvcrt"] = types.SimpleNamespace(LK_NBLCK=2, locking=locking)
-sys.platform = "win32"
-from innerattn.experiments.lock import StudyLock
-with StudyLock.take(Path(sys.argv[1]) / "study") as lock:
-    assert locked == [(2, 1)]
-    with pickle.loads(pickle.dumps(lock)):
-        pass
-    try:
-        StudyLock.take(Path(sys.argv[1]) / "study")
-    except RunError as error:
-        print("another study" in str(error))
-"""
-    assert python(WITHOUT_POSIX + code, tmp_path, folder=tmp_path) == "True\n"
 
 
 def test_runs_go_side_by_side_where_signals_cannot_be_blocked(tmp_path: Path) -> None:
@@ -71,11 +44,12 @@ for name in ("SIGHUP", "pthread_sigmask"):
 import sys
 from pathlib import Path
 from innerattn.config import RunConfig
-from innerattn.experiments.side_by_side import Run, train_side_by_side
+from innerattn.experiments.side_by_side import Run
+from innerattn.experiments.processes import run_side_by_side
 
 if __name__ == "__main__":
     run = Run(RunConfig(), Path(sys.argv[1]) / "none", trained=True)
-    train_side_by_side([run], 1, changed=lambda _: None, failed=lambda run: print(run.failure))
+    run_side_by_side([run], 1, changed=lambda _: None, failed=lambda run: print(run.failure))
 """
     expected = f"{tmp_path / 'none'}: no such run folder\n"
     assert python(code, tmp_path, folder=tmp_path) == expected

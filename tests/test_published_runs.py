@@ -1,7 +1,6 @@
 """The pages about studies show what their commands make of the archived runs, and are short."""
 
 import csv
-import json
 import math
 import re
 import shutil
@@ -13,13 +12,15 @@ from markdown_rows import rows_of
 
 from innerattn.cli.main import main
 from innerattn.experiments.archive import FILE, read_archive
+from innerattn.studies.folder import open_study
+from innerattn.studies.results import read_results
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 RECORDS = DOCS / "records"
 PAGES = ("reproduction", "paper_protocol", "crossed")
 NEEDS_STEPS = ("## Fig. 4: ", "## Fig. 5: ")
-NOT_RUN = re.compile(r"runs/(mixed-(8|16)-\S+-s\d|double-\S+-(helpers|team)\S*-short-s[3-9])$")
+NOT_RUN = re.compile(r"mixed-(8|16) .*|double .* (helpers|team)\S*, seed [3-9]")
 """Runs of a command's plan that its page says have not been run."""
 
 sys.path.insert(0, str(DOCS))
@@ -36,14 +37,15 @@ def part(name: str, section: str) -> str:
     return text.split(f"<!-- {section}: end -->")[0].strip()
 
 
-def make(words: list[str], archive: Path, study: Path) -> None:
+def make(words: list[str], archive: Path, pool: Path) -> Path:
     """Report on the archived runs, all of the plan but those that have not been run."""
-    shutil.copyfile(archive, study / FILE)
-    code = main(["reproduce", *words, "--report-only", "--out", str(study)])
-    runs = json.loads((study / "runs.json").read_text("utf-8"))["runs"]
-    missing = [run["folder"] for run in runs if run["state"] != "finished"]
+    shutil.copyfile(archive, pool / FILE)
+    code = main(["reproduce", *words, "--report-only", "--out", str(pool)])
+    study = pool / words[0]
+    missing = [run for run, _ in read_results(open_study(study)).left_out]
     assert code == bool(missing)
-    assert all(NOT_RUN.match(folder) for folder in missing)
+    assert all(NOT_RUN.match(str(run)) for run in missing)
+    return study
 
 
 @pytest.fixture(scope="module")
@@ -54,10 +56,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         (command,) = re.findall(r"^innerattn (reproduce .*)$", page(name), flags=re.MULTILINE)
         target, *options = command.removeprefix("reproduce ").replace(" --report-only", "").split()
         target = {"all": "table2"}.get(target, target)  # what else there is needs steps
-        study = tmp_path_factory.mktemp("studies") / name
-        study.mkdir()
-        make([target, *options], RECORDS / f"{name}.parquet", study)
-        folders[name] = study
+        pool = tmp_path_factory.mktemp("studies") / name
+        pool.mkdir()
+        folders[name] = make([target, *options], RECORDS / f"{name}.parquet", pool)
     return folders
 
 
@@ -99,10 +100,10 @@ def test_tables_are_made_of_the_archive(
     target: str, budget: str, options: str, tmp_path: Path
 ) -> None:
     archive = RECORDS / f"{KEPT[target, budget]}.parquet"
-    make([target, "--budget", budget, *options.split()], archive, tmp_path)
+    study = make([target, "--budget", budget, *options.split()], archive, tmp_path)
     shown, (parts,) = TABLES[target, budget]
     assert f"innerattn reproduce {target} --budget {budget} {options}" in shown.read_text("utf-8")
-    found = by_heading((tmp_path / report_name(target)).read_text("utf-8"))
+    found = by_heading((study / report_name(target)).read_text("utf-8"))
     for name, headings in parts.items():
         assert part(shown.stem, name) == "\n\n".join(found[one] for one in headings if one in found)
 
@@ -181,8 +182,8 @@ def test_the_answer_about_seeds_is_what_was_measured() -> None:
 
 
 def test_the_table_of_learning_is_made_of_the_same_runs(tmp_path: Path) -> None:
-    make(["learning", "--budget", "short"], RECORDS / "reproduction.parquet", tmp_path)
-    made = (tmp_path / "learning.md").read_text("utf-8")
+    study = make(["learning", "--budget", "short"], RECORDS / "reproduction.parquet", tmp_path)
+    found = by_heading((study / "report.md").read_text("utf-8"))
     shown = rows_of(part("learning", "learning_short"))
-    assert rows_of(made) == shown
-    assert len(shown) == 1 + 12 + 1 + 6
+    assert [*rows_of(found["Scores"]), *rows_of(found["Contrasts"])] == shown
+    assert len(shown) == 1 + 12 + 2 * (1 + 6)

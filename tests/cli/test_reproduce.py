@@ -2,61 +2,57 @@
 
 import json
 import shutil
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from in_turn import do_in_turn
 from reseal import reseal
-from small_study import NAMES, Command, account, states, times
+from small_study import Command, run_in, times
 
 from innerattn.cli.main import main
 from innerattn.experiments.robustness import design
+
+TD = "td-inner,td-uniform"
+
+
+def document(out: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((out / "report.json").read_text())
+    return found
 
 
 @pytest.mark.usefixtures("in_this_process")
 def test_finished_runs_are_used_and_the_missing_ones_trained(
     study: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before = times(study / "runs" / NAMES[0]) | times(study / "runs" / NAMES[1])
-    assert command("table2", study, "td-inner,td-uniform", "--seeds", "2") == 0
+    before = times(study / "runs")
+    before = {path: time for path, time in before.items() if path != study / "runs"}
+    assert command("table2", study, TD, "--seeds", "2") == 0
     out, err = capsys.readouterr()
-    assert out.startswith("table2, budget quick: 4 runs of 2 seeds; 2 finished, 2 to train, ")
-    assert out.count("a smoke run, no result") == 2
+    where = study / "table2"
+    assert out.startswith(f"{where}: 4 runs, 2 done, 0 failed, 2 to do by 2 workers\n")
+    assert out.count("a smoke run, no result") == 1
     assert err == ""
-    rows = [line.split() for line in out.splitlines()]
-    assert ["td-inner", "2", "of", "2"] in [row[:4] for row in rows]
-    assert f"Written: {study / 'runs.json'}\n" in out
-
-    document = account(study)
-    assert "no result" in document["note"]
-    assert (document["target"], document["budget"]) == ("table2", "quick")
-    assert (document["seeds"], document["situations"]) == ([0, 1], ["mixed"])
-    for run in document["runs"]:
-        summary = json.loads((study / run["folder"] / "evaluation" / "summary.json").read_text())
-        info = json.loads((study / run["folder"] / "run.json").read_text())
-        assert run["state"] == "finished"
-        assert run["rescues_per_episode"] == summary["rescues_per_episode"]["mean"]
-        assert len(run["config_sha256"]) == len(run["weights_sha256"]) == 64
-        assert (run["commit"], run["versions"]) == (info["commit"], info["versions"])
-
     made = ["report.md", "claims.md", "runs.csv", "table2.csv", "table2.json", "table2.md"]
-    assert document["outputs"] == made
-    texts = {name: (study / name).read_text() for name in made}
+    assert f"Written: {where / made[0]}, {', '.join(made[1:])}\n" in out
+    texts = {name: (where / name).read_text() for name in made}
     assert all("a smoke run, no result" in text for text in texts.values())
     assert "Left out" not in texts["report.md"]
-    assert not list(study.glob("fig*"))
+    assert not list(where.glob("fig*"))
+    listed = {line.split(",")[3] for line in texts["runs.csv"].splitlines()[1:]}
+    assert listed == {f"runs/{path.name}" for path in (study / "runs").iterdir()}
 
     trained = times(study / "runs")
     assert before.items() <= trained.items()
-    assert command("table2", study, "td-inner,td-uniform", "--seeds", "2") == 0
+    assert command("table2", study, TD, "--seeds", "2") == 0
     again = capsys.readouterr().out
-    assert again.startswith("table2, budget quick: 4 runs of 2 seeds; 4 finished, 0 to train\n")
-    assert again.splitlines()[3:] == out.splitlines()[3:]
+    assert again.startswith(f"{where}: 4 runs, 4 done, 0 failed, 0 to do\n")
+    assert again.splitlines()[1:] == out.splitlines()[1:]
     assert times(study / "runs") == trained
-    assert account(study) == document
-    assert {name: (study / name).read_text() for name in made} == texts
+    assert {name: (where / name).read_text() for name in made} == texts
 
 
 def test_a_page_about_the_finished_runs(
@@ -64,11 +60,11 @@ def test_a_page_about_the_finished_runs(
 ) -> None:
     page = tmp_path / "study.html"
     options = ["--seeds", "1", "--report-only", "--page", str(page)]
-    assert command("table2", study, "td-inner,td-uniform", *options) == 0
+    assert command("table2", study, TD, *options) == 0
     assert capsys.readouterr().out.count(f"Written: {page}\n") == 1
     text = page.read_text("utf-8")
     assert "a smoke run, no result" in text
-    assert all(f"{name} (seed 0)" in text for name in NAMES)
+    assert all(f"{run_in(study, name).name} (seed 0)" in text for name in TD.split(","))
     for wrong, message in (
         (["crossed", study, "td-inner"], "--page: runs of crossed differ by more than a page"),
         (["table2", study, "td-inner"], "--page x.pdf: must end in .html"),
@@ -82,59 +78,49 @@ def test_a_page_about_the_finished_runs(
 def test_runs_are_trained_on_a_device_and_reported_from_any(
     study: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    options = ["table2", study, "td-inner,td-uniform", "--seeds", "2"]
+    options = ["learning", study, TD, "--seeds", "2"]
     assert command(*options, "--device", "abacus") == 1
     assert "train.device = 'abacus': not usable here" in capsys.readouterr().err
-    assert not (study / "runs.json").exists()
+    assert len(list((study / "runs").iterdir())) == 2
     assert command(*options, "--device", "cpu:0") == 0  # not how the finished ones were trained
-    assert "2 finished, 2 to train" in capsys.readouterr().out
+    assert "4 runs, 2 done, 0 failed, 2 to do" in capsys.readouterr().out
     assert command(*options, "--report-only") == 0
-    assert [run["device"] for run in account(study)["runs"]] == ["cpu", "cpu", "cpu:0", "cpu:0"]
+    runs = document(study / "learning")["runs"]
+    assert sorted(run["device"] for run in runs) == ["cpu", "cpu", "cpu:0", "cpu:0"]
 
 
-@pytest.mark.usefixtures("in_this_process")
-def test_another_configuration_is_named_and_neither_used_nor_changed(
+def test_a_run_that_was_changed_is_named_and_neither_used_nor_changed(
     study: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    foreign = study / "runs" / NAMES[0]
+    foreign = run_in(study, "td-inner")
     config = foreign / "config.toml"
     config.write_text(config.read_text().replace("polyak = 0.02\n", "polyak = 0.03\n"))
     reseal(foreign)
     before = times(foreign)
-    assert command("fig4", study, "td-inner,td-uniform", "--seeds", "2") == 1
-    out, err = capsys.readouterr()
-    why = "other configuration: td.polyak = 0.03, planned 0.02"
-    assert err == f"innerattn: left out: {foreign}: {why} (move it away to have it trained)\n"
-    assert "4 runs of 2 seeds; 1 finished, 2 to train" in out
-    assert "; 1 left out\n" in out
-    assert f"  mixed td-inner seed 0: {why}\n" in out
-    (row,) = [line.split() for line in out.splitlines() if line.split()[:1] == ["td-inner"]]
-    assert row[1:4] == ["1", "of", "2"]
-    assert "±" not in row
+    assert command("table2", study, TD, "--seeds", "1") == 1
+    out, _ = capsys.readouterr()
+    why = "unreadable: its configuration is another than its name says"
+    assert "2 runs, 2 done, 0 failed, 0 to do" in out
+    assert f"  mixed td-inner, seed 0: {why}\n" in out
     assert times(foreign) == before
-    assert states(study) == ["other_configuration", "finished", "finished", "finished"]
-    assert account(study)["runs"][0]["why"] == "td.polyak = 0.03, planned 0.02"
-    assert (
-        f"**Left out of all results:**\n\n- mixed td-inner seed 0: {why}"
-        in (study / "report.md").read_text()
-    )
+    report = (study / "table2" / "report.md").read_text()
+    assert f"**Left out of all results:**\n\n- mixed td-inner, seed 0: {why}" in report
 
 
 def test_a_report_alone_trains_nothing_and_names_what_is_missing(
     study: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    missing, there = (study / "runs" / name for name in NAMES)
+    missing, there = (run_in(study, method) for method in TD.split(","))
     shutil.rmtree(missing)
+    shutil.rmtree(study / "claims")
     before = times(there)
-    assert command("table2", study, "td-inner,td-uniform", "--seeds", "1", "--report-only") == 1
+    assert command("table2", study, TD, "--seeds", "1", "--report-only") == 1
     out, err = capsys.readouterr()
     assert err == ""
-    assert out.startswith("table2, budget quick: 2 runs of 1 seed; 1 finished, 1 not\n")
-    assert "  mixed td-inner seed 0: missing\n" in out
+    assert "  mixed td-inner, seed 0: missing\n" in out
     assert not missing.exists()
     assert times(there) == before
-    assert states(study) == ["missing", "finished"]
-    assert "- mixed td-inner seed 0: missing\n" in (study / "report.md").read_text()
+    assert "- mixed td-inner, seed 0: missing\n" in (study / "table2" / "report.md").read_text()
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -143,11 +129,11 @@ def test_the_same_command_makes_the_same_files_from_nothing(
 ) -> None:
     one, other = tmp_path / "one", tmp_path / "other"
     for out in (one, other):
-        assert command("all", out, "td-inner,td-uniform", "--seeds", "1") == 0
-    made = account(one)["outputs"]
-    assert {"report.md", "table2.csv", "table2.json", "fig4.pdf"} <= set(made)
+        assert command("all", out, TD, "--seeds", "1") == 0
+    made = {path.name for path in (one / "all").iterdir()} - {"rules.json"}  # it has the time
+    assert {"report.md", "table2.csv", "table2.json", "fig4.pdf", "study.toml"} <= made
     for name in made:
-        assert (one / name).read_bytes() == (other / name).read_bytes(), name
+        assert (one / "all" / name).read_bytes() == (other / "all" / name).read_bytes(), name
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -156,40 +142,60 @@ def test_the_crossed_design_has_runs_and_files_of_its_own(
 ) -> None:
     assert command("crossed", tmp_path, "td-uniform", "--seeds", "1") == 0
     out, err = capsys.readouterr()
-    assert out.startswith("crossed, budget quick: 2 runs of 1 seed; 0 finished, 2 to train, ")
+    assert "2 runs, 0 done, 0 failed, 2 to do" in out
     assert err == ""
-    rows = [" ".join(line.split()[:5]) for line in out.splitlines()]
-    assert "td-uniform helpers 1 of 1" in rows
-    assert "td-uniform team 1 of 1" in rows
-    document = account(tmp_path)
-    files = [f"crossed.{kind}" for kind in ("csv", "json", "md", "pdf", "png")]
-    files += ["crossed_seeds.pdf", "crossed_seeds.png", "crossed_tables.md"]
-    assert (document["target"], document["outputs"]) == ("crossed", files)
-    assert [run["variant"] for run in document["runs"]] == ["helpers", "team"]
-    assert {path.name for path in (tmp_path / "runs").iterdir()} == {
-        f"mixed-td-uniform-{credit}-quick-s0" for credit in ("helpers", "team")
-    }
+    files = {f"crossed.{kind}" for kind in ("csv", "json", "md", "pdf", "png")}
+    files |= {"crossed_seeds.pdf", "crossed_seeds.png", "crossed_tables.md"}
+    assert files < {path.name for path in (tmp_path / "crossed").iterdir()}
+    found = json.loads((tmp_path / "crossed" / "crossed.json").read_text())
+    (situation,) = found["situations"]
+    assert sorted(run["credit"] for run in situation["runs"]) == ["helpers", "team"]
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_variants_of_learning_have_runs_and_files_of_their_own(
+def test_targets_share_runs_and_have_a_report_each(
     study: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert command("learning", study, "td-inner,td-uniform", "--seeds", "1") == 0
+    assert command("learning", study, TD, "--seeds", "1") == 0
     out, err = capsys.readouterr()
-    assert out.startswith("learning, budget quick: 2 runs of 1 seed; 2 finished, 0 to train\n")
-    assert account(study)["outputs"] == ["learning.json", "learning.md"]  # no episode ended
+    assert "2 runs, 2 done, 0 failed, 0 to do" in out
     assert command("learning-entities", study, "td-inner", "--seeds", "1") == 0
     out, err = capsys.readouterr()
-    assert "1 run of 1 seed; 0 finished, 1 to train, 1 at a time\n" in out
+    assert "1 run, 0 done, 0 failed, 1 to do by 1 worker\n" in out
     assert err == ""
-    assert ["td-inner", "entities", "1", "of", "1"] in [
-        line.split()[:5] for line in out.split("\n")
-    ]
-    assert account(study)["outputs"] == ["learning_entities.json", "learning_entities.md"]
-    assert (study / "runs" / "mixed-td-inner-entities-quick-s0").is_dir()
-    assert "| td-inner entities, mixed |" in (study / "learning_entities.md").read_text()
-    assert "| td-inner, mixed |" in (study / "learning.md").read_text()
+    for name, count in (("learning", 2), ("learning-entities", 1)):
+        assert len(document(study / name)["runs"]) == count
+        assert f"{count} of {count} runs are done." in (study / name / "report.md").read_text()
+    assert len(list((study / "runs").iterdir())) == 3
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_a_run_that_diverges_is_named_and_the_others_are_trained(
+    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for _ in range(2):  # it is not tried a fourth time
+        assert command("fig5", tmp_path, "all", "--seeds", "1", **{"td.reward_scale": 1e-37}) == 1
+        out, _ = capsys.readouterr()
+        assert "  mixed td-inner, seed 0: failed: training diverged at " in out
+        assert len(list((tmp_path / "runs").iterdir())) == 1
+        assert len(list((tmp_path / "claims").glob("*.failed"))) == 3
+
+
+def test_ctrl_c_keeps_what_is_finished(
+    study: Path,
+    command: Command,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def press_ctrl_c(workers: Sequence[object], *_: object, **__: object) -> None:
+        assert len(workers) == 1
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("innerattn.studies.launch.local.run_side_by_side", press_ctrl_c)
+    before = times(study / "runs")
+    assert command("fig5", study, "td-inner", "--seeds", "2") == 130
+    assert capsys.readouterr().err.splitlines()[-1] == "innerattn: interrupted"
+    assert times(study / "runs") == before
 
 
 @pytest.fixture
@@ -211,20 +217,19 @@ def test_robustness_is_measured_once_and_then_read(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     robustness = partial(command, "robustness", study, "td-uniform", "--seeds", "1")
+    where = study / "robustness"
     assert robustness("--report-only") == 1
     out, err = capsys.readouterr()
     assert "  faults of mixed-s0: not measured\n" in out
-    assert "- faults of mixed-s0: not measured\n" in (study / "robustness.md").read_text()
-    assert not (study / "faults").exists()
+    assert "- faults of mixed-s0: not measured\n" in (where / "robustness.md").read_text()
+    assert not (where / "faults").exists()
 
     assert robustness() == 0
     out, err = capsys.readouterr()
-    assert out.startswith("robustness, budget quick: 1 run of 1 seed; 1 finished, 0 to train\n")
+    assert "1 run, 1 done, 0 failed, 0 to do\n" in out
     assert err == ""
-    files = ["robustness.json", "robustness.md"]
-    assert account(study)["outputs"] == files
-    (document,) = (study / "faults").iterdir()
-    texts = [(study / name).read_bytes() for name in files]
+    (measured,) = (where / "faults").iterdir()
+    texts = [(where / name).read_bytes() for name in ("robustness.json", "robustness.md")]
     assert b"not measured" not in texts[1]
     assert json.loads(texts[0])["deployments"][0]["kinds"] == ["blackout"]
 
@@ -232,21 +237,40 @@ def test_robustness_is_measured_once_and_then_read(
         raise AssertionError("it was measured again")
 
     monkeypatch.setattr("innerattn.evaluate.robustness.measure_robustness", refuse)
-    before = times(document)
+    before = times(measured)
     for options in ([], ["--report-only"]):
         assert robustness(*options) == 0
-        assert [(study / name).read_bytes() for name in files] == texts
-        assert times(document) == before
+        now = [(where / name).read_bytes() for name in ("robustness.json", "robustness.md")]
+        assert now == texts
+        assert times(measured) == before
+
+
+@pytest.mark.usefixtures("few_faults")
+def test_ctrl_c_while_faults_are_measured_keeps_the_runs(
+    study: Path,
+    command: Command,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def press_ctrl_c(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("innerattn.experiments.processes.run_side_by_side", press_ctrl_c)
+    before = times(study / "runs")
+    assert command("robustness", study, "td-uniform", "--seeds", "1") == 130
+    assert capsys.readouterr().err.splitlines()[-1] == "innerattn: interrupted"
+    assert times(study / "runs") == before
 
 
 @pytest.mark.usefixtures("few_faults")
 def test_a_measurement_that_fails_is_named(
     study: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    shutil.rmtree(study / "runs" / NAMES[1] / "checkpoints")
+    run = run_in(study, "td-uniform")
+    shutil.rmtree(run / "checkpoints")
     assert command("robustness", study, "td-uniform", "--seeds", "1") == 1
     out, err = capsys.readouterr()
-    reason = f"{study / 'runs' / NAMES[1]}: holds no checkpoint yet"
+    reason = f"{run}: holds no checkpoint yet"
     assert err == f"innerattn: error: faults of mixed-s0: {reason}\n"
     assert f"  faults of mixed-s0: {reason}\n" in out
 
@@ -254,7 +278,7 @@ def test_a_measurement_that_fails_is_named(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["fig5", "--methods", "td-uniform"], "--methods = 'td-uniform': must be all or of td-i"),
+        (["fig5", "--methods", "td-unifor"], "--methods = 'td-unifor': must be all or of td-i"),
         (["all", "--presets", "mixed,x"], "--presets = 'x': must be all or of single, "),
         (["all", "--situations", "mixed,x"], "--presets = 'x': must be all or of single, "),
         (["all", "--seeds", "0"], "--seeds = 0: must be 1 to 1,000"),

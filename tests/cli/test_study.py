@@ -31,11 +31,12 @@ def test_a_study_from_file_to_report(file: Path, capsys: pytest.CaptureFixture[s
     assert "inner attention, ppo-inner - ppo-uniform" in said
     folder = Path("studies/tiny")
     found = json.loads((folder / "report.json").read_text())
-    assert set(found["runs"].values()) == {"done"}
-    assert [one["seeds"] for one in found["means"]] == [[0, 1, 2], [0, 1, 2]]
+    assert (len(found["runs"]), found["left_out"]) == (6, [])
+    assert [one["seeds"] for one in found["tables"]["Scores"]] == [[0, 1, 2], [0, 1, 2]]
     assert found["contrasts"][0]["seeds"] == [0, 1, 2]
     page = (folder / "report.md").read_text()
-    assert page.startswith("# Does inner attention matter?\n")
+    note = "> **Budget quick: a smoke run, no result; its runs are too short to compare methods.**"
+    assert page.startswith(f"{note}\n\n# Does inner attention matter?\n")
     assert "given before the first run" in page
     before = (folder / "report.json").read_bytes()
     assert main(["study", "run", str(folder), "-q"]) == 0
@@ -43,7 +44,7 @@ def test_a_study_from_file_to_report(file: Path, capsys: pytest.CaptureFixture[s
     assert main(["study", "status", str(folder)]) == 0
     said = capsys.readouterr().out
     assert "6 runs: 6 done, 0 running, 0 waiting, 0 failed" in said
-    assert "rescues/episode" in said  # the table so far
+    assert "rescues, 25 steps" in said  # the table so far
     shutil.rmtree(next((folder / "runs").iterdir()))
     assert main(["study", "status", str(folder)]) == 0
     said = capsys.readouterr().out
@@ -65,8 +66,8 @@ def test_everything_is_killed_and_goes_on(file: Path) -> None:
     first.wait()
     assert main(["study", "run", str(file), "-q"]) == 0
     found = json.loads(Path("studies/tiny/report.json").read_text())
-    assert set(found["runs"].values()) == {"done"}
-    assert sorted(os.listdir("studies/tiny/runs")) == sorted(found["runs"])
+    assert (len(found["runs"]), found["left_out"]) == (6, [])
+    assert sorted(os.listdir("studies/tiny/runs")) == sorted(one["key"] for one in found["runs"])
 
 
 def test_ctrl_c_saves_and_frees_every_run(file: Path) -> None:

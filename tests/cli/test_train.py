@@ -322,7 +322,7 @@ def test_the_score_is_the_last_thing_on_the_screen(
     assert re.match(score, last)
     hint = f"Rescues still rose at the end: {more}"
     assert before == hint if rises else before.startswith("Watch it in a browser: ")
-    monkeypatch.setattr("innerattn.cli.train.train_side_by_side", do_in_turn)
+    monkeypatch.setattr("innerattn.cli.train.run_side_by_side", do_in_turn)
     assert main(["train", "--seeds", "0..1", "--run-dir", str(tmp_path / "two"), *tiny]) == 0
     *_, before, last = capsys.readouterr().out.splitlines()
     assert re.match(f"{score}.*, mean of 2 of 2 seeds", last)

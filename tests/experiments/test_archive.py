@@ -1,6 +1,7 @@
 """Archived runs: a study takes them for the runs, and makes the same report of them."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,13 +10,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from reseal import reseal
+from small_study import begin_small
 
 from innerattn.errors import RunError
 from innerattn.experiments.archive import FILE, FORMAT, read_archive, write_archive
-from innerattn.experiments.plan import plan
 from innerattn.experiments.run import FinishedRun, read_run, refuse_without_steps
-from innerattn.experiments.scan import finished_runs, scan_runs
 from innerattn.report.crossed.write import write_crossed
+from innerattn.studies.results import read_results
 
 
 def test_what_is_written_is_read_but_for_steps(runs: list[FinishedRun], tmp_path: Path) -> None:
@@ -46,21 +47,30 @@ def test_what_is_written_is_read_but_for_steps(runs: list[FinishedRun], tmp_path
 
 
 def test_a_study_takes_archived_runs_for_runs(
-    study: Path, small: dict[str, object], tmp_path: Path
+    finished_study: Path, small: dict[str, object], tmp_path: Path
 ) -> None:
-    methods, situations, seeds = ("td-inner", "td-uniform"), ("mixed",), (0, 1)
-    source = plan(methods, situations, seeds, "quick", study, small)
-    write_archive(finished_runs(scan_runs(source, study)), tmp_path / FILE)
-    planned = plan(methods, situations, seeds, "quick", tmp_path, small)
-    found = scan_runs(planned, tmp_path)
-    assert [one.state for one in found] == ["finished", "finished", "missing", "missing"]
-    assert [run.folder for run in finished_runs(found)] == [one.folder for one in planned[:2]]
-    (whole, *_) = scan_runs(planned, tmp_path, steps=True, archived=False)
-    assert (whole.state, whole.why) == ("unreadable", "archived, without metrics and steps")
-    other = plan(methods, situations, (0,), "quick", tmp_path, {**small, "td.polyak": 0.5})
-    assert scan_runs(other, tmp_path)[0].why == "td.polyak = 0.02, planned 0.5"
-    planned[0].folder.mkdir(parents=True)  # what lies in the study comes first
-    assert scan_runs(planned, tmp_path)[0].state == "unreadable"
+    methods = ("td-inner", "td-uniform")
+    pool = Path(shutil.copytree(finished_study, tmp_path / "source"))
+    source = read_results(begin_small("paper", pool, methods, 1, small)).runs
+    pool = tmp_path / "pool"
+    write_archive(source, pool / FILE)
+    study = begin_small("paper", pool, methods, 2, small)
+    assert list(study.states().values()) == ["done", "done", "planned", "planned"]
+    assert [run.seed for run in study.to_do] == [1, 1]
+    found = read_results(study)
+    assert [(run.case, run.folder.name) for run in found.runs] == [
+        (run.case, run.folder.name) for run in source
+    ]
+    assert [why for _, why in found.left_out] == ["missing", "missing"]
+    whole = read_results(study, steps=True, archived=False)
+    assert [why for _, why in whole.left_out] == [
+        *(["archived, without metrics and steps"] * 2),
+        *(["missing"] * 2),
+    ]
+    other = begin_small("paper", pool, methods, 1, {**small, "td.polyak": 0.5})
+    assert other.archived == {}
+    (study.runs / study.planned[0].key).mkdir(parents=True)  # what lies in the pool comes first
+    assert read_results(study).left_out[0][1].startswith("unreadable: ")
 
 
 def test_archived_runs_give_the_same_report(

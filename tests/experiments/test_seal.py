@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from small_study import run_in
 
 from innerattn.cli.main import main
 from innerattn.config import load_run_config
@@ -37,7 +38,7 @@ def unseal(run: Path) -> Path:
 
 @pytest.fixture
 def run(study: Path) -> Path:
-    return unseal(study / "runs" / "mixed-td-inner-quick-s0")
+    return unseal(run_in(study, "td-inner"))
 
 
 def test_a_sealed_run_is_checked_from_then_on(

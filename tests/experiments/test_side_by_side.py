@@ -197,7 +197,7 @@ def test_processes_and_threads(
     def note(runs: Sequence[Run], processes: int, **_: object) -> None:
         asked.append(([run.config for run in runs], [run.folder.name for run in runs], processes))
 
-    monkeypatch.setattr(command, "train_side_by_side", note)
+    monkeypatch.setattr(command, "run_side_by_side", note)
     monkeypatch.setattr(command, "usable_cores", lambda: 7)
     monkeypatch.chdir(tmp_path)
     assert main(["train", "--seeds", "0..8", *options]) == 0

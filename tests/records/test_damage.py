@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reseal import reseal
+from small_study import run_in
 
 from innerattn.errors import InnerattnError, RunError, UnsealedRunWarning
 from innerattn.experiments.plan import Case
@@ -28,7 +29,7 @@ FILES = (
 
 @pytest.fixture
 def run(study: Path) -> Path:
-    return study / "runs" / "mixed-td-inner-quick-s0"
+    return run_in(study, "td-inner")
 
 
 def read_all(run: Path) -> None:
@@ -93,7 +94,7 @@ def test_what_is_no_plain_file_of_this_run_is_refused(run: Path, name: str, chan
             pytest.skip("this system has no such files")
         os.mkfifo(path)
     elif change == "of another run":
-        other = run.with_name("mixed-td-uniform-quick-s0") / name
+        other = run_in(run.parents[1], "td-uniform") / name
         shutil.copy(other, path)
         if path.read_bytes() == away.read_bytes():  # both end at the same step
             return
@@ -192,7 +193,7 @@ def test_numbers_that_cannot_be_are_refused_though_nothing_is_sealed(run: Path, 
 
 def test_weights_of_another_run_are_refused_though_they_are_sealed(run: Path) -> None:
     weights = "checkpoints/96/weights.safetensors"
-    other = run.with_name("mixed-td-uniform-quick-s0")
+    other = run_in(run.parents[1], "td-uniform")
     shutil.copy(other / weights, run / weights)
     reseal(run)
     with pytest.raises(RunError, match=r"weights\.safetensors: is not of this run"):

@@ -1,30 +1,67 @@
-"""What tests of `innerattn reproduce` look at in a study of small runs."""
+"""Shipped studies of runs that take a second each."""
 
-import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from innerattn.train.weights import read_weights
+from innerattn.report.targets import TARGETS
+from innerattn.studies.folder import StudyFolder, begin_study_in
+from innerattn.studies.plan import PlannedRun, plan_study
+from innerattn.studies.shipped import as_file, narrowed, shipped_table
+from innerattn.studies.study import study_in
 
 Command = Callable[..., int]
-"""The command with small runs, as the fixture ``command`` has it."""
-NAMES = ("mixed-td-inner-quick-s0", "mixed-td-uniform-quick-s0")
-"""Folders of the runs of the fixture ``study``."""
+"""`innerattn reproduce` with small runs, as the fixture ``command`` has it."""
 
 
-def account(out: Path) -> dict[str, Any]:
-    document: dict[str, Any] = json.loads((out / "runs.json").read_text())
-    return document
+def with_values(table: Mapping[str, Any], values: Mapping[str, object]) -> dict[str, Any]:
+    """A study all of whose runs have some values by dotted key."""
+    grids = []
+    for grid in table["grid"]:
+        sections: dict[str, dict[str, object]] = {}
+        for key, value in values.items():
+            section, name = key.split(".")
+            sections.setdefault(section, dict(grid.get(section, {})))[name] = [value]
+        grids.append({**grid, **sections})
+    return {**table, "grid": grids}
 
 
-def states(out: Path) -> list[str]:
-    return [run["state"] for run in account(out)["runs"]]
+def planned_of(
+    target: str,
+    methods: Sequence[str] | None = None,
+    scenarios: Sequence[str] | None = None,
+    seeds: int = 1,
+    budget: str = "short",
+    values: Mapping[str, object] | None = None,
+) -> list[PlannedRun]:
+    """The runs of `innerattn reproduce` with these options."""
+    found = TARGETS[target]
+    table = narrowed(
+        found.table,
+        methods=methods or found.methods,
+        scenarios=scenarios or found.situations,
+        budget=budget,
+        seeds=seeds,
+    )
+    data = as_file(with_values(table, values or {}))
+    return plan_study(study_in(data, f"{target}.toml"), Path)
 
 
-def weights(folder: Path) -> dict[str, bytes]:
-    tensors = read_weights(folder / "checkpoints" / "96" / "weights.safetensors")
-    return {name: tensor.numpy().tobytes() for name, tensor in tensors.items()}
+def begin_small(
+    name: str, pool: Path, methods: Sequence[str], seeds: int, values: Mapping[str, object]
+) -> StudyFolder:
+    """A shipped study of budget quick in mixed, in a folder of its own in the pool."""
+    table = narrowed(
+        shipped_table(name), methods=methods, scenarios=("mixed",), budget="quick", seeds=seeds
+    )
+    data = as_file(with_values(table, values))
+    return begin_study_in(data, Path(f"{name}.toml"), pool / "begun", pool=pool)
+
+
+def run_in(pool: Path, method: str) -> Path:
+    """The folder of the only run of a method in a pool."""
+    (folder,) = (pool / "runs").glob(f"mixed-{method}-*")
+    return folder
 
 
 def times(folder: Path) -> dict[Path, int]:

@@ -1,4 +1,4 @@
-"""On a file system without locks, trainings and studies go on, and say so."""
+"""On a file system without locks, trainings go on, and say so."""
 
 import errno
 import fcntl
@@ -11,7 +11,6 @@ import pytest
 from innerattn.config import RunConfig
 from innerattn.config.files import sync_folder
 from innerattn.errors import RunError
-from innerattn.experiments.lock import StudyLock
 from innerattn.records.run_folder import read_info
 from innerattn.train import Progress, resume, train
 from innerattn.train.run_lock import only_training_in
@@ -44,12 +43,6 @@ def test_a_training_begins_stops_and_goes_on(
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
 
-@pytest.mark.usefixtures("no_locks")
-def test_a_study_begins(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    with StudyLock.take(tmp_path / "study"):
-        assert "its file system has no locks" in caplog.text
-
-
 def test_other_errors_of_a_lock_are_not_taken_for_that(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -57,8 +50,6 @@ def test_other_errors_of_a_lock_are_not_taken_for_that(
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
     monkeypatch.setattr(fcntl, "flock", fail)
-    with pytest.raises(RunError, match=r"study: cannot be locked \(Input/output error\)"):
-        StudyLock.take(tmp_path / "study")
     with pytest.raises(RunError, match=r"cannot be locked"), only_training_in(tmp_path):
         pass
 

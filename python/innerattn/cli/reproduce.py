@@ -1,34 +1,30 @@
-"""`innerattn reproduce`: train the runs that a table or figure needs, then write it."""
+"""`innerattn reproduce`: a shipped study, trained where runs are missing, then reported."""
 
 from __future__ import annotations
 
 import sys
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
 
 from innerattn.cli.options import LongCommand, UsageError, check_target
-from innerattn.cli.progress import SeveralMeasurements, SeveralRuns
+from innerattn.cli.progress import SeveralMeasurements
+from innerattn.cli.study import do_runs, print_means, say_report, say_written
 from innerattn.config import BUDGETS
 from innerattn.config.files import write_whole
 from innerattn.config.near import did_you_mean
-from innerattn.experiments.plan import SITUATIONS, PlannedRun, on_device
+from innerattn.experiments.plan import SITUATIONS
 from innerattn.experiments.smoke import smoke_note
-from innerattn.report.tables.experiments import print_scores
-from innerattn.report.targets import TARGETS, Target
+from innerattn.report.targets import TARGETS, Report, Target, write_special
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from innerattn.experiments.lock import StudyLock
     from innerattn.experiments.processes import Job
     from innerattn.experiments.run import FinishedRun
-    from innerattn.experiments.scan import RunStatus
+    from innerattn.studies.folder import StudyFolder
+    from innerattn.studies.results import Results
 
     TargetName: TypeAlias = str
     Budget: TypeAlias = str
@@ -52,7 +48,8 @@ class Reproduce(LongCommand):
     seeds: int = 5
     """How many seeds: 0, 1, ... up to one less."""
     out: Path | None = None
-    """Folder of the study, its runs in runs; None: studies/BUDGET or studies/crossed-BUDGET."""
+    """Folder of the runs, which targets share, and of the report in TARGET; None: studies/BUDGET or
+    studies/crossed-BUDGET."""
     methods: str = "all"
     """Methods, separated by commas; all: what the target needs."""
     presets: Annotated[str, tyro.conf.arg(aliases=["--situations"])] = "all"
@@ -71,76 +68,113 @@ class Reproduce(LongCommand):
             The exit code: 0, or 1 where a run failed or is left out.
 
         Raises:
-            InnerattnError: wrong options, matplotlib is needed and not installed, or another study
-                is at work in the same folder.
+            InnerattnError: wrong options, or matplotlib is needed and not installed.
             OSError: a file cannot be written.
-            KeyboardInterrupt: the user stopped it; finished runs are kept.
+            KeyboardInterrupt: the user stopped it; runs are saved.
         """
-        target = TARGETS[self.target]
-        out = self.out or Path("studies") / f"{target.study}{self.budget}"
-        planned = self._planned(target, out)
-
-        from innerattn.experiments.account import write_account
-        from innerattn.experiments.lock import StudyLock
-        from innerattn.experiments.scan import finished_runs, scan_runs
-        from innerattn.experiments.score_means import method_scores
-        from innerattn.report.left_out import left_out
         from innerattn.report.plots.drawing import check_format
+        from innerattn.studies.results import read_results
 
-        page = self.page is not None
-        scan = partial(
-            scan_runs,
-            planned,
-            out,
-            steps=target.steps or page,
-            archived=target.archived and not page,
-        )
-        self._check_page(planned)  # before hours of training, not after
+        target = TARGETS[self.target]
         if target.draws:
-            check_format(out / "figure.png")
+            check_format(Path("figure.png"))
+        study = self._begun(target)
+        self._check_page(study)  # before hours of training, not after
+        if not self.report_only:
+            do_runs(self, study)
+        page = self.page is not None
+        results = read_results(
+            study, steps=target.steps or page, archived=target.archived and not page
+        )
+        runs = results.runs
+        if target.report is None:
+            code = self._report(study, results)
+        else:
+            code = self._special(target, target.report(), study, results)
+        note = smoke_note(self.budget)
+        say_written(self.console(), self._write_page(runs, [note] if note else []))
+        return int(code or bool(results.left_out))
+
+    def _begun(self, target: Target) -> StudyFolder:
+        from innerattn.studies.folder import begin_study_in
+        from innerattn.studies.shipped import as_file, narrowed
+
+        methods, presets = target.methods, target.situations
+        if self.methods != "all":
+            methods = _chosen("methods", self.methods, target.known)
+        if self.presets != "all":
+            presets = _chosen("presets", self.presets, (*target.situations, *SITUATIONS))
+        if not 1 <= self.seeds <= _MOST_SEEDS:
+            raise UsageError(f"--seeds = {self.seeds}: must be 1 to {_MOST_SEEDS:,}")
+        table = narrowed(
+            target.table,
+            methods=methods,
+            scenarios=presets,
+            budget=self.budget,
+            seeds=self.seeds,
+            device=self.device,
+        )
+        pool = self.out or Path("studies") / f"{target.pool}{self.budget}"
+        out = pool / target.name
+        return begin_study_in(as_file(table), Path(f"{target.name}.toml"), out, pool=pool)
+
+    def _report(self, study: StudyFolder, results: Results) -> int:
+        from innerattn.report.study.write import write_study
+
+        return say_report(self, *write_study(study, results))
+
+    def _special(self, target: Target, report: Report, study: StudyFolder, results: Results) -> int:
+        """Write a report of the target's own, and print what its runs scored."""
+        from innerattn.report.study.page import left_out
+
+        jobs = self._measured(target, study, results)
+        reasons = left_out(results)
+        reasons += [f"{job}: {job.failure or 'not measured'}" for job in jobs]
+        files = write_special(report, results.runs, study.path, self.budget, reasons)
         console = self.console()
-        with StudyLock.take(out) as lock:
-            found = scan()
-            self._print_plan(console, found, out)
-            try:
-                if not self.report_only:
-                    self._train(found, out, lock)
-                    found = scan()
-                jobs = self._measure(target, found, out, lock)
-            except KeyboardInterrupt:
-                found = scan()
-                write_account(out, self.target, self.budget, found)
-                _say_what_is_kept(found)
-                raise
-            write_account(out, self.target, self.budget, found)
-            note = smoke_note(self.budget)
-            reasons = left_out(found)
-            reasons += [f"{job}: {job.failure or 'not measured'}" for job in jobs]
-            outputs = target.write(finished_runs(found), out, self.budget, reasons)
-            account = write_account(out, self.target, self.budget, found, outputs)
-        outputs += self._write_page(finished_runs(found), [*([note] if note else []), *reasons])
-        print_scores(console, method_scores(found))
+        print_means(console, results)
         if reasons:
             console.print("Runs that are not in it", style="bold")
         for reason in reasons:
-            console.print(f"  {reason}", soft_wrap=True)
-        for path in (*outputs, account):
-            console.print(f"Written: {path}", soft_wrap=True)
+            console.print(f"  {reason}", soft_wrap=True, markup=False)
+        say_written(console, files)
+        note = smoke_note(self.budget)
         if note:
             console.print(note[:1].upper() + note[1:], style="bold")
-        finished = sum(one.state == "finished" for one in found)
-        runs = f"{finished} of {_count(len(found), 'run')} finished"
-        self.say_result(f"{self.target}: {runs}; written: {(*outputs, account)[0]}")
+        done = len({one.run.key for one in results.finished})
+        self.say_result(f"{self.target}: {done} of {len(study.keys)} runs done")
         return int(bool(reasons))
 
-    def _check_page(self, planned: Sequence[PlannedRun]) -> None:
+    def _measured(self, target: Target, study: StudyFolder, results: Results) -> list[Job]:
+        """Do what is to be done with finished runs, unless only a report is asked for.
+
+        Returns:
+            What is not done.
+        """
+        from innerattn.experiments.processes import places, run_side_by_side
+
+        if target.jobs is None:
+            return []
+        jobs = target.jobs([run.case for run in study.planned], results.runs, study.path)
+        if jobs and not self.report_only:
+            with SeveralMeasurements(self.progress_console()) as progress:
+                run_side_by_side(
+                    jobs,
+                    places(len(jobs)),
+                    changed=progress,
+                    failed=lambda job: _say(f"error: {job}: {job.failure}"),
+                    debug=self.debug,
+                )
+        return [job for job in jobs if job.state != "done"]
+
+    def _check_page(self, study: StudyFolder) -> None:
         """Refuse a page that could not be written after all."""
         if self.page is None:
             return
         if self.page.suffix != ".html":
             raise UsageError(f"--page {self.page}: must end in .html")
-        cases = {(run.case.situation, run.case.method, run.case.seed) for run in planned}
-        if len(cases) < len(planned):
+        cases = {(run.case.situation, run.case.method, run.case.seed) for run in study.planned}
+        if len(cases) < len(study.planned):
             raise UsageError(f"--page: runs of {self.target} differ by more than a page tells")
         check_target(self.page)
 
@@ -152,99 +186,18 @@ class Reproduce(LongCommand):
         write_whole(self.page, runs_page(runs, notes=notes).encode())
         return [self.page]
 
-    def _planned(self, target: Target, out: Path) -> list[PlannedRun]:
-        methods = target.methods
-        if self.methods != "all":
-            methods = _chosen("methods", self.methods, (*target.methods, *target.further))
-        presets = target.situations
-        if self.presets != "all":
-            known = tuple(dict.fromkeys((*target.situations, *SITUATIONS)))
-            presets = _chosen("presets", self.presets, known)
-        if not 1 <= self.seeds <= _MOST_SEEDS:
-            raise UsageError(f"--seeds = {self.seeds}: must be 1 to {_MOST_SEEDS:,}")
-        planned = target.plan(methods, presets, range(self.seeds), self.budget, out)
-        return on_device(planned, self.device)
-
-    def _print_plan(self, console: Console, found: Sequence[RunStatus], out: Path) -> None:
-        from innerattn.experiments.processes import places
-        from innerattn.experiments.train import to_measure, to_train
-
-        states = Counter(one.state for one in found)
-        train, measure = len(to_train(found)), len(to_measure(found))
-        count = train + measure
-        unused = len(found) - count - states["finished"]
-        line = f"{self.target}, budget {self.budget}: {_count(len(found), 'run')} of "
-        line += f"{_count(self.seeds, 'seed')}; "
-        line += f"{states['finished']} finished, "
-        if self.report_only:
-            line += f"{count} not"
-        else:
-            line += f"{train} to train" + (f", {measure} to measure only" if measure else "")
-            line += f", {places(count)} at a time" if count else ""
-        line += f"; {unused} left out" if unused else ""
-        console.print(line, soft_wrap=True)
-        note = smoke_note(self.budget)
-        if note:
-            console.print(note[:1].upper() + note[1:], style="bold")
-        console.print(f"Study folder: {out}", soft_wrap=True)
-        for one in found:
-            if one.state in ("other_configuration", "unreadable"):
-                text = f"left out: {one.planned.folder}: {one.reason}"
-                _say(f"{text} (move it away to have it trained)")
-
-    def _train(self, found: Sequence[RunStatus], out: Path, lock: StudyLock) -> None:
-        from innerattn.experiments.train import train_missing
-
-        with SeveralRuns(self.progress_console()) as progress:
-            train_missing(found, out, lock, changed=progress, failed=_say_why, debug=self.debug)
-
-    def _measure(
-        self, target: Target, found: Sequence[RunStatus], out: Path, lock: StudyLock
-    ) -> list[Job]:
-        """Do what is to be done with finished runs, unless only a report is asked for.
-
-        Returns:
-            What is not done.
-        """
-        from innerattn.experiments.processes import places, run_side_by_side
-
-        jobs = target.jobs(found, out) if target.jobs else ()
-        if jobs and not self.report_only:
-            with SeveralMeasurements(self.progress_console()) as progress:
-                run_side_by_side(
-                    jobs,
-                    places(len(jobs)),
-                    changed=progress,
-                    failed=lambda job: _say(f"error: {job}: {job.failure}"),
-                    debug=self.debug,
-                    keep=lock,
-                )
-        return [job for job in jobs if job.state != "done"]
-
 
 def _chosen(option: str, text: str, known: Sequence[str]) -> tuple[str, ...]:
     """The names that ``text`` lists, in the order of ``known``."""
+    known = tuple(dict.fromkeys(known))
     names = {name.strip() for name in text.split(",")}
     if names == {"all"}:
-        return tuple(known)
+        return known
     unknown = sorted(names - set(known))
     if unknown:
         near = did_you_mean(unknown[0], known)
         raise UsageError(f"--{option} = {unknown[0]!r}: must be all or of {', '.join(known)}{near}")
     return tuple(name for name in known if name in names)
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
-
-
-def _say_why(planned: PlannedRun, reason: str) -> None:
-    _say(f"error: {planned.case}: {reason}")
-
-
-def _say_what_is_kept(found: Sequence[RunStatus]) -> None:
-    done = sum(one.state == "finished" for one in found)
-    _say(f"{done} of {len(found)} runs are finished and kept; the same command goes on with them")
 
 
 def _say(text: str) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -16,12 +15,14 @@ import tyro
 
 from innerattn.cli.options import LongCommand, UsageError
 from innerattn.cli.progress import Work
-from innerattn.config.files import write_whole
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
+    from innerattn.report.study.page import Found
     from innerattn.studies.folder import StudyFolder
     from innerattn.studies.ledger import State
-    from innerattn.studies.study import Length
+    from innerattn.studies.results import Results
     from innerattn.studies.work import Outcome
 
 _TIME = re.compile(r"([0-9]{1,6})([smh])")
@@ -72,38 +73,12 @@ class Study(LongCommand):
         return getattr(self, f"_{self.action}")()  # type: ignore[no-any-return]
 
     def _run(self) -> int:
-        from innerattn.experiments.processes import places
-        from innerattn.studies.launch.local import run_workers
-        from innerattn.studies.launch.ray import run_workers_on_ray
-
         if not 0.0 <= self.gpus <= 64.0:
             raise UsageError(f"--gpus = {self.gpus:g}: must be 0 to 64")
         if self.workers is not None and not 1 <= self.workers <= 256:
             raise UsageError(f"--workers = {self.workers}: must be 1 to 256")
         study = self._begun()
-        ledger, keys = study.ledger(), [run.key for run in study.planned]
-        over = Counter(ledger.states(keys).values())
-        left = len(keys) - over["done"] - over["failed"]
-        workers = self.workers or places(left)
-        by = f" by {workers} workers" if self.ray is None else f" by workers on Ray, {self.ray}"
-        console = self.console()
-        console.print(
-            f"{study.path}: {len(keys)} runs, {over['done']} done, {over['failed']} failed, "
-            f"{left} to do" + (by if left else ""),
-            soft_wrap=True,
-        )
-        if left:
-            with _Progress(self.progress_console()) as progress:
-
-                def now_left() -> int:
-                    return progress(ledger.states(keys))
-
-                if self.ray is None:
-                    run_workers(study.path, workers, left=now_left)
-                else:
-                    run_workers_on_ray(
-                        study.path, self.workers, self.ray, gpus=self.gpus, left=now_left
-                    )
+        do_runs(self, study, workers=self.workers, ray=self.ray, gpus=self.gpus)
         return self._report(study)
 
     def _work(self) -> int:
@@ -118,7 +93,7 @@ class Study(LongCommand):
                 print(f"innerattn: error: {outcome.run}: {outcome.reason}", file=sys.stderr)
             console.print(f"{outcome.run}: {outcome.state}", soft_wrap=True)
 
-        work(study.ledger(), study.planned, until=until, ended=ended)
+        work(study.ledger(), study.to_do, until=until, ended=ended)
         return 0
 
     def _status(self) -> int:
@@ -128,13 +103,13 @@ class Study(LongCommand):
         from innerattn.studies.results import means, read_summaries
 
         study = self._opened()
-        states = study.ledger().states(run.key for run in study.planned)
+        states = study.states()
         counts = Counter(states.values())
         names: tuple[State, ...] = ("done", "claimed", "planned", "failed")
         words = {"claimed": "running", "planned": "waiting"}
         told = ", ".join(f"{counts[name]} {words.get(name, name)}" for name in names)
         print(f"{study.path}: {len(states)} runs: {told}")
-        found = duration_of(study.path, states)
+        found = duration_of(study.pool, states)
         if found is not None and found.left_s:
             workers = "one worker" if found.workers < 2 else f"{found.workers} workers"
             print(
@@ -151,51 +126,12 @@ class Study(LongCommand):
         return int(counts["failed"] > 0)
 
     def _report(self, study: StudyFolder | None = None) -> int:
-        from innerattn.report.study.exports import marl_eval_document, rliable_document
-        from innerattn.report.study.page import (
-            algorithm_names,
-            means_table,
-            sentences,
-            study_document,
-            study_page,
-        )
-        from innerattn.report.table import print_table
-        from innerattn.studies.aggregates import aggregate
-        from innerattn.studies.results import compare, means, read_results
+        from innerattn.report.study.write import write_study
+        from innerattn.studies.results import read_results
 
         study = study or self._opened()
-        ledger = study.ledger()
-        states = ledger.states(run.key for run in study.planned)
-        results = read_results(study.runs, study.planned)
-        found, compared = means(results), compare(study.study, study.planned, results)
-        failures = {
-            key: ledger.failures(key)[-1].strip().splitlines()[-1]
-            for key, state in states.items()
-            if state == "failed"
-        }
-        lengths: tuple[Length, ...] = ("standard", "long")
-        aggregates = {length: algorithm_names(aggregate(results, length)) for length in lengths}
-        page = study_page(study, states, found, compared, failures, aggregates)
-        documents = {
-            "report.json": study_document(study, states, found, compared, aggregates),
-            "scores.json": rliable_document(aggregates["standard"]),
-            "marl_eval.json": marl_eval_document(aggregates["standard"], results, study.runs),
-        }
-        write_whole(study.path / "report.md", page.encode())
-        for name, document in documents.items():
-            text = json.dumps(document, allow_nan=False)
-            write_whole(study.path / name, f"{text}\n".encode())
-        console = self.console()
-        if found:
-            print_table(console, means_table(found))
-        for text in sentences(compared):
-            console.print(text.replace("**", ""), soft_wrap=True)
-        self._print_failures(study, states)
-        written = f"Written: {study.path / 'report.md'}, {', '.join(documents)}"
-        console.print(written, soft_wrap=True)
-        done = sum(state == "done" for state in states.values())
-        self.say_result(f"{study.path}: {done} of {len(states)} runs done")
-        return int("failed" in states.values())
+        found, files = write_study(study, read_results(study))
+        return say_report(self, found, files)
 
     def _slurm(self) -> int:
         from innerattn.studies.launch.slurm import slurm_script
@@ -228,11 +164,104 @@ class Study(LongCommand):
         return self.out or Path("studies") / self.study.stem
 
     def _print_failures(self, study: StudyFolder, states: Mapping[str, State]) -> None:
+        from innerattn.studies.results import last_line
+
         ledger = study.ledger()
-        for run in study.planned:
+        for run in study.to_do:
             if states[run.key] == "failed":
-                reason = ledger.failures(run.key)[-1].strip().splitlines()[-1]
+                reason = last_line(ledger.failures(run.key)[-1])
                 print(f"innerattn: failed: {run}: {reason}", file=sys.stderr)
+
+
+def do_runs(
+    command: LongCommand,
+    study: StudyFolder,
+    *,
+    workers: int | None = None,
+    ray: str | None = None,
+    gpus: float = 0.0,
+) -> None:
+    """Do what is left of a study, and show how far it is; see `innerattn study run`.
+
+    Raises:
+        InnerattnError: the first run cannot be trained here, or workers cannot run.
+        OSError: a file cannot be read or written.
+        KeyboardInterrupt: the user stopped it; every worker has saved its run.
+    """
+    from innerattn.experiments.processes import places
+    from innerattn.experiments.side_by_side import Run, refuse_what_cannot_run
+    from innerattn.studies.launch.local import run_workers
+    from innerattn.studies.launch.ray import run_workers_on_ray
+
+    over = Counter(study.states().values())
+    left = len(study.keys) - over["done"] - over["failed"]
+    count = workers or places(left)
+    by = f" by {count} worker{'s' * (count > 1)}" if ray is None else f" by workers on Ray, {ray}"
+    command.console().print(
+        f"{study.path}: {len(study.keys)} run{'s' * (len(study.keys) != 1)}, {over['done']} done, "
+        f"{over['failed']} failed, {left} to do" + (by if left else ""),
+        soft_wrap=True,
+    )
+    if not left:
+        return
+    if ray is None:
+        refuse_what_cannot_run([Run(study.to_do[0].config, study.pool / "none")])
+    with _Progress(command.progress_console()) as progress:
+
+        def now_left() -> int:
+            return progress(study.states())
+
+        if ray is None:
+            run_workers(study.path, count, left=now_left)
+        else:
+            run_workers_on_ray(study.path, workers, ray, gpus=gpus, left=now_left)
+
+
+def say_report(command: LongCommand, found: Found, files: Sequence[Path]) -> int:
+    """Print what the report of a study says.
+
+    Returns:
+        The exit code: 0, or 1 where a run has failed or cannot be read.
+    """
+    from innerattn.report.study.page import left_out, means_table, sentences
+    from innerattn.report.table import print_table
+
+    console = command.console()
+    for _, rows in found.tables.values():
+        if rows:
+            print_table(console, means_table(rows), dense=True)
+    for text in sentences(found.compared):
+        console.print(text.replace("**", ""), soft_wrap=True)
+    reasons = [reason for _, reason in found.results.left_out]
+    if reasons:
+        console.print("Runs that are not in it", style="bold")
+    for text in left_out(found.results):
+        console.print(f"  {text}", soft_wrap=True, markup=False)
+    console.print(
+        f"Written: {files[0]}, {', '.join(one.name for one in files[1:])}", soft_wrap=True
+    )
+    if found.note:
+        console.print(found.note[:1].upper() + found.note[1:], style="bold")
+    done = sum(state == "done" for state in found.states.values())
+    command.say_result(f"{found.study.path}: {done} of {len(found.states)} runs done")
+    return int(any(one.startswith(("failed", "unreadable")) for one in reasons))
+
+
+def print_means(console: Console, results: Results) -> None:
+    """Print rescues and scores of finished runs, means over seeds."""
+    from innerattn.report.study.page import means_table
+    from innerattn.report.table import print_table
+    from innerattn.studies.results import means
+
+    if results.finished:
+        print_table(console, means_table(means(results.finished)), dense=True)
+
+
+def say_written(console: Console, files: Sequence[Path]) -> None:
+    """Name the files of one folder."""
+    if files:
+        others = "".join(f", {one.name}" for one in files[1:])
+        console.print(f"Written: {files[0]}{others}", soft_wrap=True)
 
 
 class _Progress(Work):

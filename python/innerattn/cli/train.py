@@ -25,11 +25,11 @@ from innerattn.config.registry import methods
 from innerattn.config.sections import WarmStart
 from innerattn.cores import usable_cores
 from innerattn.errors import ConfigError, RunError
+from innerattn.experiments.processes import run_side_by_side
 from innerattn.experiments.side_by_side import (
     Run,
     refuse_what_cannot_run,
     say_not_logged,
-    train_side_by_side,
 )
 from innerattn.loggers import LOGGERS, Opened, RunLoggers
 from innerattn.records.logged import METRICS, logged_lines, logged_rescues, still_rises
@@ -251,9 +251,7 @@ class _Train(_Sources):
         console.print(f"Run folders: {runs[0].folder} to {runs[-1].folder}", soft_wrap=True)
         try:
             with SeveralRuns(self.progress_console()) as progress:
-                train_side_by_side(
-                    runs, at_once, changed=progress, failed=_say_why, debug=self.debug
-                )
+                run_side_by_side(runs, at_once, changed=progress, failed=_say_why, debug=self.debug)
         except KeyboardInterrupt:
             _say_what_is_kept([run.folder for run in runs])
             raise

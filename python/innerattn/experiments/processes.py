@@ -81,7 +81,6 @@ def run_side_by_side(
     changed: Callable[[Sequence[AnyJob]], None],
     failed: Callable[[AnyJob], None],
     debug: bool = False,
-    keep: object = None,
 ) -> None:
     """Do every job in a process of its own; a failure leaves the others alone.
 
@@ -91,7 +90,6 @@ def run_side_by_side(
         changed: called with all jobs when one of them is further.
         failed: called with each job that failed.
         debug: let a process that fails show where.
-        keep: handed to every process, which keeps it until its end.
 
     Raises:
         KeyboardInterrupt: after every process has ended its job and is gone; a second one ends
@@ -104,7 +102,7 @@ def run_side_by_side(
     try:
         while waiting or running:
             while waiting and len(running) < at_once:
-                _start(waiting.popleft(), running, debug, keep)
+                _start(waiting.popleft(), running, debug)
             for pipe in connection.wait(list(running)):
                 pipe = cast(Connection, pipe)
                 job, process = running[pipe]
@@ -124,7 +122,6 @@ def _start(
     job: AnyJob,
     running: dict[Connection, tuple[AnyJob, BaseProcess]],
     debug: bool,
-    keep: object,
 ) -> None:
     """Start a process that Ctrl-C does not reach: what a terminal sends, it sends to all."""
     before = set()
@@ -132,7 +129,7 @@ def _start(
         before = signal.pthread_sigmask(signal.SIG_BLOCK, _FOR_THE_FIRST)
     try:
         pipe, its_end = _SPAWN.Pipe()
-        process = _SPAWN.Process(target=work, args=(job, its_end, debug, keep), daemon=True)
+        process = _SPAWN.Process(target=work, args=(job, its_end, debug), daemon=True)
         process.start()
         its_end.close()
         job.state = "running"
@@ -174,7 +171,7 @@ def _stop(processes: Sequence[BaseProcess], pipes: Sequence[Connection]) -> None
         raise
 
 
-def work(job: Job, pipe: Connection, debug: bool, keep: object = None) -> None:
+def work(job: Job, pipe: Connection, debug: bool) -> None:
     """What the process of a job does.
 
     Args:
@@ -182,9 +179,7 @@ def work(job: Job, pipe: Connection, debug: bool, keep: object = None) -> None:
         pipe: takes pairs of a state and its value: the share of a running job, the result of one
             that is done, the reason of a failure; its end ends the job.
         debug: let an error that is told through the pipe be seen too.
-        keep: what comes with the process and lasts as long by itself, such as a lock.
     """
-    del keep  # it lasts without this name
     if not _CAN_BLOCK:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:

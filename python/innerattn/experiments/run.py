@@ -248,9 +248,11 @@ def refuse_without_steps(runs: Sequence[FinishedRun]) -> None:
 
 
 def named_from(folder: Path, base: Path) -> str:
-    """How a report in ``base`` names a run folder: from there, where it lies within."""
-    within = folder.is_relative_to(base)
-    return (folder.relative_to(base) if within else folder).as_posix()
+    """How a report in ``base`` names a run folder: from there, or from its pool, where it lies."""
+    if folder.is_relative_to(base):
+        return folder.relative_to(base).as_posix()
+    pooled = folder.parent == base.parent / "runs"
+    return f"runs/{folder.name}" if pooled else folder.as_posix()
 
 
 def check_summary(path: Path, found: dict[str, Any], config: RunConfig) -> dict[str, Any]:

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from innerattn.experiments.run import FinishedRun, Scores
-from innerattn.experiments.scan import RunStatus
 from innerattn.measures.summary import Summary
 from innerattn.stats import Estimate
 from innerattn.stats.seeds import seed_estimate
@@ -45,25 +44,6 @@ class SeedScores:
     mean: tuple[MeanScores, MeanScores]
 
 
-@dataclass(frozen=True)
-class MethodScores:
-    """Runs of one situation and method in a study.
-
-    Attributes:
-        situation: of the worlds.
-        method: how it was trained.
-        planned: number of runs.
-        used: number of finished runs, over which the means are.
-        mean: at both lengths; None where no run is finished.
-    """
-
-    situation: str
-    method: str
-    planned: int
-    used: int
-    mean: tuple[MeanScores, MeanScores] | None
-
-
 def seed_scores(summaries: Mapping[int, Summary | None]) -> SeedScores | None:
     """Scores by seed, and their mean; None where every run failed.
 
@@ -81,25 +61,6 @@ def seed_scores(summaries: Mapping[int, Summary | None]) -> SeedScores | None:
 def scores_over_runs(runs: Sequence[FinishedRun]) -> tuple[MeanScores, MeanScores]:
     """Means over finished runs, at least one, at both lengths of episodes."""
     return _means([run.scores() for run in runs])
-
-
-def method_scores(found: Sequence[RunStatus]) -> list[MethodScores]:
-    """Means of every situation and method of a study, in the order in which they are planned.
-
-    Args:
-        found: what is there of each planned run; only finished runs count.
-    """
-    groups: dict[tuple[str, str], list[TwoLengths | None]] = {}
-    for one in found:
-        case = one.planned.case
-        scores = one.run.scores() if one.run else None
-        groups.setdefault((case.situation, case.trained), []).append(scores)
-    listed = []
-    for (situation, method), runs in groups.items():
-        used = [two for two in runs if two is not None]
-        mean = _means(used) if used else None
-        listed.append(MethodScores(situation, method, len(runs), len(used), mean))
-    return listed
 
 
 def _scores(summary: Summary) -> TwoLengths:

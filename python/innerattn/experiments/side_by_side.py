@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from innerattn.config import RunConfig
-from innerattn.experiments.processes import Job, run_side_by_side
+from innerattn.experiments.processes import Job
 
 if TYPE_CHECKING:
     from innerattn.evaluate import Summary
@@ -104,24 +104,6 @@ def refuse_what_cannot_run(runs: Sequence[Run]) -> None:
     config = runs[0].config
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         build_learner(config, env)
-
-
-def train_side_by_side(
-    runs: Sequence[Run],
-    at_once: int,
-    *,
-    changed: Callable[[Sequence[Run]], None],
-    failed: Callable[[Run], None],
-    debug: bool = False,
-    keep: object = None,
-) -> None:
-    """Train and evaluate every run; see `run_side_by_side`.
-
-    Raises:
-        KeyboardInterrupt: after every process has saved what it learnt and is gone; a second one
-            ends them at once.
-    """
-    run_side_by_side(runs, at_once, changed=changed, failed=failed, debug=debug, keep=keep)
 
 
 def say_not_logged(problem: str) -> None:

@@ -40,14 +40,15 @@ class ReportFolder:
         self.path = path
         self.budget = budget
 
-    def json(self, name: str, document: Mapping[str, Any]) -> None:
-        """Write a document of plain values."""
-        noted = {"note": smoke_note(self.budget), **document}
+    def json(self, name: str, document: Mapping[str, Any], *, note: bool = True) -> None:
+        """Write a document of plain values; ``note``: it may have one more, of smoke runs."""
+        noted = {**({"note": smoke_note(self.budget)} if note else {}), **document}
         write_whole(self.path / name, f"{json.dumps(noted, allow_nan=False)}\n".encode())
 
-    def markdown(self, name: str, text: str) -> None:
-        """Write a page."""
-        write_whole(self.path / name, noted_markdown(text, self.budget).encode())
+    def markdown(self, name: str, text: str, *, note: bool = True) -> None:
+        """Write a page, with a note of smoke runs unless it has one."""
+        noted = noted_markdown(text, self.budget) if note else text
+        write_whole(self.path / name, noted.encode())
 
     def csv(self, name: str, text: str) -> None:
         """Write a table of values."""

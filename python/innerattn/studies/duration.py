@@ -34,7 +34,7 @@ def duration_of(folder: Path, states: Mapping[str, State]) -> Duration | None:
     """How long the runs of the study in a folder take; None before the first one is finished.
 
     Args:
-        folder: of the study.
+        folder: of the study's runs and claims.
         states: of its runs.
     """
     took = []

@@ -43,7 +43,7 @@ a = {{ variant = "kind" }}
 b = {{ variant = "own" }}
 # score, rescues_per_episode or a registered measure
 measure = "score"
-# length of the measured episodes: standard or long
+# length of the measured episodes: standard, long or both
 length = "standard"
 # differences that are smaller count as none
 margin = 0.03
@@ -51,6 +51,19 @@ margin = 0.03
 direction = "two-sided"
 # contrasts whose p-values are adjusted together (Holm)
 family = "all"
+
+# A table of means over seeds, with the value of each seed; without one: rescues and scores.
+#[[tables]]
+#title = "Scores"
+# which runs, by coordinates of the grid; none: all
+#of = {{ variant = "kind" }}
+# measures; ", long" behind one means episodes of the second length
+#measures = ["rescues_per_episode", "score", "score, long"]
+#seeds = true
+
+# A figure of rescues in training; it needs matplotlib.
+[[curves]]
+title = "Learning curves"
 """
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -14,9 +14,9 @@ from typing import Any
 from innerattn.config import SCENARIOS, RunConfig, load_run_config
 from innerattn.config.run import digest_of
 from innerattn.errors import ConfigError
-from innerattn.experiments.plan import of_seed
+from innerattn.experiments.plan import Case, of_seed
 from innerattn.measures.registry import MEASURES
-from innerattn.studies.study import Study, StudyContrast, Value
+from innerattn.studies.study import Grid, Study, StudyContrast, Value, coordinates
 
 MEASURES_OF_ALL = ("score", "rescues_per_episode")
 """What every evaluation holds beside the registered measures."""
@@ -30,10 +30,10 @@ class PlannedRun:
 
     Attributes:
         place: its coordinates in the grid but the seed: scenario, method, budget, variant if the
-            study has variants, and each key that the grid varies.
+            study has variants, and each key that has several values in the grid.
         seed: of training.
         config: what it is trained and measured with.
-        digest: of ``config``.
+        digest: of ``config``, by `run_digest`.
     """
 
     place: Mapping[str, Value]
@@ -49,9 +49,25 @@ class PlannedRun:
         name = re.sub(r"[^A-Za-z0-9_-]", "_", "-".join(words))
         return f"{name}-{self.digest[:16]}"
 
+    @property
+    def case(self) -> Case:
+        """What reports call it."""
+        names = (str(self.place.get(key, "")) for key in ("scenario", "method", "variant"))
+        scenario, method, variant = names
+        return Case(scenario, method, self.seed, variant)
+
     def __str__(self) -> str:
         words = [str(value) for key, value in self.place.items() if key != "budget"]
-        return f"{' '.join(words)}, seed {self.seed}"
+        return f"{' '.join(filter(None, words))}, seed {self.seed}"
+
+
+def run_digest(config: RunConfig) -> str:
+    """The digest that tells runs apart: of a configuration, but for the device of its training."""
+    return digest_of(_on_any_device(config.digest_values()))
+
+
+def _on_any_device(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {**values, "train": {**values["train"], "device": "cpu"}}
 
 
 def plan_study(study: Study, find: Callable[[str], Path]) -> list[PlannedRun]:
@@ -65,42 +81,69 @@ def plan_study(study: Study, find: Callable[[str], Path]) -> list[PlannedRun]:
         ConfigError: there are over 10,000 runs, a combination cannot be run, two are the same run,
             or a contrast names runs that are not in the grid.
     """
-    variants = {one.name: one.changes for one in study.variants} or {"": {}}
-    keys = study.grid.keys
-    for key in (*keys, *(key for changes in variants.values() for key in changes)):
+    changes = {one.name: one.changes for one in study.variants}
+    keys = [key for grid in study.grid for key in grid.keys]
+    for key in (*keys, *(key for given in changes.values() for key in given)):
         if key in _NAMED_BY_THE_GRID:
             raise ConfigError(f"{key}: is set by grid.{_NAMED_BY_THE_GRID[key]}")
-    for scenario in study.grid.scenarios:
+    scenarios = dict.fromkeys(name for grid in study.grid for name in grid.scenarios)
+    for scenario in scenarios:
         _refuse_unknown(scenario, find)
-    names = [Path(scenario).stem for scenario in study.grid.scenarios]
-    if len(set(names)) < len(names):
+    if len({Path(scenario).stem for scenario in scenarios}) < len(scenarios):
         raise ConfigError("grid.scenarios: two files have the same name; rename one")
-    grid, found = study.grid, list[_OfAllSeeds]()
-    axes: list[Sequence[Any]] = [grid.scenarios, grid.methods, grid.budgets, list(variants)]
-    axes += keys.values()
-    count = math.prod(map(len, axes)) * len(grid.numbers)
+    count = sum(math.prod(map(len, _axes(study, grid))) * len(grid.numbers) for grid in study.grid)
     if count > MOST_RUNS:
         raise ConfigError(f"grid: has {count:,} runs: must be at most {MOST_RUNS:,}")
-    for scenario, method, budget, variant, *values in product(*axes):
-        chosen = dict(zip(keys, values, strict=True))
+    found = [(grid, list(_places(study, grid, changes, find))) for grid in study.grid]
+    planned: dict[tuple[Any, ...], PlannedRun] = {}
+    for seed in dict.fromkeys(seed for grid, _ in found for seed in grid.numbers):
+        for runs in ([one.run(seed) for one in own] for grid, own in found if seed in grid.numbers):
+            known = dict[tuple[str, Value], PlannedRun]()
+            for run in runs:  # a variant may be what a budget is anyway
+                named = run.key, run.place.get("variant", "")
+                if (other := known.setdefault(named, run)) is not run:
+                    raise ConfigError(f"grid: {run} and {other} are the same run")
+                planned.setdefault((seed, *run.place.items()), run)  # several grids may have it
+    places = list({tuple(run.place.items()): run.place for run in planned.values()}.values())
+    for contrast in study.contrasts:
+        pairs(contrast, places)
+    for shown in study.shown:
+        where = f"{shown.place}, {shown.title!r}"
+        refuse_other_coordinates(where, coordinates(shown.of, where), places)
+    for table in study.tables:
+        for measure, _ in table.wanted:
+            _refuse_other_measure(f"tables, {table.title!r}: measures", measure)
+    return list(planned.values())
+
+
+def _axes(study: Study, grid: Grid) -> list[Sequence[Any]]:
+    """What a grid combines: scenarios, methods, budgets, names of variants, values of its keys."""
+    every = tuple(one.name for one in study.variants)
+    names = every if grid.variants is None else grid.variants
+    return [grid.scenarios, grid.methods, grid.budgets, names or ("",), *grid.keys.values()]
+
+
+def _places(
+    study: Study,
+    grid: Grid,
+    changes: Mapping[str, Mapping[str, Any]],
+    find: Callable[[str], Path],
+) -> Iterator[_OfAllSeeds]:
+    """The runs of a grid, without their seeds."""
+    varied = [key for key in grid.keys if len({repr(one.keys.get(key)) for one in study.grid}) > 1]
+    varied += [key for key, values in grid.keys.items() if len(values) > 1 and key not in varied]
+    for scenario, method, budget, variant, *values in product(*_axes(study, grid)):
+        chosen = dict(zip(grid.keys, values, strict=True))
         place = {"scenario": Path(scenario).stem, "method": method, "budget": budget}
-        place |= ({"variant": variant} if variant else {}) | chosen
-        given = {**chosen, **variants[variant]}
+        place |= {"variant": variant} if changes else {}
+        place |= {key: value for key, value in chosen.items() if key in varied}
+        given = {**chosen, **changes.get(variant, {})}
         try:
             config = _config(scenario, find, method, budget, {**of_seed(grid.numbers[0]), **given})
         except ConfigError as error:
-            named = ", ".join(f"{key} = {value}" for key, value in place.items())
+            named = ", ".join(f"{key} = {value}" for key, value in place.items() if value != "")
             raise ConfigError(f"grid ({named}): {error}") from error
-        found.append(_OfAllSeeds(place, given, config, config.digest_values()))
-    planned = [one.run(seed) for seed in grid.numbers for one in found]
-    known = dict[str, PlannedRun]()
-    for run in planned:
-        if (other := known.setdefault(run.key, run)) is not run:
-            raise ConfigError(f"grid: {run} and {other} are the same run")
-    places = [one.place for one in found]
-    for contrast in study.contrasts:
-        pairs(contrast, places)
-    return planned
+        yield _OfAllSeeds(place, given, config, _on_any_device(config.digest_values()))
 
 
 @dataclass(frozen=True)
@@ -150,16 +193,10 @@ def pairs(
             measure is not known.
     """
     where = f"contrasts, {contrast.name!r}"
-    if contrast.measure not in (*MEASURES_OF_ALL, *MEASURES):
-        known = ", ".join((*MEASURES_OF_ALL, *MEASURES))
-        raise ConfigError(f"{where}: measure = {contrast.measure!r}: must be one of {known}")
+    _refuse_other_measure(f"{where}: measure", contrast.measure)
     sides = []
     for name, side in zip("ab", contrast.sides, strict=True):
-        for key, value in side.items():
-            values = list(dict.fromkeys(place[key] for place in places if key in place))
-            if value not in values:
-                of = f"must be one of {', '.join(map(repr, values))}" if values else "is no key"
-                raise ConfigError(f"{where}: {name}.{key} = {value!r}: {of} of the grid")
+        refuse_other_coordinates(f"{where}: {name}", side, places)
         sides.append([one for one in places if side.items() <= one.items()])
     free = set().union(*contrast.sides)
     others = {_rest(place, free): place for place in sides[1]}
@@ -171,6 +208,28 @@ def pairs(
     if not found or any(a == b for a, b in found):
         raise ConfigError(f"{where}: a and b must be different runs of the grid")
     return found
+
+
+def refuse_other_coordinates(
+    where: str, named: Mapping[str, Value], places: Iterable[Mapping[str, Value]]
+) -> None:
+    """Refuse coordinates that no place of the grid has.
+
+    Raises:
+        ConfigError: there is one; the message begins with ``where``.
+    """
+    every = list(places)
+    for key, value in named.items():
+        values = list(dict.fromkeys(place[key] for place in every if key in place))
+        if value not in values:
+            of = f"must be one of {', '.join(map(repr, values))}" if values else "is no key"
+            raise ConfigError(f"{where}.{key} = {value!r}: {of} of the grid")
+
+
+def _refuse_other_measure(where: str, measure: str) -> None:
+    if measure not in (*MEASURES_OF_ALL, *MEASURES):
+        known = ", ".join((*MEASURES_OF_ALL, *MEASURES))
+        raise ConfigError(f"{where} = {measure!r}: must be one of {known}")
 
 
 def _rest(place: Mapping[str, Value], free: set[str]) -> tuple[tuple[str, Value], ...]:

@@ -9,16 +9,26 @@ from pathlib import Path
 from typing import Any, Literal
 
 from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json
-from innerattn.errors import RunError
-from innerattn.experiments.plan import Case
-from innerattn.experiments.run import check_summary, read_run
+from innerattn.errors import InnerattnError, RunError, one_line
+from innerattn.experiments.run import FinishedRun, check_summary, read_run
 from innerattn.records.run_files import RunFiles
 from innerattn.stats import Estimate
 from innerattn.stats.aggregate import improvement_interval
 from innerattn.stats.comparison import ALPHA, Contrast, contrast, holm
 from innerattn.stats.seeds import seed_estimate
-from innerattn.studies.plan import MEASURES_OF_ALL, PlannedRun, pairs
-from innerattn.studies.study import Direction, Length, Study, StudyContrast, Value
+from innerattn.studies.folder import StudyFolder
+from innerattn.studies.ledger import Ledger, State
+from innerattn.studies.plan import MEASURES_OF_ALL, PlannedRun, pairs, run_digest
+from innerattn.studies.study import (
+    SCORES,
+    Direction,
+    Length,
+    Study,
+    StudyContrast,
+    StudyTable,
+    Value,
+    coordinates,
+)
 
 LEAST_SEEDS = 3
 """Fewer seeds decide nothing."""
@@ -36,10 +46,17 @@ RULES = f"""\
 
 @dataclass(frozen=True)
 class Result:
-    """A finished run of a study and its ``evaluation/summary.json``."""
+    """A finished run of a study.
+
+    Attributes:
+        run: which one.
+        summary: its ``evaluation/summary.json``.
+        finished: all that is known of it; None where only summaries were read.
+    """
 
     run: PlannedRun
     summary: Mapping[str, Any]
+    finished: FinishedRun | None = None
 
     def value(self, measure: str, length: Length) -> float | None:
         """A measure of the run; None where its episodes do not determine it."""
@@ -53,18 +70,53 @@ class Result:
 
 
 @dataclass(frozen=True)
+class Results:
+    """What there is of a study's runs.
+
+    Attributes:
+        planned: all runs, in the order of the grid.
+        finished: likewise.
+        left_out: each other run, and why it is not among these.
+    """
+
+    planned: tuple[PlannedRun, ...]
+    finished: tuple[Result, ...]
+    left_out: tuple[tuple[PlannedRun, str], ...]
+
+    @property
+    def runs(self) -> list[FinishedRun]:
+        """The finished runs as reports take them."""
+        return [one.finished for one in self.finished if one.finished is not None]
+
+
+@dataclass(frozen=True)
+class Values:
+    """A measure of the runs of one place in the grid.
+
+    Attributes:
+        each: by seed; None where the episodes of a run do not determine it.
+        mean: over those that have a value; None without one.
+    """
+
+    each: Mapping[int, float | None]
+    mean: Estimate | None
+
+
+@dataclass(frozen=True)
 class Mean:
-    """What the runs of one place in the grid found, as means over seeds.
+    """What the runs of one place in the grid found.
 
     Attributes:
         place: coordinates in the grid.
         seeds: of its finished runs.
-        values: by measure and length; None where no run has the value.
+        values: by measure and length of episodes.
+        episode_steps: of either length [control steps].
     """
 
     place: Mapping[str, Value]
     seeds: tuple[int, ...]
-    values: Mapping[tuple[str, Length], Estimate | None]
+    values: Mapping[tuple[str, Length], Values]
+    episode_steps: Mapping[Length, int]
 
 
 @dataclass(frozen=True)
@@ -73,6 +125,7 @@ class Compared:
 
     Attributes:
         contrast: what is asked.
+        length: of the episodes.
         a: place of the runs.
         b: place of those that they are compared with.
         seeds: those that have a value of both.
@@ -86,6 +139,7 @@ class Compared:
     """
 
     contrast: StudyContrast
+    length: Length
     a: Mapping[str, Value]
     b: Mapping[str, Value]
     seeds: tuple[int, ...]
@@ -96,29 +150,61 @@ class Compared:
     holm_p: float | None = None
     verdict: Verdict = "undecided"
 
+    @property
+    def family(self) -> str:
+        """Whose p-values are adjusted together; at both lengths there are two."""
+        second = self.contrast.length == "both" and self.length == "long"
+        return f"{self.contrast.family}, long" if second else self.contrast.family
 
-def read_results(folder: Path, planned: Iterable[PlannedRun]) -> list[Result]:
-    """The finished runs; folders that are not there are left out.
+
+def read_results(study: StudyFolder, *, steps: bool = False, archived: bool = True) -> Results:
+    """What there is of the runs of a study; a run that cannot be read is left out and named.
 
     Args:
-        folder: of the finished runs, one for each key.
-        planned: the runs of the study.
+        study: in its folder.
+        steps: whether records are to hold what was recorded step by step.
+        archived: whether archived runs do, which have neither metrics nor steps.
 
     Raises:
-        RunError: a finished run cannot be read, or was measured otherwise than planned.
-        OSError: a file cannot be read.
+        RunError: the study's archive is damaged.
+        OSError: the ledger cannot be read.
     """
-    found = []
-    for run in planned:
-        path = folder / run.key
-        if path.exists():
-            case = Case(run.config.scenario.situation, run.config.train.method, run.seed)
-            found.append(Result(run, read_run(case, path, steps=False).summary))
-    return found
+    states, ledger = study.states(), study.ledger()
+    finished, left_out = [], list[tuple[PlannedRun, str]]()
+    for run in study.planned:
+        path = study.runs / run.key
+        try:
+            if path.exists():
+                found = read_run(run.case, path, steps=steps)
+                if run_digest(found.config) != run.digest:
+                    raise RunError("its configuration is another than its name says")
+            elif run.key in study.archived and archived:
+                found = replace(study.archived[run.key], case=run.case)
+            else:
+                left_out.append((run, _why_left_out(run.key, states[run.key], ledger)))
+                continue
+        except (InnerattnError, OSError) as error:
+            left_out.append((run, f"unreadable: {one_line(error)}"))
+            continue
+        finished.append(Result(run, found.summary, found))
+    return Results(tuple(study.planned), tuple(finished), tuple(left_out))
+
+
+def _why_left_out(key: str, state: State, ledger: Ledger) -> str:
+    if state == "done":
+        return "archived, without metrics and steps"
+    if state == "failed":
+        return f"failed: {last_line(ledger.failures(key)[-1])}"
+    return {"planned": "missing", "claimed": "not finished: a worker has it, or has left it"}[state]
+
+
+def last_line(reason: str) -> str:
+    """The last line of why a run failed, which may be a traceback."""
+    return reason.strip().splitlines()[-1]
 
 
 def read_summaries(folder: Path, planned: Iterable[PlannedRun]) -> list[Result]:
-    """As `read_results`, but only summaries are read, so that many runs take little time.
+    """The finished runs in a folder; only summaries are read, so that many take little time.
 
     Raises:
         RunError: a summary cannot be read, or is none of the run.
@@ -136,24 +222,34 @@ def read_summaries(folder: Path, planned: Iterable[PlannedRun]) -> list[Result]:
     return found
 
 
-def means(results: Sequence[Result]) -> list[Mean]:
-    """Means over seeds of what every study shows, in the order of the grid."""
-    wanted: list[tuple[str, Length]] = [
-        ("rescues_per_episode", "standard"),
-        ("score", "standard"),
-        ("score", "long"),
-    ]
+def means(results: Sequence[Result], table: StudyTable = SCORES) -> list[Mean]:
+    """Means over seeds of what a table shows, in the order of the grid."""
     groups: dict[tuple[tuple[str, Value], ...], list[Result]] = {}
-    for one in results:
+    for one in chosen(results, table.of):
         groups.setdefault(tuple(one.run.place.items()), []).append(one)
     return [
         Mean(
             dict(place),
             tuple(one.run.seed for one in group),
-            {key: seed_estimate([one.value(*key) for one in group]) for key in wanted},
+            {key: _values(group, *key) for key in table.wanted},
+            {
+                "standard": int(group[0].summary["episode_steps"]),
+                "long": int(group[0].summary["long"]["episode_steps"]),
+            },
         )
         for place, group in groups.items()
     ]
+
+
+def chosen(results: Iterable[Result], of: Mapping[str, Any]) -> list[Result]:
+    """The runs whose place in the grid has some coordinates."""
+    wanted = coordinates(of).items()
+    return [one for one in results if wanted <= one.run.place.items()]
+
+
+def _values(group: Sequence[Result], measure: str, length: Length) -> Values:
+    each = {one.run.seed: one.value(measure, length) for one in group}
+    return Values(each, seed_estimate(list(each.values())))
 
 
 def compare(
@@ -166,14 +262,13 @@ def compare(
     found = []
     places = list({tuple(run.place.items()): run.place for run in planned}.values())
     for wanted in study.contrasts:
-        for a, b in pairs(wanted, places):
-            of_a, of_b = (by_place.get(tuple(place.items()), {}) for place in (a, b))
-            found.append(_compared(wanted, a, b, of_a, of_b))
-    for family in dict.fromkeys(one.contrast.family for one in found):
+        for length in wanted.lengths:
+            for a, b in pairs(wanted, places):
+                of_a, of_b = (by_place.get(tuple(place.items()), {}) for place in (a, b))
+                found.append(_compared(wanted, length, a, b, of_a, of_b))
+    for family in dict.fromkeys(one.family for one in found):
         own = {
-            n: one.p
-            for n, one in enumerate(found)
-            if one.contrast.family == family and one.p is not None
+            n: one.p for n, one in enumerate(found) if one.family == family and one.p is not None
         }
         for n, holm_p in zip(own, holm(list(own.values())), strict=True):
             found[n] = _judged(found[n], holm_p)
@@ -182,6 +277,7 @@ def compare(
 
 def _compared(
     wanted: StudyContrast,
+    length: Length,
     a: Mapping[str, Value],
     b: Mapping[str, Value],
     of_a: Mapping[int, Result],
@@ -189,7 +285,7 @@ def _compared(
 ) -> Compared:
     values: dict[int, tuple[float, float]] = {}
     for seed in sorted(of_a.keys() & of_b.keys()):
-        x, y = (one.value(wanted.measure, wanted.length) for one in (of_a[seed], of_b[seed]))
+        x, y = (one.value(wanted.measure, length) for one in (of_a[seed], of_b[seed]))
         if x is not None and y is not None:
             values[seed] = x, y
     differences = [x - y for x, y in values.values()]
@@ -199,7 +295,7 @@ def _compared(
     p = None if found is None else one_sided(found, wanted.direction)
     sides = ([x for x, _ in values.values()], [y for _, y in values.values()])
     improvement = improvement_interval([sides[0]], [sides[1]], seed=0) if enough else None
-    return Compared(wanted, a, b, tuple(values), mean, found, improvement, p)
+    return Compared(wanted, length, a, b, tuple(values), mean, found, improvement, p)
 
 
 def one_sided(found: Contrast, direction: Direction) -> float:

@@ -24,6 +24,11 @@ def study_schema() -> dict[str, Any]:
     """
     study, run = Study.model_json_schema(), run_schema()
     parts = study.pop("$defs")
+    grids = study["properties"]["grid"]
+    study["properties"]["grid"] = {
+        "description": grids.pop("description"),
+        "anyOf": [grids["items"], grids],
+    }
     sections = run["properties"]
     parts |= run["$defs"]
     parts["Variant"] |= {"properties": {**parts["Variant"]["properties"], **sections}}

@@ -11,6 +11,7 @@ from pydantic import ConfigDict, Field, ValidationError, field_validator, model_
 
 from innerattn.config.files import toml_table_in
 from innerattn.config.model import Model, config_error
+from innerattn.config.near import did_you_mean
 from innerattn.config.run import digest_of
 from innerattn.errors import ConfigError
 
@@ -19,6 +20,7 @@ _SEEDS = re.compile(r"([0-9]{1,18})\.\.([0-9]{1,18})")
 _MOST_SEEDS = 1_000
 _MOST_SEED = 2**62
 _MOST_CONTRASTS = 200
+_LONG = ", long"
 
 Name = Annotated[str, Field(pattern=rf"^{_WORD}$")]
 Value = str | int | float | bool
@@ -44,6 +46,9 @@ class Grid(Model):
     budgets: tuple[str, ...] = Field(("fast",), min_length=1, description="built-in recipes")
     seeds: str | tuple[int, ...] = Field(
         (0, 1, 2), description="seeds of training: a list, or a range with both ends as text"
+    )
+    variants: tuple[str, ...] | None = Field(
+        None, description="names of variants that it is combined with, unless with all"
     )
 
     @field_validator("seeds")
@@ -71,6 +76,7 @@ class Grid(Model):
             "methods": self.methods,
             "budgets": self.budgets,
             "seeds": self.numbers,
+            "variants": self.variants or (),
             **self.keys,
         }
         for key, values in listed.items():
@@ -122,7 +128,10 @@ class StudyContrast(Model):
     measure: str = Field(
         "score", description="score, rescues_per_episode or a registered measure of a run"
     )
-    length: Length = Field("standard", description="length of the episodes: standard or long")
+    length: Length | Literal["both"] = Field(
+        "standard",
+        description="length of the episodes: standard, long, or both, each with its own family",
+    )
     margin: float = Field(gt=0.0, description="differences that are smaller count as none")
     direction: Direction = Field(
         "two-sided", description="hypothesis: a is another, a greater or a smaller value than b"
@@ -130,9 +139,56 @@ class StudyContrast(Model):
     family: str = Field("all", description="contrasts whose p-values are adjusted together (Holm)")
 
     @property
+    def lengths(self) -> tuple[Length, ...]:
+        """The lengths of episodes at which it is judged."""
+        return ("standard", "long") if self.length == "both" else (self.length,)
+
+    @property
     def sides(self) -> tuple[dict[str, Value], dict[str, Value]]:
         """What a and b name, by coordinate of the grid."""
-        return _coordinates(self.a), _coordinates(self.b)
+        return coordinates(self.a), coordinates(self.b)
+
+
+class Shown(Model):
+    """A part of the report."""
+
+    title: str = Field(min_length=1, max_length=100, description="heading in the report")
+    of: dict[str, Any] = Field(
+        default_factory=dict, description="which runs: coordinates of the grid by value; none: all"
+    )
+
+
+class Curves(Shown):
+    """A figure of rescues in training, against env-steps and time."""
+
+    place: ClassVar[str] = "curves"
+
+
+class StudyTable(Shown):
+    """A table of means over seeds, a row for each place in the grid."""
+
+    place: ClassVar[str] = "tables"
+
+    measures: tuple[str, ...] = Field(
+        ("rescues_per_episode", "score", "score, long"),
+        min_length=1,
+        max_length=8,
+        description="score, rescues_per_episode or registered measures of a run; ', long' behind "
+        "one means episodes of the second length",
+    )
+    seeds: bool = Field(True, description="whether the value of each seed is shown")
+
+    @property
+    def wanted(self) -> list[tuple[str, Length]]:
+        """Its measures and their lengths of episodes."""
+        return [
+            (one.removesuffix(_LONG), "long" if one.endswith(_LONG) else "standard")
+            for one in self.measures
+        ]
+
+
+SCORES = StudyTable(title="Scores")
+"""The table of a study that lists none."""
 
 
 class Study(Model):
@@ -141,28 +197,64 @@ class Study(Model):
     place: ClassVar[str] = "study"
 
     question: str = Field("", description="what the study asks, in a sentence; opens its report")
-    grid: Grid = Field(default_factory=Grid, description="what its runs are made of")
+    grid: tuple[Grid, ...] = Field(
+        default_factory=lambda: (Grid(),),
+        min_length=1,
+        max_length=20,
+        description="what its runs are made of: one grid, or several",
+    )
     variants: tuple[Variant, ...] = Field(
         (), description="named changes; each is combined with the whole grid"
     )
     contrasts: tuple[StudyContrast, ...] = Field(
         (), max_length=_MOST_CONTRASTS, description="what is compared"
     )
+    tables: tuple[StudyTable, ...] = Field(
+        (), max_length=20, description="what is shown as tables; none: rescues and scores of all"
+    )
+    curves: tuple[Curves, ...] = Field(
+        (), max_length=20, description="what is shown as learning curves"
+    )
+
+    @field_validator("grid", mode="before")
+    @classmethod
+    def _one_or_several(cls, given: Any) -> Any:
+        return (given,) if isinstance(given, Mapping) else given
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         for what, names in (
             ("variants", [one.name for one in self.variants]),
             ("contrasts", [one.name for one in self.contrasts]),
+            ("tables and curves", [one.title for one in self.shown]),
         ):
             if (twice := _first_twice(names)) is not None:
                 raise ValueError(f"{what}: the name {twice!r} stands twice")
+        known = [one.name for one in self.variants]
+        for name in (name for grid in self.grid for name in grid.variants or ()):
+            if name not in known:
+                near = did_you_mean(name, known, repr)
+                raise ValueError(f"grid.variants: {name!r}: must be the name of a variant{near}")
         return self
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """Its tables and curves."""
+        return (*self.tables, *self.curves)
+
+    def values(self) -> dict[str, Any]:
+        """What its file says, as JSON values; one grid is a table, and what it lacks is absent."""
+        values = self.model_dump(mode="json", exclude_none=True)
+        for key in ("tables", "curves"):  # added later: where absent, digests are as before
+            if not values[key]:
+                del values[key]
+        if len(self.grid) == 1:
+            (values["grid"],) = values["grid"]
+        return values
 
     def digest(self) -> str:
         """SHA-256, in hexadecimal, of its values; comments and order in its file do not count."""
-        values = self.model_dump(mode="json")
-        return digest_of(values)
+        return digest_of(self.values())
 
 
 def study_in(data: bytes, path: str | Path) -> Study:
@@ -175,7 +267,10 @@ def study_in(data: bytes, path: str | Path) -> Study:
     try:
         return Study.model_validate(table)
     except ValidationError as error:
-        raise config_error(error, source=str(path), model=Study) from error
+        refused = str(config_error(error, source=str(path), model=Study))
+        if isinstance(table.get("grid"), Mapping):  # as the file has it
+            refused = refused.replace("grid[0]", "grid")
+        raise ConfigError(refused) from error
 
 
 def _first_twice(values: Iterable[Any]) -> Any | None:
@@ -188,10 +283,11 @@ def _first_twice(values: Iterable[Any]) -> Any | None:
     return None
 
 
-def _coordinates(side: Mapping[str, Any]) -> dict[str, Value]:
+def coordinates(side: Mapping[str, Any], where: str = "contrasts") -> dict[str, Value]:
+    """Values by coordinate of the grid, whose keys of a run may be sections."""
     words = {key: value for key, value in side.items() if not isinstance(value, Mapping)}
     keys = {key: value for key, value in side.items() if isinstance(value, Mapping)}
-    return words | dict(_flat(keys, "contrasts"))
+    return words | dict(_flat(keys, where))
 
 
 def _flat(sections: Mapping[str, Any], place: str) -> Iterator[tuple[str, Any]]:

@@ -1,16 +1,17 @@
 """The arms of the crossed design are what they say."""
 
 from itertools import product
-from pathlib import Path
 
-from innerattn.experiments.crossed.arms import ARMS, Arm, arm_of, plan_crossed
+from small_study import planned_of
+
+from innerattn.experiments.crossed.arms import ARMS, Arm, arm_of
 
 METHODS = ("td-inner", "td-uniform")
 
 
 def test_all_combinations_are_planned_and_are_what_they_say() -> None:
-    runs = plan_crossed(METHODS, ("single", "mixed"), range(2), "quick", Path("study"))
-    assert len({one.folder for one in runs}) == len(runs) == 2 * 2 * 9
+    runs = planned_of("crossed", METHODS, ("single", "mixed"), 2, "quick")
+    assert len({one.key for one in runs}) == len(runs) == 2 * 2 * 9
     found = set()
     for one in runs:
         config, arm = one.config, arm_of(one.case)
@@ -26,5 +27,5 @@ def test_all_combinations_are_planned_and_are_what_they_say() -> None:
     assert [arm for arm in ARMS if arm.shared] == [Arm("team", 0.0, shared=True)]
     inner = {(arm.credit, arm.penalty) for arm in ARMS if arm.method == "td-inner"}
     assert inner == set(product(("helpers", "team"), (0.0, 1e-4, 1e-3)))
-    alone = plan_crossed(("td-uniform",), ("single",), (0,), "quick", Path("study"))
+    alone = planned_of("crossed", ("td-uniform",), ("single",))
     assert [one.case.variant for one in alone] == ["helpers", "team"]

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from markdown_rows import rows_of
+from small_study import planned_of
 
 from innerattn.experiments.crossed import swapped
-from innerattn.experiments.crossed.arms import plan_crossed, plan_swapped
 from innerattn.experiments.crossed.swapped import read_swaps
 from innerattn.experiments.run import FinishedRun
 from innerattn.report.crossed.swapped import FILES, write_swapped
@@ -21,12 +21,14 @@ METHODS = ("td-uniform", "td-inner")
 def made(run: FinishedRun, shares: dict[str, list[float | None]], out: Path) -> list[FinishedRun]:
     """Runs in single, by variant and seed; the share of each stands in its summary."""
     found = []
-    for one in plan_swapped(("td-uniform",), ("single",), range(4), "short", out):
+    for one in planned_of("swapped", ("td-uniform",), ("single",), 4):
         own = shares[one.case.variant]
         if one.case.seed < len(own):
             summary = {**run.summary, "first_share": own[one.case.seed]}
             found.append(
-                replace(run, case=one.case, config=one.config, folder=one.folder, summary=summary)
+                replace(
+                    run, case=one.case, config=one.config, folder=out / one.key, summary=summary
+                )
             )
     return found
 
@@ -39,18 +41,16 @@ def _shares_of_summaries(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_each_run_has_one_beside_it_that_differs_in_the_swap_alone() -> None:
-    planned = plan_swapped(METHODS, ("single", "mixed"), range(2), "short", Path("study"))
+    planned = planned_of("swapped", METHODS, ("single", "mixed"), 2)
     assert len(planned) == 16
-    crossed = {
-        one.folder: one.config.digest()
-        for one in plan_crossed(METHODS, ("single", "mixed"), range(2), "short", Path("study"))
-    }
-    for drawn, other in zip(planned[::2], planned[1::2], strict=True):
-        assert crossed[drawn.folder] == drawn.config.digest()
-        assert other.folder not in crossed
+    crossed = {one.key for one in planned_of("crossed", METHODS, ("single", "mixed"), 2)}
+    drawn = {one.case: one for one in planned if one.key in crossed}
+    assert len(drawn) == 8
+    for other in (one for one in planned if one.key not in crossed):
         assert other.config.network.swapped_robots == ("food_0", "food_1")
+        case = replace(other.case, variant=other.case.variant.removesuffix("-swapped"))
         network = other.config.network.model_copy(update={"swapped_robots": None})
-        assert other.config.model_copy(update={"network": network}) == drawn.config
+        assert other.config.model_copy(update={"network": network}) == drawn[case].config
 
 
 @pytest.mark.parametrize(

@@ -1,21 +1,20 @@
 """Which runs meet which faults."""
 
 from collections import Counter
-from pathlib import Path
+
+from small_study import planned_of
 
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.experiments.plan import METHODS, Case
-from innerattn.experiments.robustness.design import TEAMS, groups, plan_robustness
-
-OUT = Path("study")
+from innerattn.experiments.robustness.design import TEAMS, groups
 
 
 def test_the_runs_of_the_study() -> None:
-    planned = plan_robustness(METHODS, ("mixed",), (0, 1), "short", OUT)
+    planned = planned_of("robustness", METHODS, ("mixed",), 2)
     parts = Counter((one.case.situation, one.case.variant) for one in planned)
     own = {("mixed", ""): 8, ("mixed-faults", ""): 2, ("mixed-faults", "masked"): 2}
     assert parts == own | {(name, "team"): 1 for name in TEAMS}
-    assert len({one.folder for one in planned}) == len(planned)
+    assert len({one.key for one in planned}) == len(planned)
     by_case = {one.case: one.config for one in planned}
     for case, config in by_case.items():
         assert config.network.mask_unavailable == (case.variant == "masked")
@@ -27,7 +26,7 @@ def test_the_runs_of_the_study() -> None:
 
 
 def test_groups_meet_the_same_faults_in_the_same_worlds() -> None:
-    planned = plan_robustness(METHODS, ("mixed", "double"), (0, 1), "short", OUT)
+    planned = planned_of("robustness", METHODS, ("mixed", "double"), 2)
     found = groups([one.case for one in planned])
     assert len({group.name for group in found}) == len(found) == 4 + 2 + 5
     worlds = {one.case: one.config.evaluate.seed for one in planned}
@@ -49,7 +48,7 @@ def test_groups_meet_the_same_faults_in_the_same_worlds() -> None:
 
 def test_without_the_trained_method_or_mixed_there_is_deployment_alone() -> None:
     for methods, situation in ((("ppo-inner",), "mixed"), (METHODS, "double")):
-        planned = plan_robustness(methods, (situation,), (0,), "short", OUT)
+        planned = planned_of("robustness", methods, (situation,))
         assert [one.case for one in planned] == [Case(situation, m, 0) for m in methods]
         (group,) = groups([one.case for one in planned])
         assert group.part == "deployment"

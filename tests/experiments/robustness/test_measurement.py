@@ -1,41 +1,45 @@
 """Groups under faults are measured once, as the command does it, and then only read."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from reseal import reseal
+from small_study import run_in
 
 from innerattn.cli.main import main
 from innerattn.errors import RunError
-from innerattn.experiments.plan import PlannedRun, plan
+from innerattn.experiments.plan import Case
 from innerattn.experiments.robustness import design, measurement
 from innerattn.experiments.robustness.measurement import (
     FaultMeasurement,
     missing_measurements,
     read_measurements,
 )
-from innerattn.experiments.scan import finished_runs, scan_runs
+from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.policies import Policy
 
 
 @pytest.fixture
-def planned(
-    study: Path, small: dict[str, object], monkeypatch: pytest.MonkeyPatch
-) -> list[PlannedRun]:
-    """The finished runs of the study, which are to meet one fault in few worlds."""
+def runs(study: Path, monkeypatch: pytest.MonkeyPatch) -> list[FinishedRun]:
+    """The finished runs in a pool, which are to meet one fault in few worlds."""
 
     def few(cases: list[design.Case]) -> list[design.Group]:
         return [replace(one, kinds=("blackout",), episodes=3) for one in design.groups(cases)]
 
     monkeypatch.setattr(measurement, "groups", few)
-    return plan(("td-inner", "td-uniform"), ("mixed",), (0,), "quick", study, small)
+    return [
+        read_run(Case("mixed", method, 0), run_in(study, method))
+        for method in ("td-inner", "td-uniform")
+    ]
 
 
-def measured(planned: list[PlannedRun], study: Path) -> FaultMeasurement:
+def missing(runs: list[FinishedRun], study: Path) -> list[FaultMeasurement]:
+    return missing_measurements([run.case for run in runs], runs, study)
+
+
+def measured(runs: list[FinishedRun], study: Path) -> FaultMeasurement:
     """The only measurement that there is, done."""
-    (job,) = missing_measurements(scan_runs(planned, study), study)
+    (job,) = missing(runs, study)
     shares: list[float] = []
     job.do(shares.append)
     assert shares[0] == 0.0
@@ -46,13 +50,13 @@ def measured(planned: list[PlannedRun], study: Path) -> FaultMeasurement:
 
 def test_a_document_is_that_of_the_command_and_is_read_without_playing(
     study: Path,
-    planned: list[PlannedRun],
+    runs: list[FinishedRun],
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    job = measured(planned, study)
+    job = measured(runs, study)
     assert str(job) == "faults of mixed-s0"
-    folders = [str(one.folder) for one in planned]
+    folders = [str(one.folder) for one in runs]
     few = ["--faults", "blackout", "--episodes", "3"]
     assert main(["robustness", *folders, *few, "--json", "-"]) == 0
     assert job.path.read_text() == capsys.readouterr().out
@@ -61,36 +65,29 @@ def test_a_document_is_that_of_the_command_and_is_read_without_playing(
         raise AssertionError("a policy was loaded")
 
     monkeypatch.setattr("innerattn.evaluate.robustness.load_trained", refuse)
-    found = scan_runs(planned, study)
-    assert missing_measurements(found, study) == []
-    (result,) = read_measurements(finished_runs(found), study)
-    assert list(result.runs) == [one.case for one in planned]
+    assert missing(runs, study) == []
+    (result,) = read_measurements(runs, study)
+    assert list(result.runs) == [one.case for one in runs]
     assert list(result.scripts) == ["greedy", "hungarian", "oracle"]
-    assert list(result.bounds) == list(result.attention) == [planned[0].case]
+    assert list(result.bounds) == list(result.attention) == [runs[0].case]
     assert result.critics == 2
 
 
-def test_other_weights_are_another_measurement(study: Path, planned: list[PlannedRun]) -> None:
-    measured(planned, study)
-    path = planned[1].folder / "run.json"
-    info = json.loads(path.read_text())
-    path.write_text(json.dumps({**info, "weights_sha256": 64 * "0"}))
-    reseal(path.parent)
-    found = scan_runs(planned, study)
-    assert len(missing_measurements(found, study)) == 1
-    assert read_measurements(finished_runs(found), study) == []
+def test_other_weights_are_another_measurement(study: Path, runs: list[FinishedRun]) -> None:
+    measured(runs, study)
+    runs[1] = replace(runs[1], info=replace(runs[1].info, weights_sha256=64 * "0"))
+    assert len(missing(runs, study)) == 1
+    assert read_measurements(runs, study) == []
 
 
-def test_a_group_waits_for_all_its_runs(study: Path, planned: list[PlannedRun]) -> None:
-    (planned[1].folder / "evaluation" / "summary.json").unlink()
-    assert missing_measurements(scan_runs(planned, study), study) == []
+def test_a_group_waits_for_all_its_runs(study: Path, runs: list[FinishedRun]) -> None:
+    assert missing_measurements([run.case for run in runs], runs[:1], study) == []
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"policies": [{}], "robots": []}'])
-def test_a_damaged_document_is_named(text: str, study: Path, planned: list[PlannedRun]) -> None:
-    found = scan_runs(planned, study)
-    (job,) = missing_measurements(found, study)
+def test_a_damaged_document_is_named(text: str, study: Path, runs: list[FinishedRun]) -> None:
+    (job,) = missing(runs, study)
     job.path.parent.mkdir()
     job.path.write_text(text)
     with pytest.raises(RunError, match=f"{job.path.name}: not a measurement under faults of this"):
-        read_measurements(finished_runs(found), study)
+        read_measurements(runs, study)

@@ -1,17 +1,17 @@
 """What faults cost over seeds, against plain arithmetic on the documents."""
 
 import json
-from pathlib import Path
 from statistics import mean
 from typing import Any
 
 import pytest
 from made_faults import made_document
 from scipy import stats
+from small_study import planned_of
 
 from innerattn.config import Scenario
 from innerattn.experiments.plan import METHODS
-from innerattn.experiments.robustness.design import groups, plan_robustness
+from innerattn.experiments.robustness.design import groups
 from innerattn.experiments.robustness.documents import GroupResult, group_result
 from innerattn.experiments.robustness.results import Robustness, over_groups
 from innerattn.stats import Estimate
@@ -22,7 +22,7 @@ Documents = dict[str, dict[str, Any]]
 
 
 def made(seeds: range) -> tuple[Documents, list[GroupResult]]:
-    planned = plan_robustness(METHODS, ("mixed",), seeds, "short", Path("study"))
+    planned = planned_of("robustness", METHODS, ("mixed",), len(seeds))
     documents, found = {}, []
     for number, group in enumerate(groups([one.case for one in planned])):
         name = group.cases[0].situation if group.part == "teams" else "mixed"

@@ -1,14 +1,13 @@
 """The page on what faults cost: every number in its table, and no part that was not measured."""
 
-from pathlib import Path
-
 import pytest
 from made_faults import made_document
 from markdown_rows import rows_of
+from small_study import planned_of
 
 from innerattn.config import Scenario
 from innerattn.experiments.plan import METHODS
-from innerattn.experiments.robustness.design import Group, groups, plan_robustness
+from innerattn.experiments.robustness.design import Group, groups
 from innerattn.experiments.robustness.documents import group_result
 from innerattn.experiments.robustness.results import Robustness, over_groups
 from innerattn.report.robustness import page
@@ -24,7 +23,7 @@ def made(*parts: str) -> Robustness:
         methods = [case.method for case in group.cases]
         return made_document(methods, Scenario.preset(name), group.kinds, seed)
 
-    planned = plan_robustness(METHODS, ("mixed", "double"), range(2), "short", Path("study"))
+    planned = planned_of("robustness", METHODS, ("mixed", "double"), 2)
     asked = [one for one in groups([one.case for one in planned]) if one.part in parts]
     found = [group_result(one, document(one, seed)) for seed, one in enumerate(asked)]
     return over_groups(found, ("motor_gain",))

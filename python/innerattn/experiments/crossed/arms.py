@@ -1,18 +1,14 @@
-"""The arms of the crossed design, and the runs that they need; it looks at no folder."""
+"""The arms of the crossed design; ``crossed.toml`` of the shipped studies lists their runs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
-from innerattn.experiments.plan import Case, PlannedRun, planned_run
+from innerattn.experiments.plan import Case
 
 Credit = Literal["helpers", "team"]
 
-SITUATIONS = ("single", "mixed")
-"""The built-in scenarios that arms are compared in, unless told otherwise."""
 CREDITS: tuple[Credit, ...] = ("helpers", "team")
 """Who is paid for a rescue: `scenario.rescue_credit`."""
 PENALTIES = (0.0, 1e-4, 1e-3)
@@ -50,15 +46,6 @@ class Arm:
         attention = "uniform" if self.penalty is None else f"inner λ = {self.penalty:g}"
         return f"{attention}, {self.credit}{', shared by kind' if self.shared else ''}"
 
-    def overrides(self) -> dict[str, object]:
-        """Values by dotted key that make the arm what it is."""
-        penalty = 0.0 if self.penalty is None else self.penalty
-        return {
-            "scenario.rescue_credit": self.credit,
-            "td.attention_logit_penalty": penalty,
-            "network.parameter_sharing": "kind" if self.shared else "none",
-        }
-
 
 CROSSED = tuple(Arm(credit, penalty) for credit in CREDITS for penalty in (None, *PENALTIES))
 """Both attentions, with learnt attention at every penalty, under both credits."""
@@ -67,60 +54,8 @@ SHARED = Arm("team", PENALTIES[0], shared=True)
 ARMS = (*CROSSED, SHARED)
 """All arms."""
 
-WITH_SWAPS = {arm.method: arm for arm in (Arm("team", None), Arm("team", 0.0))}
-"""Arms whose runs have others beside them in which robots swap their initial weights, by method."""
 SWAPPED = "-swapped"
 """Ends the variant of a run with swapped weights."""
-_SWAP = {"network.swapped_robots": ["food_0", "food_1"]}
-
-
-def plan_crossed(
-    methods: Sequence[str],
-    situations: Sequence[str],
-    seeds: Sequence[int],
-    budget: str,
-    out: Path,
-    overrides: Mapping[str, object] | None = None,
-) -> list[PlannedRun]:
-    """The runs of the `ARMS` of some methods, as `innerattn.experiments.plan.plan` lists runs."""
-    return [
-        planned_run(
-            Case(situation, arm.method, seed, arm.variant),
-            budget,
-            out,
-            {**(overrides or {}), **arm.overrides()},
-        )
-        for seed in seeds
-        for situation in situations
-        for arm in ARMS
-        if arm.method in methods
-    ]
-
-
-def plan_swapped(
-    methods: Sequence[str],
-    situations: Sequence[str],
-    seeds: Sequence[int],
-    budget: str,
-    out: Path,
-    overrides: Mapping[str, object] | None = None,
-) -> list[PlannedRun]:
-    """Pairs of runs, as `innerattn.experiments.plan.plan` lists runs.
-
-    Those with weights as they were drawn are runs of the crossed design; a study has them once.
-    """
-    return [
-        planned_run(
-            Case(situation, arm.method, seed, arm.variant + word),
-            budget,
-            out,
-            {**(overrides or {}), **arm.overrides(), **changes},
-        )
-        for seed in seeds
-        for situation in situations
-        for arm in (WITH_SWAPS[method] for method in methods)
-        for word, changes in (("", {}), (SWAPPED, _SWAP))
-    ]
 
 
 def arm_of(case: Case) -> Arm:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from innerattn.envs.batch import FAULT_KINDS
-from innerattn.experiments.plan import METHODS, SITUATIONS, Case, PlannedRun, planned_run
+from innerattn.experiments.plan import METHODS, SITUATIONS, Case
 
 Part = Literal["deployment", "training", "teams"]
 """deployment: teams trained without faults; training: beside them, teams trained with faults;
@@ -24,9 +23,6 @@ TEAMS = ("mixed-1-food", "mixed", "mixed-4-food", "mixed-8", "mixed-16")
 """The built-in scenarios whose teams differ in size, for as many victims."""
 TEAM_BUDGET = "quick"
 """The budget of these teams, whatever that of the other runs."""
-
-_CHANGES: Mapping[str, Mapping[str, object]] = {MASKED: {"network.mask_unavailable": True}}
-"""What variants change, by dotted key."""
 
 
 @dataclass(frozen=True)
@@ -46,32 +42,6 @@ class Group:
     cases: tuple[Case, ...]
     kinds: tuple[str, ...] = FAULT_KINDS
     episodes: int = 100
-
-
-def plan_robustness(
-    methods: Sequence[str],
-    situations: Sequence[str],
-    seeds: Sequence[int],
-    budget: str,
-    out: Path,
-    overrides: Mapping[str, object] | None = None,
-) -> list[PlannedRun]:
-    """The runs of the study, as `innerattn.experiments.plan.plan` lists runs.
-
-    Training with faults and teams by their size are in it where `TRAINED` and mixed are.
-    """
-    whole = TRAINED in methods and "mixed" in situations
-    cases: list[tuple[Case, str]] = []
-    for seed in seeds:
-        cases += [(Case(s, method, seed), budget) for s in situations for method in methods]
-        if whole:
-            cases += [(case, budget) for case in _trained_with_faults(seed)]
-    if whole:
-        cases += [(case, TEAM_BUDGET) for case in map(_team, TEAMS)]
-    return [
-        planned_run(case, budget, out, {**(overrides or {}), **_CHANGES.get(case.variant, {})})
-        for case, budget in cases
-    ]
 
 
 def groups(cases: Collection[Case]) -> list[Group]:

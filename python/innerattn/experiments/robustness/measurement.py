@@ -11,11 +11,11 @@ from pathlib import Path
 from innerattn.config.files import write_whole
 from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json, read_plain
 from innerattn.errors import RunError
+from innerattn.experiments.plan import Case
 from innerattn.experiments.processes import Job
 from innerattn.experiments.robustness.design import Group, groups
 from innerattn.experiments.robustness.documents import GroupResult, group_result
 from innerattn.experiments.run import FinishedRun
-from innerattn.experiments.scan import RunStatus, finished_runs
 
 FOLDER = "faults"
 """Holds the documents in a study's folder."""
@@ -61,18 +61,21 @@ class FaultMeasurement(Job):
         write_whole(self.path, f"{text}\n".encode())
 
 
-def missing_measurements(found: Sequence[RunStatus], out: Path) -> list[FaultMeasurement]:
+def missing_measurements(
+    planned: Sequence[Case], finished: Sequence[FinishedRun], out: Path
+) -> list[FaultMeasurement]:
     """What is to be measured of the planned groups and has no document; nothing is read.
 
     A group is measured once all its runs are finished.
 
     Args:
-        found: what is there of each planned run.
+        planned: all runs of the study.
+        finished: those that are there.
         out: folder of the study.
     """
-    runs = {run.case: run for run in finished_runs(found)}
+    runs = {run.case: run for run in finished}
     jobs = []
-    for group in groups([one.planned.case for one in found]):
+    for group in groups(planned):
         own = [runs[case] for case in group.cases if case in runs]
         if len(own) == len(group.cases) and not (path := _path(group, own, out)).exists():
             folders = tuple(run.folder for run in own)

@@ -12,7 +12,6 @@ import tomli_w
 
 from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json, read_plain
 from innerattn.errors import RunError
-from innerattn.experiments.learning.curves import learning_curves
 from innerattn.experiments.paper.fig4 import fig4
 from innerattn.experiments.paper.fig5 import evidence
 from innerattn.experiments.paper.table2 import table2
@@ -41,6 +40,7 @@ from innerattn.report.runs.tables import (
     verdict,
     versions_text,
 )
+from innerattn.studies.curves import learning_curves
 
 _WEB = files("innerattn.report.runs") / "web"
 _SHARING = (
@@ -132,7 +132,7 @@ def _details(summary: str, inside: str) -> str:
 def _training(
     runs: Sequence[FinishedRun], groups: Sequence[Sequence[FinishedRun]], plots: list[Plot]
 ) -> str:
-    curves = learning_curves(groups)
+    curves = learning_curves((own[0].situation, own[0].method, own) for own in groups)
     parts = [html_table(training_table(runs))]
     if curves:
         for worlds in dict.fromkeys(curve.situation for curve in curves):

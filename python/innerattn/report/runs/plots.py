@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from innerattn.envs.colours import robot_looks
-from innerattn.experiments.learning.curves import LearningCurve
 from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence
 from innerattn.stats.seeds import BAND_NAMES, SeedCurve
+from innerattn.studies.curves import LearningCurve
 
 _COLOURS = 6  # of lines, and of kinds of robots, in ``web/colours.css``
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from innerattn.experiments.learning.curves import LearningCurve
 from innerattn.experiments.run import FinishedRun
 from innerattn.experiments.score_means import MeanScores, scores_over_runs
 from innerattn.measures.summary import script_score
@@ -15,6 +14,7 @@ from innerattn.report.runs.groups import in_situations
 from innerattn.report.table import Row, Table, columns, plain_table, section
 from innerattn.stats import Estimate
 from innerattn.stats.text import NONE, format_estimate, format_number
+from innerattn.studies.curves import LearningCurve
 
 _MOST_NAMED = 4  # groups of runs in one line
 _DIGITS = 12  # of a digest, enough to tell two apart

@@ -2,63 +2,124 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from innerattn.report.table import Table, columns, markdown, plain_table
 from innerattn.report.tables.text import plus_minus
 from innerattn.stats.estimate import as_json
-from innerattn.stats.text import NONE, format_estimate, format_p, format_seeds, format_signed
+from innerattn.stats.text import (
+    NONE,
+    format_estimate,
+    format_number,
+    format_p,
+    format_seeds,
+    format_signed,
+)
 from innerattn.studies.aggregates import THRESHOLDS, Aggregate
+from innerattn.studies.curves import EPISODES, LearningCurve
 from innerattn.studies.folder import Rules, StudyFolder
 from innerattn.studies.ledger import State
-from innerattn.studies.results import RULES, Compared, Mean
-from innerattn.studies.study import Length, Value
+from innerattn.studies.results import RULES, Compared, Mean, Result, Results, Values
+from innerattn.studies.study import Length, StudyTable, Value
 
 
-def study_page(
-    study: StudyFolder,
-    states: Mapping[str, State],
-    found: Sequence[Mean],
-    compared: Sequence[Compared],
-    failures: Mapping[str, str],
-    aggregates: Mapping[Length, Mapping[str, Aggregate]],
-) -> str:
+@dataclass(frozen=True)
+class Found:
+    """What a report shows.
+
+    Attributes:
+        study: in its folder, with its rules over time.
+        states: of its runs by key.
+        results: its finished runs, and why others are left out.
+        tables: means by title, each with what it shows.
+        compared: its contrasts.
+        aggregates: of its algorithms by name, for each length of episodes.
+        curves: learning curves by title; without those of archived runs.
+        note: what is said of runs that are too short to mean anything.
+    """
+
+    study: StudyFolder
+    states: Mapping[str, State]
+    results: Results
+    tables: Mapping[str, tuple[StudyTable, Sequence[Mean]]]
+    compared: Sequence[Compared]
+    aggregates: Mapping[Length, Mapping[str, Aggregate]]
+    curves: Mapping[str, Sequence[LearningCurve]]
+    note: str | None
+
+
+def study_page(found: Found, figures: Mapping[str, str]) -> str:
     """The page as Markdown.
 
     Args:
-        study: with its rules over time, which the page prints.
-        states: of its runs.
-        found: means by place in the grid.
-        compared: its contrasts.
-        failures: why runs failed, by name.
-        aggregates: of its algorithms by name, for each length of episodes.
+        found: what it shows.
+        figures: files of figures, "scores" and by title of curves.
     """
-    counts = Counter(states.values())
-    total = f"{counts['done']} of {len(states)} runs are done"
-    total += f", {counts['failed']} failed" if counts["failed"] else ""
+    study, results, compared = found.study, found.results, found.compared
+    keys = {one.run.key for one in results.finished}
     parts = [f"# {study.study.question or study.path.name}\n"]
+    if found.note:
+        parts.insert(0, f"> **{found.note[:1].upper()}{found.note[1:]}.**\n")
     parts += [f"{one}\n" for one in sentences(compared)]
-    parts += [f"{total}.\n"]
+    parts += [f"{len(keys)} of {len(found.states)} runs are done.\n"]
+    if results.left_out:
+        parts += ["**Left out of all results:**\n", *map("- {}".format, left_out(results)), ""]
+    if "scores" in figures:
+        parts += [f"![Scores of all runs]({figures['scores']})\n", _DOTS]
     if compared:
-        parts += ["## Contrasts\n", markdown(contrasts_table(compared))]
-    if found:
-        parts += ["## Scores\n", markdown(means_table(found)), _SCORE]
-    if any(aggregates.values()):
-        parts += ["## Over all scenarios\n", markdown(aggregates_table(aggregates)), _AGGREGATES]
-    if failures:
-        parts += ["## Failed runs\n", *(f"- {key}: {why}" for key, why in failures.items()), ""]
+        parts += ["## Contrasts\n", contrasts_tables(compared)]
+    for title, (shown, rows) in found.tables.items():
+        if rows:
+            parts += [f"## {title}\n", markdown(means_table(rows, shown.seeds)), _SCORE]
+    for title in found.curves:
+        if title in figures:
+            parts += [f"## {title}\n", f"![{title}]({figures[title]})\n", _CURVES]
+    if any(found.aggregates.values()):
+        table = aggregates_table(found.aggregates)
+        parts += ["## Over all scenarios\n", markdown(table), _AGGREGATES]
     parts += ["## Rules\n", RULES, "", *map(_dated, study.rules), ""]
     return "\n".join(parts)
 
 
+def left_out(results: Results) -> list[str]:
+    """What a report says of runs that are not in it.
+
+    It is one line where a scenario lacks the same seeds everywhere, else one for each place.
+    """
+    places: dict[str, set[str]] = {}
+    seeds: dict[tuple[str, str, str], list[int]] = {}
+    for run in results.planned:
+        place = str(run).removesuffix(f", seed {run.seed}")
+        places.setdefault(str(run.place["scenario"]), set()).add(place)
+    for run, reason in results.left_out:
+        place = str(run).removesuffix(f", seed {run.seed}")
+        seeds.setdefault((str(run.place["scenario"]), place, reason), []).append(run.seed)
+    alike: dict[tuple[str, str, tuple[int, ...]], list[str]] = {}
+    for (scenario, place, reason), those in seeds.items():
+        alike.setdefault((scenario, reason, tuple(those)), []).append(place)
+    lines = []
+    for (scenario, reason, same), those_places in alike.items():
+        which = f"seed{'s' * (len(same) > 1)} {format_seeds(same)}: {reason}"
+        if len(those_places) == len(places[scenario]) > 1:
+            lines.append(f"{scenario}, {which} ({len(those_places) * len(same)} runs)")
+        else:
+            lines += [f"{place}, {which}" for place in those_places]
+    return lines
+
+
 _SCORE = (
     "A score of 0 plays like `random`, a score of 1 like `hungarian`, in the same worlds. ± is "
-    "half the 95 % interval over seeds (Student's t).\n"
+    "half the 95 % interval over seeds (Student's t); in brackets are the values of the seeds.\n"
 )
-
-
+_DOTS = "A dot is a run; a bar is the mean over seeds with its 95 % interval.\n"
+_CURVES = (
+    "Curves are training episodes with sampled actions: means over seeds with 95 % intervals "
+    "(Student's t), of two seeds the range. Minutes are means over seeds. Dotted lines are scripts "
+    "in episodes as long as those of training: in the worlds of the evaluation, or, where its "
+    f"episodes have another length, in {EPISODES} episodes in worlds as those of the training.\n"
+)
 _AGGREGATES = (
     "IQM is the interquartile mean of the score over runs and scenarios, with a 95 % interval of a "
     "bootstrap within scenarios. The other columns are the share of runs that score more: a "
@@ -87,34 +148,41 @@ def aggregates_table(aggregates: Mapping[Length, Mapping[str, Aggregate]]) -> Ta
 
 def algorithm_names(found: Sequence[Aggregate]) -> dict[str, Aggregate]:
     """Algorithms by a name of their own: what differs between their places in the grid."""
-    varied = _varied([one.algorithm for one in found]) or ["method"]
+    varied = varied_in([one.algorithm for one in found]) or ["method"]
     return {" ".join(str(one.algorithm[key]) for key in varied): one for one in found}
 
 
-def study_document(
-    study: StudyFolder,
-    states: Mapping[str, State],
-    found: Sequence[Mean],
-    compared: Sequence[Compared],
-    aggregates: Mapping[Length, Mapping[str, Aggregate]],
-) -> dict[str, Any]:
+def study_document(found: Found) -> dict[str, Any]:
     """The same as a JSON document."""
+    study = found.study
     return {
-        "schema_version": 1,
+        "schema_version": 2,
+        "note": found.note,
         "question": study.study.question,
         "rules": [as_json(one) for one in study.rules],
-        "runs": dict(states),
-        "means": [
-            {
-                "place": dict(one.place),
-                "seeds": list(one.seeds),
-                "values": {
-                    f"{measure}.{length}": as_json(value)
-                    for (measure, length), value in one.values.items()
-                },
-            }
-            for one in found
+        "runs": [_listed(one) for one in found.results.finished],
+        "left_out": [
+            {"place": dict(run.place), "seed": run.seed, "key": run.key, "why": why}
+            for run, why in found.results.left_out
         ],
+        "tables": {
+            title: [
+                {
+                    "place": dict(one.place),
+                    "seeds": list(one.seeds),
+                    "values": {
+                        f"{measure}.{length}": {
+                            "each": list(values.each.values()),
+                            "mean": as_json(values.mean),
+                        }
+                        for (measure, length), values in one.values.items()
+                    },
+                }
+                for one in rows
+            ]
+            for title, (_, rows) in found.tables.items()
+        },
+        "curves": {title: [_curve(one) for one in own] for title, own in found.curves.items()},
         "over_all_scenarios": [
             {
                 "algorithm": dict(one.algorithm),
@@ -122,12 +190,14 @@ def study_document(
                 "iqm": as_json(one.iqm),
                 "above": dict(zip(map(str, THRESHOLDS), one.above, strict=True)),
             }
-            for length, found in aggregates.items()
-            for one in found.values()
+            for length, aggregates in found.aggregates.items()
+            for one in aggregates.values()
         ],
         "contrasts": [
             {
                 **one.contrast.model_dump(mode="json"),
+                "length": one.length,
+                "family": one.family,
                 "of": {"a": dict(one.a), "b": dict(one.b)},
                 "seeds": list(one.seeds),
                 "mean": one.mean,
@@ -138,53 +208,129 @@ def study_document(
                 "equivalence_p": one.found.equivalence_p if one.found else None,
                 "verdict": one.verdict,
             }
-            for one in compared
+            for one in found.compared
         ],
     }
 
 
-def means_table(found: Sequence[Mean]) -> Table:
-    """Rescues and scores of every place in the grid."""
-    varied = _varied([one.place for one in found]) or ["method"]
-    rows = [
-        [
-            *(str(one.place[key]) for key in varied),
-            str(len(one.seeds)),
-            *(NONE if value is None else plus_minus(value) for value in one.values.values()),
-        ]
-        for one in found
-    ]
-    heads = ["seeds", "rescues/episode", "score", "score, long episodes"]
-    return plain_table(columns(varied, heads), rows)
+def _listed(one: Result) -> dict[str, Any]:
+    """What names a run, and what made it."""
+    named = {"place": dict(one.run.place), "seed": one.run.seed, "key": one.run.key}
+    if one.finished is None:
+        return named
+    info = one.finished.info
+    return named | {
+        "folder": f"runs/{one.finished.folder.name}",
+        "archived": one.finished.archived,
+        "config_sha256": one.finished.config_sha256,
+        "weights_sha256": one.finished.weights_sha256,
+        "commit": info.commit,
+        "device": info.device,
+        "versions": info.versions,
+    }
 
 
-def contrasts_table(compared: Sequence[Compared]) -> Table:
-    """Every contrast with its numbers."""
-    rows = [
-        [
-            one.contrast.name,
-            sides,
-            f"{one.contrast.measure}, {one.contrast.length}",
-            format_seeds(one.seeds) or NONE,
-            NONE if one.found is None else format_estimate(one.found.difference),
-            NONE if one.improvement is None else format_estimate(one.improvement),
-            format_p(one.holm_p),
-            f"{one.contrast.margin:g}",
-            one.verdict,
+def _curve(curve: LearningCurve) -> dict[str, Any]:
+    return {
+        "situation": curve.situation,
+        "method": curve.method,
+        "env_steps": curve.env_steps.tolist(),
+        "seconds": curve.seconds.tolist(),
+        "rescues_per_episode": curve.rescues.to_json(),
+        "scripts": curve.scripts,
+    }
+
+
+def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:
+    """Measures of every place in the grid.
+
+    Args:
+        found: at least one.
+        seeds: whether the value of each seed is shown; then means are bold, for Markdown.
+    """
+    varied = varied_in([one.place for one in found]) or ["method"]
+    rows = []
+    for one in found:
+        cells = [value_cell(x) if seeds else plus_minus(x.mean) for x in one.values.values()]
+        rows.append([*(str(one.place[key]) for key in varied), format_seeds(one.seeds), *cells])
+    heads = []
+    for measure, length in found[0].values:
+        steps = {one.episode_steps[length] for one in found}
+        which = f"{steps.pop()} steps" if len(steps) == 1 else f"{length} episodes"
+        heads.append(f"{_IN_WORDS.get(measure, measure.replace('_', ' '))}, {which}")
+    return plain_table(columns(varied, ["seeds", *heads]), rows)
+
+
+_IN_WORDS = {"rescues_per_episode": "rescues"}
+
+
+def value_cell(values: Values) -> str:
+    """The mean over seeds with half its interval, and the value of each seed."""
+    mean = values.mean
+    if mean is None:
+        return NONE
+    each = ", ".join(NONE if one is None else format_number(one) for one in values.each.values())
+    half = f" ± {format_number((mean.high - mean.low) / 2)}" if mean.bounded else ""
+    return f"**{format_number(mean.mean)}**{half} ({each})"
+
+
+def contrasts_tables(compared: Sequence[Compared]) -> str:
+    """Every contrast with its numbers, a table for each measure, length and margin."""
+    groups: dict[tuple[str, Length, float], list[tuple[Compared, str]]] = {}
+    for one, (sides, where) in zip(compared, _sides(compared), strict=True):
+        key = one.contrast.measure, one.length, one.contrast.margin
+        groups.setdefault(key, []).append((one, f"{sides} ({where})" if where else sides))
+    parts = []
+    for (measure, length, margin), own in groups.items():
+        rows = [
+            [
+                one.contrast.name,
+                sides,
+                format_seeds(one.seeds) or NONE,
+                NONE if one.found is None else format_estimate(one.found.difference),
+                NONE if one.improvement is None else format_estimate(one.improvement),
+                format_p(one.holm_p),
+                one.verdict,
+            ]
+            for one, sides in own
         ]
-        for one, sides in zip(compared, _sides(compared), strict=True)
-    ]
-    heads = ["difference [95 %]", "P(a > b) [95 %]", "Holm's p", "margin", "verdict"]
-    return plain_table(columns(["contrast", "a - b", "measure", "seeds"], heads), rows)
+        heads = ["seeds", "difference [95 %]", "P(a > b) [95 %]", "Holm's p", "verdict"]
+        words = measure.replace("_", " ")
+        parts += [
+            f"**{words[:1].upper()}{words[1:]}, {length} episodes**; within {margin:g} is alike.\n",
+            markdown(plain_table(columns(["contrast", "a - b"], heads), rows)),
+        ]
+    return "\n".join(parts)
 
 
 def sentences(compared: Sequence[Compared]) -> list[str]:
-    """What each contrast says, in Markdown."""
-    return [_sentence(one, sides) for one, sides in zip(compared, _sides(compared), strict=True)]
+    """What each contrast says, in Markdown; places that say the same are named together.
+
+    Of a contrast at both lengths of episodes it is what the standard one says.
+    """
+    groups: dict[str, list[tuple[Compared, str, str]]] = {}
+    for one, (sides, where) in zip(compared, _sides(compared), strict=True):
+        if one.length == one.contrast.lengths[0]:
+            groups.setdefault(one.contrast.name, []).append((one, sides, where))
+    return [
+        _sentence(*own[0]) if len(own) == 1 else _together(name, own)
+        for name, own in groups.items()
+    ]
 
 
-def _sentence(one: Compared, sides: str) -> str:
-    head = f"**{one.contrast.name}**, {sides}: {one.verdict}"
+def _together(name: str, own: Sequence[tuple[Compared, str, str]]) -> str:
+    """One contrast at several places."""
+    verdicts: dict[str, list[str]] = {}
+    for one, _, where in own:
+        verdicts.setdefault(one.verdict, []).append(where)
+    sides = list(dict.fromkeys(sides for _, sides, _ in own))
+    which = f", {sides[0]}" if len(sides) == 1 else ""
+    told = "; ".join(f"{verdict} in {', '.join(places)}" for verdict, places in verdicts.items())
+    return f"**{name}**{which}: {told}."
+
+
+def _sentence(one: Compared, sides: str, where: str) -> str:
+    head = f"**{one.contrast.name}**, {sides}{f' ({where})' if where else ''}: {one.verdict}"
     if one.mean is None:
         return f"{head}, no seed has both runs."
     measure = one.contrast.measure.replace("_", " ")
@@ -198,19 +344,19 @@ def _seeds(one: Compared) -> str:
     return f"{len(one.seeds)} seed{'' if len(one.seeds) == 1 else 's'}"
 
 
-def _sides(compared: Sequence[Compared]) -> list[str]:
+def _sides(compared: Sequence[Compared]) -> list[tuple[str, str]]:
     """What differs between both sides of each contrast, and what they share that others do not."""
-    varied = _varied([place for one in compared for place in (one.a, one.b)])
+    varied = varied_in([place for one in compared for place in (one.a, one.b)])
     texts = []
     for one in compared:
         free = [key for key in varied if one.a.get(key) != one.b.get(key)]
         a, b = (" ".join(str(side[key]) for key in free if key in side) for side in (one.a, one.b))
         shared = [str(one.a[key]) for key in varied if key not in free and key in one.a]
-        texts.append(f"{a} - {b}" + (f" ({' '.join(shared)})" if shared else ""))
+        texts.append((f"{a} - {b}", " ".join(shared)))
     return texts
 
 
-def _varied(places: Sequence[Mapping[str, Value]]) -> list[str]:
+def varied_in(places: Sequence[Mapping[str, Value]]) -> list[str]:
     """Coordinates that are not the same everywhere."""
     keys = dict.fromkeys(key for place in places for key in place)
     return [key for key in keys if len({place.get(key) for place in places}) > 1]

@@ -24,7 +24,7 @@ class _Worker(Job):
         from innerattn.studies.work import work
 
         study = open_study(self.folder)
-        work(study.ledger(), study.planned, report=report)
+        work(study.ledger(), study.to_do, report=report)
 
 
 def run_workers(folder: Path, count: int, *, left: Callable[[], int]) -> None:

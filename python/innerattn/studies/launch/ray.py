@@ -108,4 +108,4 @@ def _work(folder: str) -> None:
     from innerattn.studies.work import work
 
     study = open_study(Path(folder))
-    work(study.ledger(), study.planned)
+    work(study.ledger(), study.to_do)

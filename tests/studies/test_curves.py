@@ -6,18 +6,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_study import run_in
 
 from innerattn.envs import BatchEnv
-from innerattn.experiments.learning.curves import (
-    EPISODES,
-    PARTS,
-    SCRIPTS,
-    in_parts,
-    learning_curves,
-)
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.policies import PolicyInput, WorldState, scripted_policy
+from innerattn.studies.curves import (
+    EPISODES,
+    PARTS,
+    SCRIPTS,
+    LearningCurve,
+    in_parts,
+    learning_curves,
+)
+
+
+def curves_of(*runs: FinishedRun) -> list[LearningCurve]:
+    return learning_curves([(runs[0].situation, runs[0].method, runs)])
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -43,7 +49,7 @@ def test_means_over_parts_are_those_of_a_plain_loop(seed: int) -> None:
 
 def test_a_curve_is_the_mean_over_runs(runs: list[FinishedRun]) -> None:
     own = [run for run in runs if run.method == "td-inner"]
-    (curve,) = learning_curves([own])
+    (curve,) = curves_of(*own)
     assert (curve.situation, curve.method) == ("mixed", "td-inner")
     courses, all_lines = [], []
     for run in own:
@@ -78,7 +84,7 @@ def test_scripts_play_episodes_as_long_as_those_of_training(runs: list[FinishedR
     run = next(run for run in runs if run.method == "td-inner")
     train = run.config.train.replace(episode_steps=50, engine="discs")
     longer = replace(run, config=run.config.model_copy(update={"train": train}))
-    (curve,) = learning_curves([[longer]])
+    (curve,) = curves_of(longer)
     scenario = run.config.scenario.replace(episode_steps=50, engine="discs")
     policy, rescues = scripted_policy("hungarian", scenario), 0
     with BatchEnv(scenario, EPISODES, seed=run.seed) as env:
@@ -91,5 +97,5 @@ def test_scripts_play_episodes_as_long_as_those_of_training(runs: list[FinishedR
 
 
 def test_runs_in_which_no_episode_ended_have_no_curve(finished_study: Path) -> None:
-    folder = finished_study / "runs" / "mixed-td-inner-quick-s0"
-    assert learning_curves([[read_run(Case("mixed", "td-inner", 0), folder)]]) == []
+    run = read_run(Case("mixed", "td-inner", 0), run_in(finished_study, "td-inner"))
+    assert curves_of(run) == []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +28,7 @@ class LearningCurve:
 
     Attributes:
         situation: of the worlds.
-        method: of training.
+        method: what was trained, by name.
         env_steps: (P,) in the middle of each part.
         seconds: (P,) of training until then, with what compiling took; means over runs.
         rescues: (P,) per training episode, over runs; NaN where no episode ended.
@@ -45,22 +45,27 @@ class LearningCurve:
     scripts: dict[str, float]
 
 
-def learning_curves(groups: Sequence[Sequence[FinishedRun]]) -> list[LearningCurve]:
+def learning_curves(
+    groups: Iterable[tuple[str, str, Sequence[FinishedRun]]],
+) -> list[LearningCurve]:
     """The courses of groups of runs; a group with a run in which no episode ended has none.
 
     Args:
-        groups: runs of one situation and method, one per seed.
+        groups: situation, name of the method, and a run for each seed.
 
     Raises:
         RunError: a run has no readable metrics.
     """
     scripts: dict[str, dict[str, float]] = {}
-    curves = (_curve(group, scripts) for group in groups)
+    curves = (_curve(*group, scripts) for group in groups)
     return [curve for curve in curves if curve is not None]
 
 
 def _curve(
-    group: Sequence[FinishedRun], scripts: dict[str, dict[str, float]]
+    situation: str,
+    method: str,
+    group: Sequence[FinishedRun],
+    scripts: dict[str, dict[str, float]],
 ) -> LearningCurve | None:
     courses = [_course(run) for run in group]
     if not all(len(steps) for steps, _ in courses):
@@ -71,12 +76,11 @@ def _curve(
     parts = max(1, min(PARTS, 2 * fewest // 3))
     edges = np.linspace(0.0, end, parts + 1)
     middles = (edges[1:] + edges[:-1]) / 2.0
-    situation = group[0].situation
     if situation not in scripts:  # they play once for all methods
         scripts[situation] = _scripts(group[0])
     return LearningCurve(
         situation=situation,
-        method=group[0].method,
+        method=method,
         env_steps=middles,
         seconds=np.mean([_seconds_at(run, middles) for run in group], axis=0),
         rescues=seed_curve(np.stack([in_parts(steps, values, edges) for steps, values in courses])),

@@ -1,1 +1,0 @@
-"""What learnt attention is worth: its teams beside those of other critics, in teams of any size."""

@@ -1,1 +1,0 @@
-"""What learnt attention is worth, as a page with a figure."""

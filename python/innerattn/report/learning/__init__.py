@@ -1,1 +1,0 @@
-"""The report on what methods learn: its page, its tables and its figure."""
