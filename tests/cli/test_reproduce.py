@@ -1,6 +1,7 @@
 """`innerattn reproduce`: trains what is missing, uses what is as planned, and names the rest."""
 
 import json
+import re
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
@@ -134,6 +135,23 @@ def test_the_same_command_makes_the_same_files_from_nothing(
     assert {"report.md", "table2.csv", "table2.json", "fig4.pdf", "study.toml"} <= made
     for name in made:
         assert (one / "all" / name).read_bytes() == (other / "all" / name).read_bytes(), name
+
+
+def test_runs_with_names_of_an_earlier_version_are_taken_over(
+    study: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for method in TD.split(","):
+        run_in(study, method).rename(study / "runs" / f"mixed-{method}-quick-s0")
+    foreign = study / "runs" / "mixed-mappo-quick-s0"
+    foreign.mkdir()
+    shutil.rmtree(study / "claims")
+    assert command("table2", study, "td-inner", "--seeds", "1", "--report-only") == 0
+    assert capsys.readouterr().err == ""
+    names = {path.name for path in (study / "runs").iterdir()}
+    assert names == {foreign.name, "mixed-td-uniform-quick-s0", run_in(study, "td-inner").name}
+    assert re.search("-[0-9a-f]{16}$", run_in(study, "td-inner").name)
+    assert command("learning", study, TD, "--seeds", "1", "--report-only") == 0
+    assert len(document(study / "learning")["runs"]) == 2
 
 
 @pytest.mark.usefixtures("in_this_process")

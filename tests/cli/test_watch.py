@@ -13,12 +13,15 @@ from typing import Any
 import pytest
 from browser import PHONE, WIDE, Visit, opened_browser, until
 from reseal import reseal
+from tiny_study import TINY
 
 from innerattn.cli.main import main
 from innerattn.cli.watch import Watch, _scripts_beside
 from innerattn.errors import RunError
 from innerattn.records.run_files import seal
 from innerattn.records.run_folder import run_info
+from innerattn.studies.folder import begin_study
+from innerattn.studies.work import work
 
 FRAME = "document.querySelector('#episodes')"
 INSIDE = f"{FRAME}.contentDocument?.documentElement?"
@@ -130,3 +133,49 @@ def test_scripts_stand_beside_runs_of_the_same_worlds_only(run_dir: Path, tmp_pa
     config.write_text(config.read_text().replace('"mixed"', '"double"'))
     reseal(other)
     assert _scripts_beside([run_dir, other]) == {}
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_a_study_is_watched_while_it_goes_on(tmp_path: Path) -> None:
+    file = tmp_path / "tiny.toml"
+    file.write_text(TINY)
+    study = begin_study(file, tmp_path / "study")
+    command = [sys.executable, "-m", "innerattn", "watch", str(study.path)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    problems: list[str] = []
+    try:
+        address = process.stdout.readline().split()[-1]
+        with opened_browser() as browser:
+            page = browser.new_page(viewport={"width": WIDE[0], "height": WIDE[1]})
+            page.on("pageerror", lambda error: problems.append(str(error)))
+            page.on("console", lambda m: problems.append(m.text) if m.type == "error" else None)
+            page.goto(address)
+            page.get_by_text("0 of 6 runs are done, 0 running, 6 waiting.").wait_for()
+            assert page.locator("h1").inner_text() == "Does inner attention matter?"
+            assert page.locator("#scores-part").is_hidden()
+            claim = study.ledger().claim(run.key for run in study.planned[-1:])
+            assert claim is not None
+            work(study.ledger(), study.planned[:4])
+            claim.fail("Traceback\nRunError: no luck <b>")
+            page.get_by_text("4 of 6 runs are done").wait_for()
+            assert page.locator("#scores tr").count() == 2
+            assert "undecided" in page.locator("#verdicts li").inner_text()
+            claim = study.ledger().claim(run.key for run in study.planned[4:])
+            assert claim is not None
+            page.get_by_text("4 of 6 runs are done, 1 running, 1 waiting.").wait_for()
+            assert page.locator("#running th").inner_text() == str(study.planned[4])
+            for _ in range(3):
+                claim.fail("RunError: no luck <b>")
+                claim = study.ledger().claim([study.planned[4].key])
+            page.get_by_text("1 failed").wait_for()
+            failed = page.locator("#failed li").inner_text()
+            assert failed == f"{study.planned[4]}: RunError: no luck <b>"
+            assert not Visit(page).serious_faults()
+            page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
+            until(page, f"document.documentElement.scrollWidth <= {PHONE[0]}")
+            assert not problems
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=30) == 0
+        process.stdout.close()

@@ -12,7 +12,7 @@ import pytest
 from innerattn.errors import RunError
 from innerattn.experiments.side_by_side import Run
 from innerattn.studies import work as working
-from innerattn.studies.folder import StudyFolder, begin_study
+from innerattn.studies.folder import StudyFolder, begin_study, open_study
 from innerattn.studies.ledger import Claim, ClaimLostError
 from innerattn.studies.work import Outcome, work
 
@@ -165,3 +165,20 @@ def test_two_workers_share_the_runs(tiny_file: Path, tmp_path: Path) -> None:
         for run in study.planned
     }
     assert len(digests) == 6
+
+
+def test_studies_share_the_runs_of_a_pool(tiny_file: Path, tmp_path: Path) -> None:
+    pool = tmp_path / "pool"
+    first = begin_study(tiny_file, tmp_path / "first", pool=pool)
+    work(first.ledger(), first.to_do)
+    tiny_file.write_text(tiny_file.read_text().replace('"0..2"', "[0, 5]"))
+    second = begin_study(tiny_file, tmp_path / "second", pool=pool)
+    states = {run.key: second.states()[run.key] for run in second.planned}
+    assert list(states.values()) == ["done", "done", "planned", "planned"]
+    assert second.rules[0].finished == 2
+    assert open_study(second.path).runs == pool / "runs"
+    with pytest.raises(RunError, match=r"its runs are in .*pool: must be .*other; choose another"):
+        begin_study(tiny_file, tmp_path / "second", pool=tmp_path / "other")
+    (second.path / "pool.json").write_text("{}")
+    with pytest.raises(RunError, match=r"pool\.json: does not name the folder"):
+        open_study(second.path)

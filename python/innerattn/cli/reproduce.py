@@ -80,6 +80,7 @@ class Reproduce(LongCommand):
             check_format(Path("figure.png"))
         study = self._begun(target)
         self._check_page(study)  # before hours of training, not after
+        study.take_over()
         if not self.report_only:
             do_runs(self, study)
         page = self.page is not None

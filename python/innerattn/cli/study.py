@@ -47,6 +47,8 @@ class Study(LongCommand):
     """The study's file (.toml), or its folder once it has begun."""
     out: Path | None = None
     """Folder of the study in a file; None: studies/NAME for NAME.toml."""
+    pool: Path | None = None
+    """Folder whose runs the study shares with others (run); None: its own."""
     workers: int | None = None
     """How many workers (run) or jobs (slurm); None: one for each core, also of a cluster, or 10
     jobs."""
@@ -148,7 +150,11 @@ class Study(LongCommand):
         """The study in a folder, or that of a file, which begins here where it has not begun."""
         from innerattn.studies.folder import begin_study
 
-        return self._opened() if self.study.is_dir() else begin_study(self.study, self._folder())
+        return (
+            self._opened()
+            if self.study.is_dir()
+            else begin_study(self.study, self._folder(), pool=self.pool)
+        )
 
     def _opened(self) -> StudyFolder:
         """The study in a folder, or that of a file, which has begun; nothing is written."""

@@ -1,9 +1,9 @@
-"""`innerattn watch`: trainings in the browser while they go on."""
+"""`innerattn watch`: trainings, or a study, in the browser while they go on."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from innerattn.errors import InnerattnError, RunError
 
 if TYPE_CHECKING:
     from innerattn.records import Record
+    from innerattn.report.local_server import Answer
 
 SCRIPTS = ("hungarian", "greedy")
 SCRIPT_EPISODES = 200
@@ -24,10 +25,11 @@ SCRIPT_EPISODES = 200
 
 @dataclass(kw_only=True)
 class Watch(Command):
-    """Watch trainings in a browser on this machine while they go on; Ctrl-C ends it."""
+    """Watch trainings or a study in a browser on this machine while they go on; Ctrl-C ends it."""
 
     runs: Annotated[tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN [RUN ...]")]
-    """Folders of runs, such as those that --seeds makes, or a folder that holds runs."""
+    """Folders of runs, such as those that --seeds makes, or a folder that holds runs; or the folder
+    of one study."""
     port: int = 0
     """Port of 127.0.0.1; 0: any that is free."""
     episodes: int = 4
@@ -44,17 +46,26 @@ class Watch(Command):
         """
         self._check()
         from innerattn.report.local_server import LocalServer
-        from innerattn.report.watch.pages import watch_pages
 
-        folders = self._folders()
-        pages = watch_pages(folders, _scripts_beside(folders), self._play)
-        server = LocalServer(pages, self.port)
+        server = LocalServer(self._pages(), self.port)
         greeting = f"Watch at {server.address}\nCtrl-C ends it."
         try:
             server.serve(partial(print, greeting, flush=True))
         except KeyboardInterrupt:
             print()
         return 0
+
+    def _pages(self) -> Mapping[str, Callable[[], Answer]]:
+        """The pages of a study, or of runs."""
+        if len(self.runs) == 1 and (Path(self.runs[0]) / "study.toml").is_file():
+            from innerattn.report.watch.study import study_pages
+            from innerattn.studies.folder import open_study
+
+            return study_pages(open_study(Path(self.runs[0])))
+        from innerattn.report.watch.pages import watch_pages
+
+        folders = self._folders()
+        return watch_pages(folders, _scripts_beside(folders), self._play)
 
     def _check(self) -> None:
         if not self.runs:

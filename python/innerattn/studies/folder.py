@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,13 +14,16 @@ from typing import Any
 
 from innerattn.config.files import write_whole
 from innerattn.config.untrusted import MOST_JSON_BYTES, MOST_TOML_BYTES, parse_json, read_plain
-from innerattn.errors import RunError
+from innerattn.errors import InnerattnError, RunError
 from innerattn.experiments import archive
 from innerattn.experiments.run import FinishedRun
+from innerattn.records.run_files import RunFiles
+from innerattn.records.run_folder import config_of
 from innerattn.studies.ledger import Ledger, State
 from innerattn.studies.plan import PlannedRun, plan_study, run_digest
 from innerattn.studies.study import Study, study_in
 
+_OF_A_LEDGER = re.compile("-[0-9a-f]{16}$")
 _FILE, _RULES, _POOL = "study.toml", "rules.json", "pool.json"
 
 
@@ -84,6 +88,34 @@ class StudyFolder:
         """Its runs that no archive has; one of each key."""
         first = {run.key: run for run in reversed(self.planned) if run.key not in self.archived}
         return list(reversed(first.values()))
+
+    def take_over(self) -> list[Path]:
+        """Let finished runs in ``runs`` that have other names be runs of the study.
+
+        Such are runs of `innerattn train` that were put there, and those of version 0.1, which were
+        named by their method and seed.
+
+        Returns:
+            Where they are now.
+
+        Raises:
+            OSError: the folder cannot be read, or a run in it cannot be renamed.
+        """
+        by_digest = {run.digest: run.key for run in self.planned}
+        taken = []
+        for folder in sorted(self.runs.iterdir()) if self.runs.is_dir() else ():
+            summary = folder / "evaluation" / "summary.json"
+            if _OF_A_LEDGER.search(folder.name) or not summary.exists():
+                continue
+            try:
+                files = RunFiles(folder)
+                key = by_digest.get(run_digest(config_of(files)))
+            except InnerattnError:
+                continue
+            done = files.info.state == "done"
+            if done and key is not None and not os.path.lexists(self.runs / key):
+                taken.append(folder.rename(self.runs / key))
+        return taken
 
     def states(self) -> dict[str, State]:
         """The state of each of its runs by key; those of an archive are done.

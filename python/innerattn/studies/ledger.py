@@ -186,6 +186,19 @@ class Ledger:
         done, runs = self._listed()
         return {key: _state(key in done, runs.get(key)) for key in keys}
 
+    def at_work(self) -> dict[str, Path]:
+        """Folders of the runs that are claimed, by key; they may not be there yet.
+
+        Raises:
+            OSError: the ledger cannot be read.
+        """
+        done, runs = self._listed()
+        return {
+            key: self.folder / "work" / f"{key}.{run.number}" / key
+            for key, run in runs.items()
+            if _state(key in done, run) == "claimed"
+        }
+
     def failures(self, key: str) -> list[str]:
         """Why the tries of a run failed or ended without a word, the last one last.
 
