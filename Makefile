@@ -23,8 +23,10 @@ robot: setup ## export a trained team, and let four processes drive it, one for 
 	@test -e runs/robot/export || innerattn export runs/robot
 	@PYTHONPATH=examples/robot python -m robot run runs/robot/export
 
+LIMIT := $(shell command -v timeout >/dev/null && echo timeout 900)# of all Rust tests together [s]
+
 test: setup lint ## every check but the long one
-	cargo test --quiet --locked
+	$(LIMIT) cargo test --quiet --locked
 	pytest -n auto --dist worksteal
 
 test-pool: ## the pool of threads under every order of events that the memory model allows

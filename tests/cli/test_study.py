@@ -14,6 +14,7 @@ import pytest
 from tiny_study import TINY
 
 from innerattn.cli.main import main
+from innerattn.studies.folder import begin_study
 
 
 @pytest.fixture
@@ -138,3 +139,28 @@ def test_wrong_usage(
     err = capsys.readouterr().err
     assert text in err
     assert err.count("\n") == 1
+
+
+def test_runs_that_were_given_up_are_tried_again(
+    file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = begin_study(file, Path("studies/tiny"))
+    first, second = study.planned[:2]
+    for _ in range(3):
+        claim = study.ledger().claim([first.key])
+        assert claim is not None
+        claim.fail("RunError: no luck")
+    assert main(["study", "status", str(study.path)]) == 1
+    assert "failed: mixed ppo-inner tiny, seed 0: RunError: no luck" in capsys.readouterr().err
+    assert main(["study", "retry", str(study.path)]) == 0
+    said = capsys.readouterr().out
+    assert (
+        said
+        == f"{first}: will be tried again\n1 run to try again: innerattn study run {study.path}\n"
+    )
+    claim = study.ledger().claim([first.key, second.key])
+    assert claim is not None
+    assert (claim.key, claim.number) == (first.key, 4)
+    claim.free()
+    assert main(["study", "retry", str(study.path)]) == 0
+    assert capsys.readouterr().out == "0 runs to try again\n"

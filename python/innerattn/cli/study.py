@@ -29,12 +29,13 @@ _TIME = re.compile(r"([0-9]{1,6})([smh])")
 _MOST_SHOWN = 500
 """Finished runs whose scores `status` reads; more would make it slow."""
 _UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
-Action = Literal["run", "work", "status", "report", "slurm"]
+Action = Literal["run", "work", "status", "report", "retry", "slurm"]
 _WHAT = """What to do.
 - run: begin or go on with the study in a file, with a worker for each core.
 - work: be one worker for a study that has begun.
 - status: how many runs are done, how long the others will take, and their scores so far.
 - report: write the report again, as Markdown and JSON, and the scores for other tools.
+- retry: let runs that were given up be tried again; run does them.
 - slurm: print a script for sbatch whose jobs are workers."""
 
 
@@ -134,6 +135,16 @@ class Study(LongCommand):
         study = study or self._opened()
         found, files = write_study(study, read_results(study))
         return say_report(self, found, files)
+
+    def _retry(self) -> int:
+        study = self._opened()
+        again = set(study.ledger().retry(study.keys))
+        for run in study.to_do:
+            if run.key in again:
+                print(f"{run}: will be tried again")
+        count = f"{len(again)} run{'s' * (len(again) != 1)}"
+        print(f"{count} to try again" + (f": innerattn study run {study.path}" if again else ""))
+        return 0
 
     def _slurm(self) -> int:
         from innerattn.studies.launch.slurm import slurm_script

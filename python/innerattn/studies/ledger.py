@@ -186,6 +186,22 @@ class Ledger:
         done, runs = self._listed()
         return {key: _state(key in done, runs.get(key)) for key in keys}
 
+    def retry(self, keys: Iterable[str]) -> list[str]:
+        """Let those of some runs that were given up be tried again, from what they had saved.
+
+        Returns:
+            Their names.
+
+        Raises:
+            OSError: the ledger cannot be read or written.
+        """
+        given_up = [key for key, state in self.states(keys).items() if state == "failed"]
+        for key in given_up:
+            for end in ("failed", "died"):
+                for mark in self.folder.glob(f"claims/{key}.*.{end}"):
+                    mark.replace(mark.with_suffix(".free"))
+        return given_up
+
     def at_work(self) -> dict[str, Path]:
         """Folders of the runs that are claimed, by key; they may not be there yet.
 
