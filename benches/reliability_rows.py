@@ -60,7 +60,7 @@ ROWS: tuple[Row, ...] = (
         (
             "tests/train/test_resume.py",
             "tests/train/test_compiled_resume.py",
-            "tests/experiments/test_stopped_study.py",
+            "tests/studies/test_work.py",
         ),
     ),
     Row(

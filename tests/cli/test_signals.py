@@ -23,6 +23,10 @@ from innerattn.train.saved import whole_checkpoints
 pytestmark = pytest.mark.usefixtures("interruptible")
 ENDLESS = ("--train.env-steps", "100000000", "--train.compile", "off")
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+IN_TRAINING = (
+    signal.SIGTERM,
+    *(pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGINT, signal.SIGHUP)),
+)
 PARTIAL = re.compile(r"\..+\.([0-9a-f]{16}|[0-9]+)")
 
 
@@ -112,7 +116,7 @@ def test_as_soon_as_a_page_is_served(
     assert out.pressed
 
 
-@pytest.mark.parametrize("sent", SIGNALS)
+@pytest.mark.parametrize("sent", IN_TRAINING)
 def test_in_training(sent: signal.Signals, tiny: list[str], tmp_path: Path) -> None:
     run = tmp_path / "run"
     with begin(run, [*tiny, *ENDLESS]) as process:

@@ -16,7 +16,16 @@ def run(words: list[str], closed: str, folder: Path) -> int:
     return subprocess.run(line, cwd=folder, check=False, timeout=120).returncode
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&- <&-"])
+EVALUATE = ["evaluate", "hungarian", "--episodes", "2", "--score-episodes", "2"]
+
+
+@pytest.mark.parametrize(
+    "closed",
+    [
+        ">&- 2>&- <&-",
+        *(pytest.param(one, marks=pytest.mark.slow) for one in (">&-", "2>&-", "<&-")),
+    ],
+)
 def test_a_training_goes_on_without_its_streams(
     closed: str, tiny: list[str], tmp_path: Path
 ) -> None:
@@ -34,7 +43,11 @@ def test_a_training_goes_on_without_its_streams(
         (["--help"], 0),
         (["info"], 0),
         (["new", "scenario", "flood"], 0),
-        (["evaluate", "hungarian", "--episodes", "2", "--score-episodes", "2"], 0),
+        pytest.param(
+            ["evaluate", "hungarian", "--episodes", "2", "--score-episodes", "2"],
+            0,
+            marks=pytest.mark.slow,
+        ),
         (["nonsense"], 2),
         (["report", "nothing"], 1),
     ],

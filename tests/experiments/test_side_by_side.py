@@ -110,7 +110,14 @@ def test_runs_are_those_of_single_commands_and_a_failure_leaves_them_alone(
     assert f"  {path}-s5 (done)\n  {path}-s1 (failed)\n  {path}-s3 (done)\n" in out
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "sent",
+    [
+        signal.SIGINT,
+        pytest.param(signal.SIGTERM, marks=pytest.mark.slow),
+        pytest.param(signal.SIGHUP, marks=pytest.mark.slow),
+    ],
+)
 def test_ctrl_c_saves_every_run_and_leaves_no_process(
     sent: signal.Signals,
     tiny: list[str],

@@ -89,16 +89,30 @@ def agree(algorithm: str, robots: int, backend: str, network: dict, numbers: dic
             assert not torch.equal(state[name], before[name]), name
 
 
-@pytest.mark.parametrize(("robots", "attention"), [(1, "inner"), (4, "inner"), (4, "uniform")])
-@pytest.mark.parametrize("algorithm", ["td", "ppo"])
+@pytest.mark.parametrize(
+    ("algorithm", "robots", "attention"),
+    [
+        ("td", 4, "inner"),
+        ("ppo", 4, "uniform"),
+        ("ppo", 1, "inner"),
+        pytest.param("td", 1, "inner", marks=pytest.mark.slow),
+        pytest.param("td", 4, "uniform", marks=pytest.mark.slow),
+        pytest.param("ppo", 4, "inner", marks=pytest.mark.slow),
+    ],
+)
 def test_the_traced_update_agrees(algorithm: str, robots: int, attention: str) -> None:
     agree(algorithm, robots, "aot_eager", {"attention": attention}, {})
+
+
+SAMPLED = {"policy_gradient": "sampled", "entropy_target": "maac"}
 
 
 @pytest.mark.parametrize(
     ("algorithm", "numbers"),
     [
-        ("td", {"policy_gradient": "sampled", "entropy_target": "maac"}),
+        pytest.param(
+            "td", {"policy_gradient": "sampled", "entropy_target": "maac"}, marks=pytest.mark.slow
+        ),
         ("ppo", {"advantage": "value"}),
     ],
 )
@@ -119,9 +133,12 @@ def test_the_traced_update_agrees_by_kind() -> None:
     agree("td", 4, "aot_eager", {**BY_KIND, "shared_gradients": "mean"}, {})
 
 
-@pytest.mark.parametrize("algorithm", ["td", "ppo"])
-def test_the_compiled_update_agrees(algorithm: str) -> None:
-    agree(algorithm, 4, "inductor", {"attention": "inner"}, {})
+@pytest.mark.parametrize(
+    ("algorithm", "robots"),
+    [("td", 1), ("ppo", 4), pytest.param("td", 4, marks=pytest.mark.slow)],
+)
+def test_the_compiled_update_agrees(algorithm: str, robots: int) -> None:
+    agree(algorithm, robots, "inductor", {"attention": "inner"}, {})
 
 
 def test_advice_of_the_compiler_is_not_passed_on() -> None:

@@ -75,8 +75,15 @@ def at_env_step(count: int) -> Callable[[Progress], None]:
     return stop
 
 
-@pytest.mark.parametrize("warm_start", ["none", "hungarian"])
-@pytest.mark.parametrize("method", ["td-inner", "ppo-inner"])
+@pytest.mark.parametrize(
+    ("method", "warm_start"),
+    [
+        ("td-inner", "hungarian"),
+        ("ppo-inner", "none"),
+        pytest.param("td-inner", "none", marks=pytest.mark.slow),
+        pytest.param("ppo-inner", "hungarian", marks=pytest.mark.slow),
+    ],
+)
 def test_where_the_compiler_fails_the_run_is_that_without_it(
     method: str,
     warm_start: str,
