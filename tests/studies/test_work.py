@@ -179,6 +179,10 @@ def test_studies_share_the_runs_of_a_pool(tiny_file: Path, tmp_path: Path) -> No
     assert open_study(second.path).runs == pool / "runs"
     with pytest.raises(RunError, match=r"its runs are in .*pool: must be .*other; choose another"):
         begin_study(tiny_file, tmp_path / "second", pool=tmp_path / "other")
+    (second.path / "pool.json").write_text('{"folder": "../elsewhere"}')
+    with pytest.raises(RunError, match=r"names .*elsewhere, which holds no runs of a study"):
+        open_study(second.path)
+    assert not (tmp_path / "elsewhere").exists()
     (second.path / "pool.json").write_text("{}")
     with pytest.raises(RunError, match=r"pool\.json: does not name the folder"):
         open_study(second.path)

@@ -25,7 +25,7 @@ budgets = ["fast"]
 seeds = "0..11"
 [[variants]]
 name = "long"
-train.env_steps = 196_608
+train.env_steps = 442_368
 train.checkpoint_every_env_steps = {INTERVAL_ENV_STEPS}
 train.log_every_env_steps = 4_096
 train.compile = "off"

@@ -228,9 +228,12 @@ def _read_pool(path: Path) -> Path:
         return path
     try:
         document = parse_json(read_plain(file, MOST_JSON_BYTES))
-        return Path(os.path.normpath(path / str(document["folder"])))
+        pool = Path(os.path.normpath(path / str(document["folder"])))
     except (ValueError, KeyError, TypeError) as error:
         raise RunError(f"{file}: does not name the folder of a study's runs") from error
+    if not any((pool / name).is_dir() for name in ("runs", "claims")):
+        raise RunError(f"{file}: names {pool}, which holds no runs of a study")
+    return pool
 
 
 def _copy_in(path: Path) -> Callable[[str], Path]:
