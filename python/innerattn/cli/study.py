@@ -41,7 +41,7 @@ _WHAT = """What to do.
 
 @dataclass(kw_only=True)
 class Study(LongCommand):
-    """Train, measure and compare the runs that a file lists, on one machine or several."""
+    """Train, measure and compare the runs that a file lists, on one or more cores."""
 
     action: Annotated[tyro.conf.Positional[Action], tyro.conf.arg(help=_WHAT)]
     study: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STUDY")]
