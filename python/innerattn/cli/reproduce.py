@@ -76,7 +76,7 @@ class Reproduce(LongCommand):
         from innerattn.studies.results import read_results
 
         target = TARGETS[self.target]
-        if target.draws:
+        if target.draws and target.report is not None:
             check_format(Path("figure.png"))
         study = self._begun(target)
         self._check_page(study)  # before hours of training, not after

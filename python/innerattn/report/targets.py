@@ -50,7 +50,7 @@ class Target:
         pool: begins the name of the folder of its runs, which ends in the budget.
         steps: whether it needs metrics and steps of runs.
         archived: whether archived runs do, which have neither; for "all" they do for the table.
-        draws: whether it needs matplotlib.
+        draws: whether its own report needs matplotlib.
         jobs: what has to be done with finished runs before the report, and is not done yet, of the
             planned cases, in the study's folder; None where there is never anything.
     """
