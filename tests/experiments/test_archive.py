@@ -12,11 +12,12 @@ import pytest
 from reseal import reseal
 from small_study import begin_small
 
+from innerattn.cli.main import main
 from innerattn.errors import RunError
 from innerattn.experiments.archive import FILE, FORMAT, read_archive, write_archive
 from innerattn.experiments.run import FinishedRun, read_run, refuse_without_steps
 from innerattn.report.crossed.write import write_crossed
-from innerattn.studies.results import read_results
+from innerattn.studies.results import read_results, read_summaries
 
 
 def test_what_is_written_is_read_but_for_steps(runs: list[FinishedRun], tmp_path: Path) -> None:
@@ -47,7 +48,10 @@ def test_what_is_written_is_read_but_for_steps(runs: list[FinishedRun], tmp_path
 
 
 def test_a_study_takes_archived_runs_for_runs(
-    finished_study: Path, small: dict[str, object], tmp_path: Path
+    finished_study: Path,
+    small: dict[str, object],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     methods = ("td-inner", "td-uniform")
     pool = Path(shutil.copytree(finished_study, tmp_path / "source"))
@@ -62,6 +66,9 @@ def test_a_study_takes_archived_runs_for_runs(
         (run.case, run.folder.name) for run in source
     ]
     assert [why for _, why in found.left_out] == ["missing", "missing"]
+    assert [one.summary for one in read_summaries(study)] == [run.summary for run in source]
+    assert main(["study", "status", str(study.path)]) == 0
+    assert "4 runs: 2 done, 0 running, 2 waiting, 0 failed" in capsys.readouterr().out
     whole = read_results(study, steps=True, archived=False)
     assert [why for _, why in whole.left_out] == [
         *(["archived, without metrics and steps"] * 2),

@@ -120,9 +120,7 @@ class Study(LongCommand):
                 f"{in_words(found.left_s)} more."
             )
         if 0 < counts["done"] <= _MOST_SHOWN:
-            print_table(
-                self.console(), means_table(means(read_summaries(study.runs, study.planned)))
-            )
+            print_table(self.console(), means_table(means(read_summaries(study))))
         elif counts["done"]:
             print(f"innerattn study report {study.path} writes their table.")
         self._print_failures(study, states)

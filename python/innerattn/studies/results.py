@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Literal
 
 from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json
@@ -203,16 +202,18 @@ def last_line(reason: str) -> str:
     return reason.strip().splitlines()[-1]
 
 
-def read_summaries(folder: Path, planned: Iterable[PlannedRun]) -> list[Result]:
-    """The finished runs in a folder; only summaries are read, so that many take little time.
+def read_summaries(study: StudyFolder) -> list[Result]:
+    """The finished runs of a study; only summaries are read, so that many take little time.
 
     Raises:
         RunError: a summary cannot be read, or is none of the run.
     """
     found = []
-    for run in planned:
-        path = folder / run.key
-        if path.exists():
+    for run in study.planned:
+        path = study.runs / run.key
+        if not path.exists() and run.key in study.archived:
+            found.append(Result(run, study.archived[run.key].summary))
+        elif path.exists():
             data = RunFiles(path).read("evaluation/summary.json", MOST_JSON_BYTES)
             try:
                 document = parse_json(data)

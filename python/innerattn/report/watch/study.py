@@ -83,7 +83,7 @@ class _State:
     def _scores(self) -> dict[str, Any]:
         """Means over seeds and what contrasts say so far."""
         study = self._study
-        results = read_summaries(study.runs, study.planned)
+        results = read_summaries(study)
         found = means(results)
         table = means_table(found) if found else None
         compared = compare(study.study, study.planned, results)
