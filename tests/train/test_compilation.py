@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
+import torch._dynamo
 from torch import Tensor
 from torch.fx import GraphModule
 
@@ -21,6 +22,24 @@ from innerattn.train.compilation import compiles
 from innerattn.train.weights import digest_of
 
 TINY = {"train.env_steps": 128, "train.num_envs": 4, "train.threads": 1}
+
+
+@pytest.mark.timeout(180)
+def test_each_run_of_a_process_is_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Runs after the compiler's limit of graphs in a process, as those of a worker of a study."""
+    compiled_by = ActorCritic.compile
+    monkeypatch.setattr(ActorCritic, "compile", lambda self: compiled_by(self, "eager"))
+    monkeypatch.setattr("innerattn.train.compilation._problem", lambda _: None)
+    few = {"train.method": "ppo-inner", "ppo.rollout_steps": 4, "train.compile": "on"}
+    sizes = (16, 8, 4)
+    with torch._dynamo.config.patch(recompile_limit=2), caplog.at_level(logging.WARNING):
+        for size in sizes:
+            config = load_run_config(overrides={**TINY, **few, "ppo.minibatch_size": size})
+            train(config, tmp_path / str(size))
+    assert not caplog.records
+    assert all(read_info(tmp_path / str(size)).compiled for size in sizes)
 
 
 @pytest.mark.parametrize(

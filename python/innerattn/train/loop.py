@@ -11,6 +11,8 @@ from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import torch
+
 from innerattn.config import RunConfig
 from innerattn.config.streams import stream_seed
 from innerattn.envs import BatchEnv
@@ -149,6 +151,9 @@ def _prepared(
             parts = Parts(config, env, stage)
             compiled = compilable and compiles(config)
             if compiled:
+                # The compiler counts the graphs of a process, and gives up after eight. Those of
+                # earlier runs are of no use to this one, which shall be compiled, too.
+                torch.compiler.reset()
                 parts.learner.compile()
             yield parts, compiled, matmul_backend, interruptions
 
