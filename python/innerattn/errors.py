@@ -93,6 +93,7 @@ EXTRA_OF = {
     "onnx": "deploy",
     "onnxruntime": "deploy",
     "onnxscript": "deploy",
+    "optuna": "search",
     "pettingzoo": "gym",
     "ray": "ray",
     "rich": "train",

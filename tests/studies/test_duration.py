@@ -23,16 +23,16 @@ def test_it_is_the_median_of_finished_runs(tmp_path: Path) -> None:
     for key, took in (("a", 60.0), ("b", 100.0), ("c", 9_000.0)):
         finished(tmp_path, key, took)
     states: dict[str, State] = {"a": "done", "b": "done", "c": "done", "d": "failed"}
-    assert duration_of(tmp_path, states) == Duration(100.0, 0.0, 0)
+    assert duration_of(tmp_path, states, 0) == Duration(100.0, 0.0, 0)
     states |= {f"w{n}": "planned" for n in range(5)}
-    assert duration_of(tmp_path, states) == Duration(100.0, 500.0, 0)
+    assert duration_of(tmp_path, states, 5) == Duration(100.0, 500.0, 0)
     states |= {"x": "claimed", "y": "claimed"}
-    assert duration_of(tmp_path, states) == Duration(100.0, 300.0, 2)
+    assert duration_of(tmp_path, states, 7) == Duration(100.0, 300.0, 2)
 
 
 def test_before_the_first_one_nothing_is_known(tmp_path: Path) -> None:
-    assert duration_of(tmp_path, {"a": "planned", "b": "claimed"}) is None
-    assert duration_of(tmp_path, {"gone": "done"}) is None
+    assert duration_of(tmp_path, {"a": "planned", "b": "claimed"}, 2) is None
+    assert duration_of(tmp_path, {"gone": "done"}, 0) is None
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 import tyro
 
 from innerattn.cli.options import LongCommand, UsageError, check_target
-from innerattn.cli.progress import SeveralMeasurements
-from innerattn.cli.study import do_runs, print_means, say_report, say_written
+from innerattn.cli.study import do_jobs, do_runs, print_means, say_report, say_written
 from innerattn.config import BUDGETS
 from innerattn.config.files import write_whole
 from innerattn.config.near import did_you_mean
@@ -152,21 +150,10 @@ class Reproduce(LongCommand):
         Returns:
             What is not done.
         """
-        from innerattn.experiments.processes import places, run_side_by_side
-
         if target.jobs is None:
             return []
         jobs = target.jobs([run.case for run in study.planned], results.runs, study.path)
-        if jobs and not self.report_only:
-            with SeveralMeasurements(self.progress_console()) as progress:
-                run_side_by_side(
-                    jobs,
-                    places(len(jobs)),
-                    changed=progress,
-                    failed=lambda job: _say(f"error: {job}: {job.failure}"),
-                    debug=self.debug,
-                )
-        return [job for job in jobs if job.state != "done"]
+        return [*jobs] if self.report_only else do_jobs(self, jobs)
 
     def _check_page(self, study: StudyFolder) -> None:
         """Refuse a page that could not be written after all."""
@@ -199,7 +186,3 @@ def _chosen(option: str, text: str, known: Sequence[str]) -> tuple[str, ...]:
         near = did_you_mean(unknown[0], known)
         raise UsageError(f"--{option} = {unknown[0]!r}: must be all or of {', '.join(known)}{near}")
     return tuple(name for name in known if name in names)
-
-
-def _say(text: str) -> None:
-    print(f"innerattn: {text}", file=sys.stderr)

@@ -14,15 +14,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from innerattn.cli.options import LongCommand, UsageError
-from innerattn.cli.progress import Work
+from innerattn.cli.progress import SeveralMeasurements, Work
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from innerattn.experiments.processes import Job
     from innerattn.report.study.page import Found
     from innerattn.studies.folder import StudyFolder
     from innerattn.studies.ledger import State
     from innerattn.studies.results import Results
+    from innerattn.studies.search.state import Now
     from innerattn.studies.work import Outcome
 
 _TIME = re.compile(r"([0-9]{1,6})([smh])")
@@ -80,11 +82,15 @@ class Study(LongCommand):
             raise UsageError(f"--gpus = {self.gpus:g}: must be 0 to 64")
         if self.workers is not None and not 1 <= self.workers <= 256:
             raise UsageError(f"--workers = {self.workers}: must be 1 to 256")
+        from innerattn.studies.faults import to_measure
+
         study = self._begun()
         do_runs(self, study, workers=self.workers, ray=self.ray, gpus=self.gpus)
-        return self._report(study)
+        failed = do_jobs(self, to_measure(study), self.workers)
+        return max(self._report(study), int(bool(failed)))
 
     def _work(self) -> int:
+        from innerattn.studies.search.state import Watched
         from innerattn.studies.work import work
 
         until = None if self.until is None else time.monotonic() + _seconds(self.until)
@@ -96,7 +102,8 @@ class Study(LongCommand):
                 print(f"innerattn: error: {outcome.run}: {outcome.reason}", file=sys.stderr)
             console.print(f"{outcome.run}: {outcome.state}", soft_wrap=True)
 
-        work(study.ledger(), study.to_do, until=until, ended=ended)
+        refuse_without_optuna(study)
+        work(study.ledger(), Watched(study).to_do(), until=until, ended=ended)
         return 0
 
     def _status(self) -> int:
@@ -104,38 +111,54 @@ class Study(LongCommand):
         from innerattn.report.table import print_table
         from innerattn.studies.duration import duration_of, in_words
         from innerattn.studies.results import means, read_summaries
+        from innerattn.studies.search.state import Watched
 
-        study = self._opened()
-        states = study.states()
+        now = Watched(self._opened()).now()
+        study, states = now.study, now.states
         counts = Counter(states.values())
         names: tuple[State, ...] = ("done", "claimed", "planned", "failed")
         words = {"claimed": "running", "planned": "waiting"}
         told = ", ".join(f"{counts[name]} {words.get(name, name)}" for name in names)
         print(f"{study.path}: {len(states)} runs: {told}")
-        found = duration_of(study.pool, states)
+        found = duration_of(study.pool, states, now.left)
         if found is not None and found.left_s:
             workers = "one worker" if found.workers < 2 else f"{found.workers} workers"
+            about = "about" if now.search is None else "at most"
             print(
-                f"A run takes {in_words(found.run_s)}; {workers} will need about "
+                f"A run takes {in_words(found.run_s)}; {workers} will need {about} "
                 f"{in_words(found.left_s)} more."
             )
-        if 0 < counts["done"] <= _MOST_SHOWN:
+        if now.search is not None:
+            self._print_search(now)
+        elif 0 < counts["done"] <= _MOST_SHOWN:
             print_table(self.console(), means_table(means(read_summaries(study))))
         elif counts["done"]:
             print(f"innerattn study report {study.path} writes their table.")
         self._print_failures(study, states)
         return int(counts["failed"] > 0)
 
+    def _print_search(self, now: Now) -> None:
+        from innerattn.report.study.search import search_found, search_sentences, search_table
+        from innerattn.report.table import print_table
+
+        found = search_found(now, ())
+        print_table(self.console(), search_table(found, cost=False), dense=True)
+        for text in search_sentences(found):
+            self.console().print(text.replace("**", ""), soft_wrap=True)
+
     def _report(self, study: StudyFolder | None = None) -> int:
         from innerattn.report.study.write import write_study
         from innerattn.studies.results import read_results
+        from innerattn.studies.search.state import Watched
 
-        study = study or self._opened()
+        study = Watched(study or self._opened()).now().study
         found, files = write_study(study, read_results(study))
         return say_report(self, found, files)
 
     def _retry(self) -> int:
-        study = self._opened()
+        from innerattn.studies.search.state import Watched
+
+        study = Watched(self._opened()).now().study
         again = set(study.ledger().retry(study.keys))
         for run in study.to_do:
             if run.key in again:
@@ -207,29 +230,77 @@ def do_runs(
     from innerattn.experiments.side_by_side import Run, refuse_what_cannot_run
     from innerattn.studies.launch.local import run_workers
     from innerattn.studies.launch.ray import run_workers_on_ray
+    from innerattn.studies.search.state import Watched
 
-    over = Counter(study.states().values())
-    left = len(study.keys) - over["done"] - over["failed"]
+    watched = Watched(study)
+    now = watched.now()
+    over, left = Counter(now.states.values()), now.left
     count = workers or places(left)
     by = f" by {count} worker{'s' * (count > 1)}" if ray is None else f" by workers on Ray, {ray}"
+    of = len(study.keys) if now.search is None else sum(over.values()) - over["planned"]
+    most = "" if now.search is None else "at most "
     command.console().print(
-        f"{study.path}: {len(study.keys)} run{'s' * (len(study.keys) != 1)}, {over['done']} done, "
-        f"{over['failed']} failed, {left} to do" + (by if left else ""),
+        f"{study.path}: {of} run{'s' * (of != 1)}, {over['done']} done, {over['failed']} failed, "
+        f"{most}{left} to do" + (by if left else ""),
         soft_wrap=True,
     )
     if not left:
         return
+    refuse_without_optuna(study)
     if ray is None:
-        refuse_what_cannot_run([Run(study.to_do[0].config, study.pool / "none")])
+        refuse_what_cannot_run([Run((study.to_do or study.planned)[0].config, study.pool / "none")])
     with _Progress(command.progress_console()) as progress:
 
         def now_left() -> int:
-            return progress(study.states())
+            return progress(watched.now())
 
         if ray is None:
             run_workers(study.path, count, left=now_left)
         else:
             run_workers_on_ray(study.path, workers, ray, gpus=gpus, left=now_left)
+
+
+def do_jobs(command: LongCommand, jobs: Sequence[Job], workers: int | None = None) -> list[Job]:
+    """Measure finished runs, side by side, and show how far it is.
+
+    Args:
+        command: that shows it.
+        jobs: what is to be done.
+        workers: processes at a time; None: one for each core.
+
+    Returns:
+        What failed; standard error says why.
+
+    Raises:
+        KeyboardInterrupt: the user stopped it; what is done is kept.
+    """
+    from innerattn.experiments.processes import places, run_side_by_side
+
+    def failed(job: Job) -> None:
+        print(f"innerattn: error: {job}: {job.failure}", file=sys.stderr)
+
+    if jobs:
+        with SeveralMeasurements(command.progress_console()) as progress:
+            run_side_by_side(
+                jobs,
+                workers or places(len(jobs)),
+                changed=progress,
+                failed=failed,
+                debug=command.debug,
+            )
+    return [job for job in jobs if job.state != "done"]
+
+
+def refuse_without_optuna(study: StudyFolder) -> None:
+    """Find out in time that a search has nobody who proposes values.
+
+    Raises:
+        MissingLibraryError: the study has a search, and Optuna is not installed.
+    """
+    if study.study.search is not None:
+        from innerattn.studies.search.optuna import load_optuna
+
+        load_optuna()
 
 
 def say_report(command: LongCommand, found: Found, files: Sequence[Path]) -> int:
@@ -238,14 +309,17 @@ def say_report(command: LongCommand, found: Found, files: Sequence[Path]) -> int
     Returns:
         The exit code: 0, or 1 where a run has failed or cannot be read.
     """
-    from innerattn.report.study.page import left_out, means_table, sentences
+    from innerattn.report.study.page import answers, left_out, means_table
+    from innerattn.report.study.search import search_table
     from innerattn.report.table import print_table
 
     console = command.console()
     for _, rows in found.tables.values():
         if rows:
             print_table(console, means_table(rows), dense=True)
-    for text in sentences(found.compared):
+    if found.search is not None:
+        print_table(console, search_table(found.search), dense=True)
+    for text in answers(found):
         console.print(text.replace("**", ""), soft_wrap=True)
     reasons = [reason for _, reason in found.results.left_out]
     if reasons:
@@ -284,15 +358,16 @@ class _Progress(Work):
 
     title = "study"
 
-    def __call__(self, states: Mapping[str, State]) -> int:
-        """Show states; gives how many runs are left."""
-        counts = Counter(states.values())
+    def __call__(self, now: Now) -> int:
+        """Show how far it is; gives how many runs are left."""
+        counts = Counter(now.states.values())
         over = counts["done"] + counts["failed"]
-        note = f"{counts['done']} of {len(states)} runs done, {counts['claimed']} running"
+        most = "" if now.search is None else "at most "
+        note = f"{counts['done']} of {most}{over + now.left} runs done, {counts['claimed']} running"
         note += f", {counts['failed']} failed" if counts["failed"] else ""
         if over:
-            self.show(over, len(states), note)
-        return len(states) - over
+            self.show(over, over + now.left, note)
+        return now.left
 
 
 def _seconds(text: str) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from innerattn.stats import Estimate
 from innerattn.stats.aggregate import iqm_interval
 from innerattn.studies.results import Result
-from innerattn.studies.study import Length, Value
+from innerattn.studies.space import Length, Value
 
 THRESHOLDS = (0.0, 0.25, 0.5, 0.75, 0.9, 1.0)
 """Scores at which a performance profile is given."""

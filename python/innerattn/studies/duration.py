@@ -30,12 +30,13 @@ class Duration:
     workers: int
 
 
-def duration_of(folder: Path, states: Mapping[str, State]) -> Duration | None:
+def duration_of(folder: Path, states: Mapping[str, State], left: int) -> Duration | None:
     """How long the runs of the study in a folder take; None before the first one is finished.
 
     Args:
         folder: of the study's runs and claims.
         states: of its runs.
+        left: how many runs have no result and have not failed.
     """
     took = []
     for key in [key for key, state in states.items() if state == "done"][-_SAMPLE:]:
@@ -45,8 +46,8 @@ def duration_of(folder: Path, states: Mapping[str, State]) -> Duration | None:
     if not took:
         return None
     counts, run_s = Counter(states.values()), median(took)
-    left = counts["planned"] + counts["claimed"] / 2.0
-    return Duration(run_s, run_s * left / max(1, counts["claimed"]), counts["claimed"])
+    runs = left - counts["claimed"] / 2.0
+    return Duration(run_s, run_s * runs / max(1, counts["claimed"]), counts["claimed"])
 
 
 def in_words(seconds: float) -> str:

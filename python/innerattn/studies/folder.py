@@ -147,7 +147,7 @@ def open_study(path: Path) -> StudyFolder:
     if not file.exists():
         raise RunError(f"{path}: holds no study; innerattn study run FILE.toml begins one")
     study = study_in(read_plain(file, MOST_TOML_BYTES), file)
-    planned = plan_study(study, _copy_in(path))
+    planned = plan_study(study, copy_in(path))
     return StudyFolder(path, study, planned, _read_rules(path), _read_pool(path))
 
 
@@ -194,7 +194,7 @@ def begin_study_in(
     path.mkdir(parents=True, exist_ok=True)
     for scenario in {name for grid in study.grid for name in grid.scenarios}:
         if scenario.endswith(".toml"):
-            copy = _copy_in(path)(scenario)
+            copy = copy_in(path)(scenario)
             copy.parent.mkdir(exist_ok=True)
             write_whole(copy, read_plain(file.parent / scenario, MOST_TOML_BYTES, follow_link=True))
     if begun.pool != path:
@@ -236,7 +236,7 @@ def _read_pool(path: Path) -> Path:
     return pool
 
 
-def _copy_in(path: Path) -> Callable[[str], Path]:
+def copy_in(path: Path) -> Callable[[str], Path]:
     """Where the folder of a study has its copy of a scenario's file."""
     return lambda scenario: path / "scenarios" / Path(scenario).name
 

@@ -271,7 +271,7 @@ class Ledger:
     def _claimed(self, key: str, number: int) -> Claim | None:
         """The claim with that number, unless another worker gets it."""
         claim = Claim(self, key, number)
-        if not _linked(self.folder / "claims" / f"{key}.{number}"):
+        if not made_alone(self.folder / "claims" / f"{key}.{number}", this_process()):
             return None
         try:
             claim.beat()
@@ -343,10 +343,14 @@ def _read(path: Path) -> str:
         return ""
 
 
-def _linked(path: Path) -> bool:
-    """Make a file that nobody else has made; whether it was this call that made it."""
+def made_alone(path: Path, text: str) -> bool:
+    """Make a file that nobody else has made, whole; whether it was this call that made it.
+
+    Raises:
+        OSError: it cannot be written.
+    """
     own = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
-    own.write_text(this_process(), "utf-8")
+    own.write_text(text, "utf-8")
     try:
         os.link(own, path)
     except FileExistsError:
@@ -355,17 +359,17 @@ def _linked(path: Path) -> bool:
     except OSError as error:
         if error.errno not in _NO_LINKS:
             raise
-        return _made_alone(path)  # a file system without hard links
+        return _opened_alone(path, text)  # a file system without hard links
     finally:
         with suppress(OSError):
             own.unlink()
     return True
 
 
-def _made_alone(path: Path) -> bool:
+def _opened_alone(path: Path, text: str) -> bool:
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(this_process())
+            file.write(text)
     except FileExistsError:
         return False
     return True

@@ -64,6 +64,29 @@ family = "all"
 # A figure of rescues in training; it needs matplotlib.
 [[curves]]
 title = "Learning curves"
+
+# Faults that each finished run meets. They add the measures retained and retained_KIND: the share
+# of the rescues that a team keeps.
+#[faults]
+# kinds of faults; none: all
+#kinds = ["motor_gain", "blackout", "unavailable"]
+# worlds in which each fault is tried
+#episodes = 100
+
+# A search for better values (Optuna) instead of variants and contrasts: trials race over the seeds
+# of the grid. It needs innerattn[search].
+#[search]
+# how many sets of values are tried
+#trials = 30
+#measure = "score"
+#length = "standard"
+# which values of the measure are better: maximize or minimize
+#direction = "maximize"
+# further seeds, with which the best trial is compared with the grid as it is
+#confirm = "100..102"
+#margin = 0.03
+# any key of a run, with its ends or a list of values
+#ppo.learning_rate = {{ low = 0.0005, high = 0.01, log = true }}
 """
 
 

@@ -16,12 +16,17 @@ from innerattn.config.run import digest_of
 from innerattn.errors import ConfigError
 from innerattn.experiments.plan import Case, of_seed
 from innerattn.measures.registry import MEASURES
-from innerattn.studies.study import Grid, Study, StudyContrast, Value, coordinates
+from innerattn.studies.space import Search, Value
+from innerattn.studies.study import RETAINED, Grid, Study, StudyContrast, Variant, coordinates
 
 MEASURES_OF_ALL = ("score", "rescues_per_episode")
 """What every evaluation holds beside the registered measures."""
 MOST_RUNS = 10_000
+RECIPE = "recipe"
+"""The trial of a search that changes nothing, as its variant is called."""
 _NAMED_BY_THE_GRID = {"train.seed": "seeds", "train.method": "methods"}
+_MEASURED = ("scenario", "evaluate")
+"""Sections that say what is measured, so that no search may change them."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +84,11 @@ def plan_study(study: Study, find: Callable[[str], Path]) -> list[PlannedRun]:
 
     Raises:
         ConfigError: there are over 10,000 runs, a combination cannot be run, two are the same run,
-            or a contrast names runs that are not in the grid.
+            a contrast names runs that are not in the grid, or values of a search cannot be run.
     """
+    if study.search is not None:
+        _refuse_unfit(study.search, study, find)
+        return plan_trial(study, find, RECIPE, {})
     changes = {one.name: one.changes for one in study.variants}
     keys = [key for grid in study.grid for key in grid.keys]
     for key in (*keys, *(key for given in changes.values() for key in given)):
@@ -106,14 +114,66 @@ def plan_study(study: Study, find: Callable[[str], Path]) -> list[PlannedRun]:
                 planned.setdefault((seed, *run.place.items()), run)  # several grids may have it
     places = list({tuple(run.place.items()): run.place for run in planned.values()}.values())
     for contrast in study.contrasts:
+        _refuse_other_measure(
+            f"contrasts, {contrast.name!r}: measure", contrast.measure, study, contrast.length
+        )
         pairs(contrast, places)
     for shown in study.shown:
         where = f"{shown.place}, {shown.title!r}"
         refuse_other_coordinates(where, coordinates(shown.of, where), places)
     for table in study.tables:
-        for measure, _ in table.wanted:
-            _refuse_other_measure(f"tables, {table.title!r}: measures", measure)
+        for measure, length in table.wanted:
+            _refuse_other_measure(f"tables, {table.title!r}: measures", measure, study, length)
     return list(planned.values())
+
+
+def plan_trial(
+    study: Study, find: Callable[[str], Path], name: str, values: Mapping[str, Value]
+) -> list[PlannedRun]:
+    """The runs of one trial of a study with a search: of the seeds of the race, then the others.
+
+    Args:
+        study: what is planned.
+        find: where a scenario's file is, by its name in the study.
+        name: of the trial; its runs are those of a variant of this name.
+        values: by dotted key of a run, beside what the grid says.
+
+    Raises:
+        ConfigError: the values cannot be run together.
+    """
+    assert study.search is not None
+    seeds = (*study.grid[0].numbers, *study.search.confirm_seeds)
+    trial = study.model_copy(
+        update={
+            "search": None,
+            "grid": (study.grid[0].model_copy(update={"seeds": seeds}),),
+            "variants": (Variant.of(name, values),),
+        }
+    )
+    return plan_study(trial, find)
+
+
+def _refuse_unfit(search: Search, study: Study, find: Callable[[str], Path]) -> None:
+    """Refuse a search whose values cannot be run, each end of a range alone.
+
+    Raises:
+        ConfigError: the message names the key.
+    """
+    _refuse_other_measure("search.measure", search.measure, study, search.length)
+    most = (search.trials + 1) * len(study.grid[0].numbers) * len(study.grid[0].scenarios)
+    if most > MOST_RUNS:
+        raise ConfigError(f"search: may need {most:,} runs: must be at most {MOST_RUNS:,}")
+    for key, drawn in search.space.items():
+        if key in _NAMED_BY_THE_GRID:
+            raise ConfigError(f"search.{key}: is set by grid.{_NAMED_BY_THE_GRID[key]}")
+        if key.partition(".")[0] in _MEASURED:
+            raise ConfigError(f"search.{key}: must not change what is measured")
+        for value in drawn.ends:
+            try:
+                plan_trial(study, find, "trial", {key: value})
+            except ConfigError as error:
+                why = error.__cause__ if isinstance(error.__cause__, ConfigError) else error
+                raise ConfigError(f"search.{key} = {value!r}: {why}") from error
 
 
 def _axes(study: Study, grid: Grid) -> list[Sequence[Any]]:
@@ -189,11 +249,9 @@ def pairs(
         places: of the grid, each once.
 
     Raises:
-        ConfigError: a side names what is not in the grid, or no two places belong together, or a
-            measure is not known.
+        ConfigError: a side names what is not in the grid, or no two places belong together.
     """
     where = f"contrasts, {contrast.name!r}"
-    _refuse_other_measure(f"{where}: measure", contrast.measure)
     sides = []
     for name, side in zip("ab", contrast.sides, strict=True):
         refuse_other_coordinates(f"{where}: {name}", side, places)
@@ -226,10 +284,13 @@ def refuse_other_coordinates(
             raise ConfigError(f"{where}.{key} = {value!r}: {of} of the grid")
 
 
-def _refuse_other_measure(where: str, measure: str) -> None:
-    if measure not in (*MEASURES_OF_ALL, *MEASURES):
-        known = ", ".join((*MEASURES_OF_ALL, *MEASURES))
-        raise ConfigError(f"{where} = {measure!r}: must be one of {known}")
+def _refuse_other_measure(where: str, measure: str, study: Study, length: str) -> None:
+    if measure in study.measures and length != "standard":
+        raise ConfigError(f"{where} = {measure!r}: has no value of long episodes")
+    if measure not in (*MEASURES_OF_ALL, *MEASURES, *study.measures):
+        known = ", ".join((*MEASURES_OF_ALL, *MEASURES, *study.measures))
+        needs = "; it needs [faults]" if measure.startswith(RETAINED) and not study.faults else ""
+        raise ConfigError(f"{where} = {measure!r}: must be one of {known}{needs}")
 
 
 def _rest(place: Mapping[str, Value], free: set[str]) -> tuple[tuple[str, Value], ...]:

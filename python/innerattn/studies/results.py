@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json
@@ -15,17 +15,18 @@ from innerattn.stats import Estimate
 from innerattn.stats.aggregate import improvement_interval
 from innerattn.stats.comparison import ALPHA, Contrast, contrast, holm
 from innerattn.stats.seeds import seed_estimate
+from innerattn.studies.faults import retained
 from innerattn.studies.folder import StudyFolder
 from innerattn.studies.ledger import Ledger, State
 from innerattn.studies.plan import MEASURES_OF_ALL, PlannedRun, pairs, run_digest
+from innerattn.studies.space import Length, Value
 from innerattn.studies.study import (
+    RETAINED,
     SCORES,
     Direction,
-    Length,
     Study,
     StudyContrast,
     StudyTable,
-    Value,
     coordinates,
 )
 
@@ -51,16 +52,22 @@ class Result:
         run: which one.
         summary: its ``evaluation/summary.json``.
         finished: all that is known of it; None where only summaries were read.
+        retained: what it retains under the faults of the study, by measure; empty where it has not
+            met them.
     """
 
     run: PlannedRun
     summary: Mapping[str, Any]
     finished: FinishedRun | None = None
+    retained: Mapping[str, float | None] = field(default_factory=dict)
 
     def value(self, measure: str, length: Length) -> float | None:
         """A measure of the run; None where its episodes do not determine it."""
         part = self.summary if length == "standard" else self.summary["long"]
-        if measure in MEASURES_OF_ALL:
+        found: Any
+        if measure.startswith(RETAINED):
+            found = self.retained.get(measure)
+        elif measure in MEASURES_OF_ALL:
             found = part[measure]
         else:
             found = part["measures"][self.run.config.train.method].get(measure)
@@ -182,10 +189,9 @@ def read_results(study: StudyFolder, *, steps: bool = False, archived: bool = Tr
             else:
                 left_out.append((run, _why_left_out(run.key, states[run.key], ledger)))
                 continue
+            finished.append(Result(run, found.summary, found, retained(study, run)))
         except (InnerattnError, OSError) as error:
             left_out.append((run, f"unreadable: {one_line(error)}"))
-            continue
-        finished.append(Result(run, found.summary, found))
     return Results(tuple(study.planned), tuple(finished), tuple(left_out))
 
 
@@ -212,14 +218,17 @@ def read_summaries(study: StudyFolder) -> list[Result]:
     for run in study.planned:
         path = study.runs / run.key
         if not path.exists() and run.key in study.archived:
-            found.append(Result(run, study.archived[run.key].summary))
+            summary: Mapping[str, Any] = study.archived[run.key].summary
         elif path.exists():
             data = RunFiles(path).read("evaluation/summary.json", MOST_JSON_BYTES)
             try:
                 document = parse_json(data)
             except ValueError as error:
                 raise RunError(f"{path / 'evaluation/summary.json'}: {error}") from error
-            found.append(Result(run, check_summary(path, document, run.config)))
+            summary = check_summary(path, document, run.config)
+        else:
+            continue
+        found.append(Result(run, summary, retained=retained(study, run)))
     return found
 
 

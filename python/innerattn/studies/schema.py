@@ -7,11 +7,13 @@ are checked only when a study is planned.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from innerattn.config.files import write_whole
 from innerattn.config.schema import DIALECT, run_schema
+from innerattn.studies.space import Range
 from innerattn.studies.study import Study
 
 COPY = Path(__file__).with_name("study.schema.json")
@@ -20,7 +22,8 @@ COPY = Path(__file__).with_name("study.schema.json")
 def study_schema() -> dict[str, Any]:
     """The schema of a file for `innerattn.studies.study.study_in`.
 
-    The grid takes a list of values for each key of a run, a variant one value.
+    The grid takes a list of values for each key of a run, a variant one value, a search a list or a
+    range.
     """
     study, run = Study.model_json_schema(), run_schema()
     parts = study.pop("$defs")
@@ -32,9 +35,11 @@ def study_schema() -> dict[str, Any]:
     sections = run["properties"]
     parts |= run["$defs"]
     parts["Variant"] |= {"properties": {**parts["Variant"]["properties"], **sections}}
-    varied = {name: _varied(section, run["$defs"]) for name, section in sections.items()}
-    parts["Grid"] |= {"properties": {**parts["Grid"]["properties"], **varied}}
-    for name in ("Variant", "Grid"):
+    parts["Range"] = Range.model_json_schema()
+    for part, of_key in (("Grid", _list_of), ("Search", _list_or_range)):
+        varied = {name: _varied(one, run["$defs"], of_key) for name, one in sections.items()}
+        parts[part] |= {"properties": {**parts[part]["properties"], **varied}}
+    for name in ("Variant", "Grid", "Search"):
         parts[name]["additionalProperties"] = False
     return {"$schema": DIALECT, **study, "title": "Study of innerattn", "$defs": parts}
 
@@ -44,17 +49,30 @@ def study_schema_text() -> str:
     return json.dumps(study_schema(), indent=1) + "\n"
 
 
-def _varied(section: dict[str, Any], parts: dict[str, Any]) -> dict[str, Any]:
-    """A section of a run, with a list of values for each of its keys."""
+def _varied(
+    section: dict[str, Any], parts: dict[str, Any], of_key: Callable[[dict[str, Any]], Any]
+) -> dict[str, Any]:
+    """A section of a run, with something made of the schema of each of its keys."""
     of = parts[section["$ref"].rpartition("/")[2]]
     properties = {}
     for key, value in of["properties"].items():
         if "$ref" in value:  # a section of a section
-            properties[key] = _varied(value, parts)
+            properties[key] = _varied(value, parts, of_key)
         else:
-            one = {word: given for word, given in value.items() if word != "default"}
-            properties[key] = {"type": "array", "minItems": 1, "items": one}
+            properties[key] = of_key({k: given for k, given in value.items() if k != "default"})
     return {"type": "object", "additionalProperties": False, "properties": properties}
+
+
+def _list_of(value: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "array", "minItems": 1, "items": value}
+
+
+def _list_or_range(value: dict[str, Any]) -> dict[str, Any]:
+    values = {"type": "array", "minItems": 2, "items": value}
+    numbers = {value.get("type"), *(one.get("type") for one in value.get("anyOf", ()))}
+    if not numbers & {"integer", "number"}:
+        return values
+    return {"anyOf": [values, {"$ref": "#/$defs/Range"}]}
 
 
 if __name__ == "__main__":

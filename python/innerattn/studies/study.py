@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -13,19 +12,18 @@ from innerattn.config.files import toml_table_in
 from innerattn.config.model import Model, config_error
 from innerattn.config.near import did_you_mean
 from innerattn.config.run import digest_of
+from innerattn.envs.batch import FAULT_KINDS
 from innerattn.errors import ConfigError
+from innerattn.studies.seeds import listed_seeds
+from innerattn.studies.space import Length, Search, Value
 
 _WORD = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
-_SEEDS = re.compile(r"([0-9]{1,18})\.\.([0-9]{1,18})")
-_MOST_SEEDS = 1_000
-_MOST_SEED = 2**62
 _MOST_CONTRASTS = 200
 _LONG = ", long"
+_MOST_MEASURES = 12
 
 Name = Annotated[str, Field(pattern=rf"^{_WORD}$")]
-Value = str | int | float | bool
 Direction = Literal["two-sided", "greater", "less"]
-Length = Literal["standard", "long"]
 
 
 class Grid(Model):
@@ -54,20 +52,7 @@ class Grid(Model):
     @field_validator("seeds")
     @classmethod
     def _listed(cls, given: str | tuple[int, ...]) -> tuple[int, ...]:
-        if isinstance(given, str):
-            match = _SEEDS.fullmatch(given)
-            if match is None:
-                raise ValueError(f"grid.seeds = {given!r}: must be a range such as '0..4'")
-            first, last = int(match[1]), int(match[2])
-            seeds = tuple(range(first, min(last + 1, first + _MOST_SEEDS + 1)))
-        else:
-            seeds = given
-        if not 1 <= len(seeds) <= _MOST_SEEDS:
-            raise ValueError(f"grid.seeds = {given!r}: must be 1 to {_MOST_SEEDS:,} seeds")
-        for seed in seeds:
-            if not 0 <= seed <= _MOST_SEED:
-                raise ValueError(f"grid.seeds: {seed}: must be in 0..={_MOST_SEED}")
-        return seeds
+        return listed_seeds(given, "grid.seeds")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -113,6 +98,18 @@ class Variant(Model):
     def changes(self) -> dict[str, Any]:
         """Values by dotted key of a run."""
         return dict(_flat(self.model_extra or {}, f"variants, {self.name}"))
+
+    @classmethod
+    def of(cls, name: str, changes: Mapping[str, Value]) -> Self:
+        """A variant that makes some changes, by dotted key of a run."""
+        sections: dict[str, Any] = {}
+        for key, value in changes.items():
+            *above, last = key.split(".")
+            section = sections
+            for word in above:
+                section = section.setdefault(word, {})
+            section[last] = value
+        return cls.model_validate({"name": name, **sections})
 
 
 class StudyContrast(Model):
@@ -172,7 +169,7 @@ class StudyTable(Shown):
     measures: tuple[str, ...] = Field(
         ("rescues_per_episode", "score", "score, long"),
         min_length=1,
-        max_length=8,
+        max_length=_MOST_MEASURES,
         description="score, rescues_per_episode or registered measures of a run; ', long' behind "
         "one means episodes of the second length",
     )
@@ -189,6 +186,42 @@ class StudyTable(Shown):
 
 SCORES = StudyTable(title="Scores")
 """The table of a study that lists none."""
+RETAINED = "retained"
+"""The measure of a run under faults: the share of its rescues that it retains. With a kind of fault
+behind it, as in "retained_blackout", it is that of this kind alone."""
+
+
+class Faults(Model):
+    """Faults that every finished run meets, each robot in turn."""
+
+    place: ClassVar[str] = "faults"
+
+    kinds: tuple[str, ...] = Field(FAULT_KINDS, min_length=1, description="kinds of faults")
+    episodes: int = Field(100, ge=2, le=100_000, description="worlds in which each fault is tried")
+
+    @field_validator("kinds")
+    @classmethod
+    def _known(cls, kinds: tuple[str, ...]) -> tuple[str, ...]:
+        for kind in kinds:
+            if kind not in FAULT_KINDS:
+                near = did_you_mean(kind, FAULT_KINDS, repr)
+                raise ValueError(
+                    f"faults.kinds: {kind!r}: must be of {', '.join(FAULT_KINDS)}{near}"
+                )
+        if (twice := _first_twice(kinds)) is not None:
+            raise ValueError(f"faults.kinds: {twice!r} stands twice")
+        return kinds
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """The measures of a run that they add."""
+        return (RETAINED, *(f"{RETAINED}_{kind}" for kind in self.kinds))
+
+    @property
+    def table(self) -> StudyTable:
+        """What is shown of them in a study that lists no tables."""
+        title = "Share of the rescues that is retained under faults"
+        return StudyTable(title=title, measures=self.measures, seeds=False)
 
 
 class Study(Model):
@@ -215,6 +248,8 @@ class Study(Model):
     curves: tuple[Curves, ...] = Field(
         (), max_length=20, description="what is shown as learning curves"
     )
+    faults: Faults | None = Field(None, description="faults that finished runs meet")
+    search: Search | None = Field(None, description="which values of a run are to be found")
 
     @field_validator("grid", mode="before")
     @classmethod
@@ -235,7 +270,44 @@ class Study(Model):
             if name not in known:
                 near = did_you_mean(name, known, repr)
                 raise ValueError(f"grid.variants: {name!r}: must be the name of a variant{near}")
+        if self.search is not None:
+            self._check_search(self.search)
         return self
+
+    def _check_search(self, search: Search) -> None:
+        """Refuse what a search does not stand beside."""
+        for key in ("variants", "contrasts", "tables", "curves", "faults"):
+            if getattr(self, key):
+                raise ValueError(f"search: must stand without {key}")
+        lists: dict[str, tuple[Value, ...]] = {
+            "methods": self.grid[0].methods,
+            "budgets": self.grid[0].budgets,
+        }
+        lists |= self.grid[0].keys
+        several = [key for key, values in lists.items() if len(values) > 1]
+        if len(self.grid) > 1 or several:
+            which = f"grid.{several[0]} has several values" if several else "there are several"
+            raise ValueError(f"search: must stand beside one grid of one recipe: {which}")
+        both = [key for key in search.space if key in self.grid[0].keys]
+        if both:
+            raise ValueError(f"search.{both[0]}: is set by the grid, too")
+        if len(self.grid[0].numbers) < 2:
+            raise ValueError("grid.seeds: must be two seeds or more for a search")
+        shared = set(search.confirm_seeds) & set(self.grid[0].numbers)
+        if shared:
+            raise ValueError(f"search.confirm: {min(shared)}: must be no seed of the grid")
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """The measures that its own parts add to those of every run."""
+        return () if self.faults is None else self.faults.measures
+
+    @property
+    def listed_tables(self) -> tuple[StudyTable, ...]:
+        """Its tables, or those of a study that lists none."""
+        if self.tables or self.search is not None:
+            return self.tables
+        return (SCORES,) if self.faults is None else (SCORES, self.faults.table)
 
     @property
     def shown(self) -> tuple[Shown, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ class Outcome:
 
 def work(
     ledger: Ledger,
-    planned: Sequence[PlannedRun],
+    planned: Iterable[PlannedRun],
     *,
     until: float | None = None,
     wait: bool = True,
@@ -52,7 +52,8 @@ def work(
 
     Args:
         ledger: of the study.
-        planned: its runs in the order in which they are to be done.
+        planned: its runs in the order in which they are to be done; iterated before each claim, so
+            that a search can ask for others.
         until: when to stop, as ``clock`` has it; the run at hand is saved and given back.
         wait: whether to stay while others work on the last runs, in case they fall silent.
         report: called with the part of the run at hand that is done, and with 0 while there is
@@ -64,8 +65,8 @@ def work(
         OSError: the ledger cannot be read or written.
         KeyboardInterrupt: the worker was asked to end; the run at hand is saved and given back.
     """
-    by_key = {run.key: run for run in planned}
     while until is None or clock() < until:
+        by_key = {run.key: run for run in planned}
         claim = ledger.claim(by_key)
         if claim is not None:
             ended(_worked(claim, by_key[claim.key], until, report, clock))

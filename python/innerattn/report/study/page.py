@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from innerattn.report.study.search import (
+    SearchFound,
+    search_document,
+    search_page,
+    search_rules,
+    search_sentences,
+)
 from innerattn.report.table import Table, columns, markdown, plain_table
 from innerattn.report.tables.text import plus_minus
 from innerattn.stats.estimate import as_json
@@ -22,7 +29,8 @@ from innerattn.studies.curves import EPISODES, LearningCurve
 from innerattn.studies.folder import Rules, StudyFolder
 from innerattn.studies.ledger import State
 from innerattn.studies.results import RULES, Compared, Mean, Result, Results, Values
-from innerattn.studies.study import Length, StudyTable, Value
+from innerattn.studies.space import Length, Value
+from innerattn.studies.study import RETAINED, StudyTable
 
 
 @dataclass(frozen=True)
@@ -37,17 +45,19 @@ class Found:
         compared: its contrasts.
         aggregates: of its algorithms by name, for each length of episodes.
         curves: learning curves by title; without those of archived runs.
+        search: its search, if it has one.
         note: what is said of runs that are too short to mean anything.
     """
 
     study: StudyFolder
     states: Mapping[str, State]
     results: Results
-    tables: Mapping[str, tuple[StudyTable, Sequence[Mean]]]
-    compared: Sequence[Compared]
-    aggregates: Mapping[Length, Mapping[str, Aggregate]]
-    curves: Mapping[str, Sequence[LearningCurve]]
-    note: str | None
+    tables: Mapping[str, tuple[StudyTable, Sequence[Mean]]] = field(default_factory=dict)
+    compared: Sequence[Compared] = ()
+    aggregates: Mapping[Length, Mapping[str, Aggregate]] = field(default_factory=dict)
+    curves: Mapping[str, Sequence[LearningCurve]] = field(default_factory=dict)
+    search: SearchFound | None = None
+    note: str | None = None
 
 
 def study_page(found: Found, figures: Mapping[str, str]) -> str:
@@ -55,32 +65,50 @@ def study_page(found: Found, figures: Mapping[str, str]) -> str:
 
     Args:
         found: what it shows.
-        figures: files of figures, "scores" and by title of curves.
+        figures: files of figures, "scores", "search" and by title of curves.
     """
     study, results, compared = found.study, found.results, found.compared
     keys = {one.run.key for one in results.finished}
     parts = [f"# {study.study.question or study.path.name}\n"]
     if found.note:
         parts.insert(0, f"> **{found.note[:1].upper()}{found.note[1:]}.**\n")
-    parts += [f"{one}\n" for one in sentences(compared)]
+    parts += [f"{one}\n" for one in answers(found)]
     parts += [f"{len(keys)} of {len(found.states)} runs are done.\n"]
+    if study.study.faults is not None and (without := _without_faults(results)):
+        parts += [f"{without} of these have not met the faults; `innerattn study run` lets them.\n"]
     if results.left_out:
         parts += ["**Left out of all results:**\n", *map("- {}".format, left_out(results)), ""]
+    if found.search is not None:
+        parts += search_page(found.search, figures.get("search"))
     if "scores" in figures:
         parts += [f"![Scores of all runs]({figures['scores']})\n", _DOTS]
     if compared:
         parts += ["## Contrasts\n", contrasts_tables(compared)]
     for title, (shown, rows) in found.tables.items():
         if rows:
-            parts += [f"## {title}\n", markdown(means_table(rows, shown.seeds)), _SCORE]
+            of_faults = any(one.startswith(RETAINED) for one in shown.measures)
+            caption = f"{_SCORE}\n{_RETAINED}" if of_faults else _SCORE
+            parts += [f"## {title}\n", markdown(means_table(rows, shown.seeds)), caption]
     for title in found.curves:
         if title in figures:
             parts += [f"## {title}\n", f"![{title}]({figures[title]})\n", _CURVES]
     if any(found.aggregates.values()):
         table = aggregates_table(found.aggregates)
         parts += ["## Over all scenarios\n", markdown(table), _AGGREGATES]
-    parts += ["## Rules\n", RULES, "", *map(_dated, study.rules), ""]
+    of_search = [] if found.search is None else [search_rules(found.search.search)]
+    parts += ["## Rules\n", *of_search, RULES, "", *map(_dated, study.rules), ""]
     return "\n".join(parts)
+
+
+def _without_faults(results: Results) -> int:
+    """How many finished runs have not met the faults of the study."""
+    return len({one.run.key for one in results.finished if not one.retained})
+
+
+def answers(found: Found) -> list[str]:
+    """What the study says, in Markdown: of its search, then of its contrasts."""
+    first = [] if found.search is None else search_sentences(found.search)
+    return first + sentences(found.compared)
 
 
 def left_out(results: Results) -> list[str]:
@@ -112,6 +140,11 @@ def left_out(results: Results) -> list[str]:
 _SCORE = (
     "A score of 0 plays like `random`, a score of 1 like `hungarian`, in the same worlds. ± is "
     "half the 95 % interval over seeds (Student's t); in brackets are the values of the seeds.\n"
+)
+_RETAINED = (
+    "Retained is the share of the rescues that a team keeps: a mean over its robots, each of which "
+    "has the fault in turn, over severities, and over faults from the start and from the middle of "
+    "the episode. Episodes are twice as long as those of the training.\n"
 )
 _DOTS = "A dot is a run; a bar is the mean over seeds with its 95 % interval.\n"
 _CURVES = (
@@ -182,6 +215,7 @@ def study_document(found: Found) -> dict[str, Any]:
             ]
             for title, (_, rows) in found.tables.items()
         },
+        "search": None if found.search is None else search_document(found.search),
         "curves": {title: [_curve(one) for one in own] for title, own in found.curves.items()},
         "over_all_scenarios": [
             {
@@ -255,6 +289,10 @@ def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:
         rows.append([*(str(one.place[key]) for key in varied), format_seeds(one.seeds), *cells])
     heads = []
     for measure, length in found[0].values:
+        if measure.startswith(RETAINED):  # its episodes have a length of their own
+            kind = measure.removeprefix(RETAINED).replace("_", " ").strip()
+            heads.append(f"{RETAINED}, {kind}" if kind else RETAINED)
+            continue
         steps = {one.episode_steps[length] for one in found}
         which = f"{steps.pop()} steps" if len(steps) == 1 else f"{length} episodes"
         heads.append(f"{_IN_WORDS.get(measure, measure.replace('_', ' '))}, {which}")
@@ -296,8 +334,9 @@ def contrasts_tables(compared: Sequence[Compared]) -> str:
         ]
         heads = ["seeds", "difference [95 %]", "P(a > b) [95 %]", "Holm's p", "verdict"]
         words = measure.replace("_", " ")
+        episodes = "" if measure.startswith(RETAINED) else f", {length} episodes"
         parts += [
-            f"**{words[:1].upper()}{words[1:]}, {length} episodes**; within {margin:g} is alike.\n",
+            f"**{words[:1].upper()}{words[1:]}{episodes}**; within {margin:g} is alike.\n",
             markdown(plain_table(columns(["contrast", "a - b"], heads), rows)),
         ]
     return "\n".join(parts)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from innerattn.experiments.smoke import smoke_note
 from innerattn.report.folder import ReportFolder
 from innerattn.report.plots.arms import ArmDots, ArmPanel, draw_arms
 from innerattn.report.plots.curves import CurveLine, draw_curves
+from innerattn.report.plots.search import TrialDot, draw_search
 from innerattn.report.study.exports import marl_eval_document, rliable_document
 from innerattn.report.study.page import (
     Found,
@@ -21,11 +24,17 @@ from innerattn.report.study.page import (
     study_page,
     varied_in,
 )
+from innerattn.report.study.search import SearchFound, search_found
 from innerattn.studies.aggregates import aggregate
 from innerattn.studies.curves import LearningCurve, learning_curves
 from innerattn.studies.folder import StudyFolder
 from innerattn.studies.results import Mean, Result, Results, chosen, compare, means
-from innerattn.studies.study import SCORES, Length, Value
+from innerattn.studies.search.optuna import write_journal
+from innerattn.studies.search.state import Watched
+from innerattn.studies.space import Length, Value
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _LENGTHS: tuple[Length, ...] = ("standard", "long")
 _MOST_ROWS = 40
@@ -51,15 +60,32 @@ def write_study(study: StudyFolder, results: Results) -> tuple[Found, list[Path]
     found = find(study, results)
     budgets = {str(run.place["budget"]) for run in study.planned}
     folder = ReportFolder(study.path, "quick" if found.note else min(budgets))
-    files = ["report.md", "report.json", "scores.json", "marl_eval.json"]
     figures = _draw(folder, found) if find_spec("matplotlib") else {}
     folder.json("report.json", study_document(found))
-    folder.json("scores.json", rliable_document(found.aggregates["standard"]))
-    exported = [one for one in results.finished if one.finished and not one.finished.archived]
-    document = marl_eval_document(found.aggregates["standard"], exported, study.runs)
-    folder.json("marl_eval.json", document, note=False)
     folder.markdown("report.md", study_page(found, figures), note=False)
-    return found, [study.path / name for name in (*files, *figures.values())]
+    if found.search is None:
+        others = _write_scores(folder, found)
+    else:
+        others = _write_journal(found.search) if find_spec("optuna") else []
+    names = ["report.md", "report.json", *others, *figures.values()]
+    return found, [study.path / name for name in names]
+
+
+def _write_scores(folder: ReportFolder, found: Found) -> list[str]:
+    """Write scores for other tools."""
+    folder.json("scores.json", rliable_document(found.aggregates["standard"]))
+    finished = found.results.finished
+    exported = [one for one in finished if one.finished and not one.finished.archived]
+    document = marl_eval_document(found.aggregates["standard"], exported, found.study.runs)
+    folder.json("marl_eval.json", document, note=False)
+    return ["scores.json", "marl_eval.json"]
+
+
+def _write_journal(found: SearchFound) -> list[str]:
+    """Write the trials for Optuna's tools."""
+    path = found.study.path / "optuna.log"
+    write_journal(found.search, found.state.standings, path, found.study.path.resolve().name)
+    return [path.name]
 
 
 def find(study: StudyFolder, results: Results) -> Found:
@@ -71,16 +97,16 @@ def find(study: StudyFolder, results: Results) -> Found:
     finished = results.finished
     budgets = {str(run.place["budget"]) for run in study.planned}
     notes = [note for budget in sorted(budgets) if (note := smoke_note(budget))]
-    tables = study.study.tables or (SCORES,)
-    return Found(
-        study=study,
-        states=study.states(),
-        results=results,
-        tables={table.title: (table, means(finished, table)) for table in tables},
+    found = Found(study, study.states(), results, note=notes[0] if notes else None)
+    if study.study.search is not None:
+        search = search_found(Watched(study).now(), finished)
+        return replace(found, search=search, compared=search.confirmed)
+    return replace(
+        found,
+        tables={one.title: (one, means(finished, one)) for one in study.study.listed_tables},
         compared=compare(study.study, study.planned, finished),
         aggregates={length: algorithm_names(aggregate(finished, length)) for length in _LENGTHS},
         curves={one.title: _curves(chosen(finished, one.of)) for one in study.study.curves},
-        note=notes[0] if notes else None,
     )
 
 
@@ -106,6 +132,10 @@ def _names(places: Sequence[Mapping[str, Value]]) -> list[str]:
 
 def _draw(folder: ReportFolder, found: Found) -> dict[str, str]:
     """Draw what there is; files by what they show."""
+    if found.search is not None:
+        figure = _search_figure(found.search)
+        folder.draw("search", figure)
+        return {} if figure is None else {"search": "search.png"}
     figures = {}
     rows = means(found.results.finished)
     panels = score_panels(rows) if len(rows) <= _MOST_ROWS else []
@@ -129,6 +159,19 @@ def _draw(folder: ReportFolder, found: Found) -> dict[str, str]:
         if lines:
             figures[title] = f"{name}.png"
     return figures
+
+
+def _search_figure(found: SearchFound) -> Figure | None:
+    """Scores against cost; None before the first trial has one."""
+    dots = [
+        TrialDot(core_s, one.mean.mean, one.state == "finished")
+        for one, core_s in zip(found.state.standings, found.spent_core_s, strict=True)
+        if one.mean is not None
+    ]
+    recipe = found.state.standings[0].mean
+    label = found.search.measure.replace("_", " ")
+    most = found.search.direction == "maximize"
+    return draw_search(dots, recipe.mean if recipe else None, label, most) if dots else None
 
 
 def score_panels(found: Sequence[Mean]) -> list[list[ArmPanel]]:

@@ -16,9 +16,12 @@ from innerattn.experiments.live import read_live
 from innerattn.report.html import fill, shared_text
 from innerattn.report.local_server import Answer
 from innerattn.report.study.page import means_table, sentences
+from innerattn.report.study.search import search_found, search_sentences, search_table
+from innerattn.report.table import Table
 from innerattn.studies.duration import duration_of, in_words
 from innerattn.studies.folder import StudyFolder
 from innerattn.studies.results import compare, last_line, means, read_summaries
+from innerattn.studies.search.state import Now, Watched
 
 _WEB = files("innerattn.report.watch") / "web"
 _MOST_SHOWN = 500
@@ -42,7 +45,7 @@ class _State:
     """How a study stands; scores are read anew only where another run has ended."""
 
     def __init__(self, study: StudyFolder) -> None:
-        self._study, self._lock = study, threading.Lock()
+        self._watched, self._lock = Watched(study), threading.Lock()
         self._scored: tuple[int, dict[str, Any]] = (0, {"heads": [], "rows": [], "verdicts": []})
 
     def answer(self) -> Answer:
@@ -56,13 +59,14 @@ class _State:
             return Answer("application/json", json.dumps(self._document(), allow_nan=False))
 
     def _document(self) -> dict[str, Any]:
-        study, ledger = self._study, self._study.ledger()
-        states = study.states()
+        now = self._watched.now()
+        study, states = now.study, now.states
+        ledger = study.ledger()
         counts = Counter(states.values())
-        left = duration_of(study.pool, states)
+        left = duration_of(study.pool, states, now.left)
         named = {run.key: str(run) for run in study.planned}
         if counts["done"] != self._scored[0] and counts["done"] <= _MOST_SHOWN:
-            self._scored = counts["done"], self._scores()
+            self._scored = counts["done"], _scores(now)
         running = [
             _running(named[key], folder) for key, folder in ledger.at_work().items() if key in named
         ]
@@ -80,18 +84,25 @@ class _State:
             **self._scored[1],
         }
 
-    def _scores(self) -> dict[str, Any]:
-        """Means over seeds and what contrasts say so far."""
-        study = self._study
-        results = read_summaries(study)
+
+def _scores(now: Now) -> dict[str, Any]:
+    """Means over seeds and what contrasts say so far; of a search its trials."""
+    study = now.study
+    results = read_summaries(study)
+    table: Table | None = None
+    if now.search is not None:
+        searched = search_found(now, results)
+        table = search_table(searched, cost=False)
+        texts = search_sentences(searched) + sentences(searched.confirmed)
+    else:
         found = means(results)
         table = means_table(found) if found else None
-        compared = compare(study.study, study.planned, results)
-        return {
-            "heads": [] if table is None else [one.head for one in table.columns],
-            "rows": [] if table is None else [list(one.cells) for one in table.sections[0].rows],
-            "verdicts": [one.replace("**", "") for one in sentences(compared)],
-        }
+        texts = sentences(compare(study.study, study.planned, results))
+    return {
+        "heads": [] if table is None else [one.head for one in table.columns],
+        "rows": [] if table is None else [list(one.cells) for one in table.sections[0].rows],
+        "verdicts": [one.replace("**", "") for one in texts],
+    }
 
 
 def _running(name: str, folder: Path) -> dict[str, Any]:

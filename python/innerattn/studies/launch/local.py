@@ -21,10 +21,11 @@ class _Worker(Job):
     def do(self, report: Callable[[float], None]) -> None:
         """Work until nothing is left to do, or nobody listens any more."""
         from innerattn.studies.folder import open_study
+        from innerattn.studies.search.state import Watched
         from innerattn.studies.work import work
 
         study = open_study(self.folder)
-        work(study.ledger(), study.to_do, report=report)
+        work(study.ledger(), Watched(study).to_do(), report=report)
 
 
 def run_workers(folder: Path, count: int, *, left: Callable[[], int]) -> None:

@@ -105,7 +105,8 @@ def _wait_for(ray: Any, folder: Path, count: int, gpus: float, left: Callable[[]
 def _work(folder: str) -> None:
     """Be a worker, in a process of the cluster."""
     from innerattn.studies.folder import open_study
+    from innerattn.studies.search.state import Watched
     from innerattn.studies.work import work
 
     study = open_study(Path(folder))
-    work(study.ledger(), study.to_do)
+    work(study.ledger(), Watched(study).to_do())
