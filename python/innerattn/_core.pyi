@@ -46,8 +46,9 @@ class Batch:
     E envs, R robots, D columns of an observation, V victim slots, O obstacles, C reward components
     (`REWARD_COMPONENTS`), K kinds of faults (`FAULT_KINDS`).
 
-    Arrays that are given are copied before they are checked. Those returned by `step` and
-    `reward_components` are read-only and valid until the step after next; all others are fresh. Not
+    Arrays that are given are copied before they are checked. Those returned by `step` are the
+    caller's own if `give`, else read-only and valid until the step after next, as those of
+    `reward_components` always are; all others are fresh. Not
     to be used from two threads at once (RuntimeError), nor, with several threads, in a child
     process after a fork (RuntimeError).
 
@@ -67,6 +68,7 @@ class Batch:
         num_threads: int | None,
         first_env: int,
         autoreset: str,
+        give: bool,
     ) -> Batch: ...
     @property
     def num_threads(self) -> int:

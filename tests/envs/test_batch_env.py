@@ -8,6 +8,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
 from worlds import CONTINUOUS, CROWDED, batch, image, plan
 
 from innerattn import _core
@@ -77,7 +80,7 @@ def test_a_scenario_is_checked_once(monkeypatch: pytest.MonkeyPatch) -> None:
         assert BatchEnv(scenario, num_envs).observe().shape[0] == num_envs
     assert checked == [scenario.model_dump_json()]
     with pytest.raises(TypeError, match="Rules"):
-        _core.Batch(scenario.model_dump_json(), 1, 0, None, 0, True)  # type: ignore[arg-type]
+        _core.Batch(scenario.model_dump_json(), 1, 0, None, 0, "disabled", True)  # type: ignore[arg-type]
 
 
 def test_views_are_read_only_and_last_until_the_step_after_next() -> None:
@@ -120,6 +123,73 @@ def test_what_a_step_gives_is_the_callers_own() -> None:
         assert all((a == b).all() for a, b in zip(views.step(action), copied, strict=True))
     steps[0].obs[...] = 0  # it is the caller's own
     assert env.observe().any()
+
+
+Held = tuple[object, bytes]
+
+
+def held(array: np.ndarray, how: int) -> Held:
+    """Something that leads to the memory of an array, and what is there now."""
+    kept: list[object] = [
+        array,
+        array[1:],
+        array.reshape(-1)[::2],
+        memoryview(array),
+        torch.from_numpy(array)[:2],
+        torch.from_dlpack(array),
+        np.from_dlpack(array).T,
+    ]
+    return kept[how], np.asarray(kept[how]).tobytes()
+
+
+@given(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 6), st.booleans()), max_size=40))
+def test_nothing_that_somebody_keeps_is_written_again(
+    choices: list[tuple[int, int, bool]],
+) -> None:
+    """Slices, buffers and tensors keep an array as it is, in whatever order they go."""
+    env, views = batch(8), batch(8, copy=False)
+    actions = plan(4, 8)
+    kept: list[Held] = []
+    for number, (field, how, lets_go) in enumerate(choices):
+        step, wanted = env.step(actions[number % 4]), views.step(actions[number % 4])
+        assert all((a == b).all() for a, b in zip(step, wanted, strict=True))
+        kept.append(held(step[field], how))
+        if lets_go:
+            del kept[0]
+        del step
+        assert all(np.asarray(one).tobytes() == before for one, before in kept)
+
+
+def test_memory_that_nobody_has_is_used_again() -> None:
+    env = batch(8)
+    actions = plan(12, 8)
+    places, every_tenth = set(), []
+    for action in actions:
+        step = env.step(action)
+        places.add(step.obs.ctypes.data)
+        step.obs[...] = np.nan  # it is the caller's own
+        step.terminated.view(np.uint8)[...] = 7
+    assert len(places) == 2, "the last step and the one before it"
+    for number in range(40):
+        step = env.step(actions[number % 12])
+        assert np.isfinite(step.obs).all()
+        assert set(step.terminated.view(np.uint8)) <= {0, 1}
+        if number % 10 == 0:
+            every_tenth.append((step.obs, step.obs.copy()))
+    assert all((own == copy).all() for own, copy in every_tenth)
+    assert len({own.ctypes.data for own, _ in every_tenth}) == 4
+
+
+def test_an_array_of_a_step_is_neither_resized_nor_freed_under_another() -> None:
+    env = batch(8)
+    obs = env.step(plan(1, 8)[0]).obs
+    with pytest.raises(ValueError, match="does not own its data"):
+        obs.resize((1, 1, 1), refcheck=False)
+    assert not isinstance(obs.base, np.ndarray)
+    before = obs.copy()
+    env.close()
+    del env
+    assert (obs == before).all()
 
 
 def test_what_reset_and_observe_give_is_the_callers_own() -> None:

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from innerattn import _core
 from innerattn.config.scenario import Scenario
-from innerattn.envs.aligned import aligned_copy
 from innerattn.envs.state import state_names, world_states
 from innerattn.shown import Shown
 
@@ -124,6 +123,7 @@ class BatchEnv(Shown):
             None if num_threads is None else whole_number("num_threads", num_threads, 1, 256),
             whole_number("first_env", first_env, 0, 2**63),
             autoreset,
+            copy,
         )
         self._made_with = (seed, num_threads, autoreset, copy, first_env)
         self.num_envs = int(num_envs)
@@ -170,8 +170,7 @@ class BatchEnv(Shown):
             WorldError: worlds failed in this step; `envs` names them. All others have done it.
             KeyboardInterrupt: Ctrl-C during a long step; nothing has moved.
         """
-        step = Step._make(self._core.step(actions))
-        return Step._make(aligned_copy(array) for array in step) if self._copy else step
+        return Step._make(self._core.step(actions))
 
     def observation_names(self) -> list[str]:
         """Names of the D columns of an observation; units are m and m/s."""

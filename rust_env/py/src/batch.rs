@@ -16,7 +16,7 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::arrays::Arrays;
+use crate::arrays::Outputs;
 use crate::door::{Door, gather, probe, reserve, zeros};
 use crate::raised;
 use crate::rules::Rules;
@@ -44,9 +44,7 @@ pub struct Batch {
     /// The actions of a step, in one of the two.
     discrete: Vec<i64>,
     continuous: Vec<f32>,
-    /// What steps write, in turn.
-    sets: [Arrays; 2],
-    latest: usize,
+    outputs: Outputs,
     /// The type of a rescue, and the array of none.
     rescue_dtype: Py<PyAny>,
     no_rescues: Py<PyAny>,
@@ -56,7 +54,8 @@ pub struct Batch {
 #[pymethods]
 impl Batch {
     #[new]
-    #[pyo3(signature = (rules, num_envs, seed, num_threads, first_env, autoreset))]
+    #[pyo3(signature = (rules, num_envs, seed, num_threads, first_env, autoreset, give))]
+    #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python,
         rules: &Rules,
@@ -65,14 +64,14 @@ impl Batch {
         num_threads: Option<usize>,
         first_env: u64,
         autoreset: &str,
+        give: bool,
     ) -> PyResult<Self> {
         let autoreset = autoreset_named(autoreset)?;
         let options = Options { num_envs, seed, num_threads, first_env, autoreset };
         let rules = Arc::clone(&rules.0);
         Worlds::check(&options).map_err(|error| raised(py, &error))?;
         let (robots, width) = (rules.team.len(), rules.layout.width());
-        let set = || Arrays::new(py, num_envs, robots, width);
-        let sets = [set()?, set()?];
+        let outputs = Outputs::new(py, num_envs, robots, width, give)?;
         let rescue_dtype = rescue_dtype(py, rules.scenario.max_needs())?;
         let threads = num_threads.unwrap_or(1) * THREAD_BYTES;
         probe(py, num_envs * World::most_bytes(&rules) + SLACK_BYTES + threads)?;
@@ -82,9 +81,8 @@ impl Batch {
             rescue_dtype: rescue_dtype.unbind(),
             discrete: vec![],
             continuous: vec![],
-            sets,
+            outputs,
             worlds,
-            latest: 0,
             process: std::process::id(),
         })
     }
@@ -126,23 +124,17 @@ impl Batch {
             Actions::Discrete => {
                 Door::integers("actions", &[envs, robots]).read_i64(actions, &mut self.discrete)?;
                 let commands = Commands::Discrete(&self.discrete);
-                advance(py, &mut self.worlds, &mut self.sets, &mut self.latest, commands)?
+                advance(py, &mut self.worlds, &mut self.outputs, commands)?
             }
             Actions::Continuous => {
                 Door::floats("actions", &[envs, robots, 2]).read_f32(actions, &mut self.continuous)?;
                 let commands = Commands::Continuous(&self.continuous);
-                advance(py, &mut self.worlds, &mut self.sets, &mut self.latest, commands)?
+                advance(py, &mut self.worlds, &mut self.outputs, commands)?
             }
         };
-        let set = &self.sets[self.latest];
-        Ok((
-            set.obs.lend(py),
-            set.reward.lend(py),
-            set.terminated.lend(py),
-            set.truncated.lend(py),
-            set.final_obs.lend(py),
-            self.events(py, &rescues)?,
-        ))
+        let events = self.events(py, &rescues)?;
+        let (obs, reward, terminated, truncated, final_obs) = self.outputs.hand_out(py);
+        Ok((obs, reward, terminated, truncated, final_obs, events))
     }
 
     /// For tests: lets these worlds panic in the next step.
@@ -151,7 +143,7 @@ impl Batch {
     }
 
     fn reward_components(&self, py: Python) -> Py<PyArray3<f32>> {
-        self.sets[self.latest].components.lend(py)
+        self.outputs.components(py)
     }
 
     fn observe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
@@ -347,17 +339,15 @@ fn rescue_dtype(py: Python, helpers: usize) -> PyResult<Bound<PyAny>> {
     py.import("numpy")?.call_method1("dtype", (fields,))
 }
 
-/// Steps the worlds, which write into the set of arrays whose turn it is. A panic of some worlds counts as
-/// a step of all.
+/// Steps the worlds, which write into the arrays whose turn it is. A panic of some worlds counts as a step of
+/// all.
 fn advance(
     py: Python,
     worlds: &mut Worlds,
-    sets: &mut [Arrays; 2],
-    latest: &mut usize,
+    outputs: &mut Outputs,
     commands: Commands,
 ) -> PyResult<Vec<Rescue>> {
-    let next = 1 - *latest;
-    let buffers = sets[next].buffers();
+    let buffers = outputs.next(py)?;
     let interruption = Mutex::new(None);
     let poll = || {
         let interrupted = Python::attach(|py| py.check_signals().err());
@@ -367,7 +357,7 @@ fn advance(
     };
     let stepped = py.detach(|| worlds.step_polled(commands, buffers, Some(&poll)));
     if matches!(stepped, Ok(_) | Err(Error::Panicked { .. })) {
-        *latest = next;
+        outputs.stepped();
     }
     let interruption = interruption.into_inner().unwrap_or_else(PoisonError::into_inner);
     stepped.map_err(|error| interruption.unwrap_or_else(|| raised(py, &error)))

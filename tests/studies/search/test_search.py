@@ -15,6 +15,7 @@ from innerattn.cli.main import main
 from innerattn.errors import ConfigError, RunError
 from innerattn.experiments.side_by_side import Run
 from innerattn.report.study.write import write_study
+from innerattn.report.watch.study import study_pages
 from innerattn.studies.folder import StudyFolder, begin_study, open_study
 from innerattn.studies.plan import plan_study
 from innerattn.studies.results import Result, read_results
@@ -207,6 +208,10 @@ def test_the_commands_show_a_search(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert [one.trial.number for one in found.standings] == [0, 1, 2]
     assert not found.wanted
     assert {one.name.partition(".")[2] for one in (out / "claims").iterdir()} == {"1", "1.beat"}
+    shown = json.loads(study_pages(study)["state"]().text)
+    assert (shown["search"], shown["runs"], shown["left"]) == (True, 6, None)
+    assert [row[0] for row in shown["rows"]] == ["recipe", "trial-1", "trial-2"]
+    assert shown["verdicts"][0].startswith("No trial of 2 is better than the recipe: score ")
     assert main(["study", "run", str(out)]) == 0
     assert "at most 0 to do" in capsys.readouterr().out
 

@@ -72,7 +72,8 @@ class _State:
         ]
         return {
             "title": study.study.question or study.path.name,
-            "runs": len(states),
+            "runs": counts["done"] + counts["failed"] + now.left,
+            "search": now.search is not None,
             "counts": {name: counts[name] for name in ("done", "claimed", "planned", "failed")},
             "left": in_words(left.left_s) if left is not None and left.left_s else None,
             "running": running,

@@ -13,9 +13,10 @@ function running(run) {
 function show(state) {
   const { done, claimed, planned, failed } = state.counts;
   $("title").textContent = document.title = state.title;
-  const parts = [`${done} of ${state.runs} runs are done`, `${claimed} running`, `${planned} waiting`];
+  const all = state.search ? `at most ${state.runs}` : state.runs;
+  const parts = [`${done} of ${all} runs are done`, `${claimed} running`, `${planned} waiting`];
   if (failed) parts.push(`${failed} failed`);
-  const left = state.left === null ? "" : ` About ${state.left} more.`;
+  const left = state.left === null ? "" : ` ${state.search ? "At most" : "About"} ${state.left} more.`;
   const news = `${parts.join(", ")}.${left}`;
   if ($("news").textContent !== news) $("news").textContent = news;
   $("done").value = state.runs ? (done + failed) / state.runs : 0;
