@@ -59,10 +59,11 @@ class BatchEnv(Shown):
     first already and `final_obs` holds the last of the old one. With "next_step" (Gymnasium's
     NEXT_STEP) the step after the last one begins the next episode and does nothing else in that
     world: its action is not used, its rewards are 0. A step gives arrays of your own,
-    as `reset` and `observe` do. With `copy=False` it lends C-contiguous read-only views of buffers
+    as `reset` and `observe` do; memory that no array leads to any more is used for later steps.
+    With `copy=False` it lends C-contiguous read-only views of buffers
     owned by the environment. They are valid until the step after next, which gives the same array
     objects again: change neither their shape nor their dtype in place, and let no thread read them
-    while another steps. That saves time in loops that copy what they keep.
+    while another steps. Such a batch takes no new memory, whatever you keep.
 
     A step that takes long looks for Ctrl-C on the way; if that raises, nothing has moved. Worlds
     that fail inside compiled code are named by a `WorldError`; all others have done the step.
