@@ -110,12 +110,10 @@ def search_sentences(found: SearchFound) -> list[str]:
         return [f"{of} are proposed. None is chosen before all have ended."]
     measure = search.measure.replace("_", " ")
     recipe, best = state.standings[0], state.best
-    told = [
-        f"{measure} {plus_minus(one.mean)} over {len(one.scores)} seeds" for one in (best, recipe)
-    ]
+    told = [f"{plus_minus(one.mean)} over {len(one.scores)} seeds" for one in (best, recipe)]
     if not best.trial.number:
-        return [f"No trial of {search.trials} has a better {measure} than the recipe: {told[1]}."]
-    return [f"**{best.trial.name}** is the best of {of}: {told[0]}. The recipe has {told[1]}."]
+        return [f"No trial of {search.trials} is better than the recipe: {measure} {told[1]}."]
+    return [f"**{best.trial.name}** is the best of {of}: {measure} {told[0]}; recipe {told[1]}."]
 
 
 def search_page(found: SearchFound, figure: str | None) -> list[str]:
