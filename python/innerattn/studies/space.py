@@ -13,6 +13,7 @@ from innerattn.studies.seeds import listed_seeds
 
 Value = str | int | float | bool
 Length = Literal["standard", "long"]
+MOST_TRIALS = 1_000
 
 
 class Range(Model):
@@ -67,7 +68,7 @@ class Search(Model):
     model_config = ConfigDict(extra="allow")
     place: ClassVar[str] = "search"
 
-    trials: int = Field(30, ge=1, le=1_000, description="how many sets of values are tried")
+    trials: int = Field(30, ge=1, le=MOST_TRIALS, description="how many sets of values are tried")
     measure: str = Field(
         "score", description="score, rescues_per_episode or a registered measure of a run"
     )

@@ -179,6 +179,23 @@ def test_a_trial_of_another_space_stays_in_the_race(begun: StudyFolder) -> None:
     assert found.standings[1].state == "finished"
 
 
+def test_a_number_that_is_missing_is_left_out(begun: StudyFolder) -> None:
+    for number in (1, 3):
+        add_values(begun, number, {"ppo.learning_rate": 0.001 * number})
+    work(begun.ledger(), Searching(begun))
+    numbers = [one.trial.number for one in Searching(begun).look().standings]
+    assert numbers == [0, 1, 3, 4, 5]
+
+
+def test_very_many_trials_are_refused_at_once(begun: StudyFolder) -> None:
+    folder = begun.path / "search"
+    folder.mkdir()
+    for number in range(1, 1_002):
+        (folder / f"trial-{number}.json").write_text('{"values": {"ppo.learning_rate": 0.1}}')
+    with pytest.raises(RunError, match="too many trials: must be at most 1,000"):
+        Searching(begun).look()
+
+
 @pytest.mark.parametrize(
     "text", ["", "[]", "{}", '{"values": 3}', '{"values": {"ppo.gamma": [1]}}', "{" * 2_000]
 )

@@ -134,7 +134,7 @@ class Searching:
         """
         found = self.look()
         while found.to_propose and found.idle:
-            number = len(found.standings)
+            number = found.standings[-1].trial.number + 1
             values = propose(self._search, found.standings, number)
             add_values(self._study, number, values)  # or another worker was faster
             found = self.look()

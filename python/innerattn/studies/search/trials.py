@@ -14,7 +14,7 @@ from innerattn.errors import ConfigError, RunError
 from innerattn.studies.folder import StudyFolder, copy_in
 from innerattn.studies.ledger import made_alone
 from innerattn.studies.plan import RECIPE, PlannedRun, plan_trial
-from innerattn.studies.space import Search, Value
+from innerattn.studies.space import MOST_TRIALS, Search, Value
 
 _FILE = re.compile(r"trial-([1-9][0-9]{0,5})\.json")
 
@@ -72,15 +72,17 @@ def read_values(study: StudyFolder) -> dict[int, dict[str, Value]]:
     """The values of all trials by number, without those of the grid as it is.
 
     Raises:
-        RunError: a file is damaged.
+        RunError: a file is damaged, or there are over 1,000.
         OSError: a file cannot be read.
     """
     folder = _folder(study)
-    found = {}
+    found: dict[int, dict[str, Value]] = {}
     for path in folder.iterdir() if folder.is_dir() else ():
         match = _FILE.fullmatch(path.name)
         if match is not None:
             found[int(match[1])] = _values_in(path)
+        if len(found) > MOST_TRIALS:
+            raise RunError(f"{folder}: holds too many trials: must be at most {MOST_TRIALS:,}")
     return dict(sorted(found.items()))
 
 
