@@ -126,6 +126,32 @@ def test_a_folder_of_runs_stands_for_its_runs(
         Watch(runs=[str(runs / "notes")])._folders()
 
 
+def test_runs_that_begin_later_come_last(
+    run_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("innerattn.cli.watch._scripts_beside", lambda _: {"hungarian": 2.0})
+    runs = tmp_path / "runs"
+    shutil.copytree(run_dir, runs / "b")
+    pages = Watch(runs=[str(runs)])._pages()
+
+    def shown() -> tuple[list[str], bool]:
+        state = json.loads(pages["state"]().text)
+        return [one["name"] for one in state["runs"]], bool(state["plots"][0]["levels"])
+
+    assert shown() == (["b"], True)
+    shutil.copytree(run_dir, runs / "a")
+    (runs / "begun").mkdir()  # nothing is in it yet
+    (runs / "begun/run.json").write_text("{")
+    assert shown() == (["b", "a"], True)
+    assert {"episodes/0", "episodes/1"} <= pages.keys()
+    assert "episodes/2" not in pages
+    other = Path(shutil.copytree(run_dir, runs / "c"))
+    config = other / "config.toml"
+    config.write_text(config.read_text().replace('"mixed"', '"double"'))
+    reseal(other)
+    assert shown() == (["b", "a", "c"], False), "scripts of other worlds are no measure"
+
+
 def test_scripts_stand_beside_runs_of_the_same_worlds_only(run_dir: Path, tmp_path: Path) -> None:
     other = Path(shutil.copytree(run_dir, tmp_path / "other"))
     assert _scripts_beside([run_dir, other]).keys() == {"hungarian", "greedy"}

@@ -28,8 +28,8 @@ class Watch(Command):
     """Watch trainings or a study in a browser on this machine while they go on; Ctrl-C ends it."""
 
     runs: Annotated[tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN [RUN ...]")]
-    """Folders of runs, such as those that --seeds makes, or a folder that holds runs; or the folder
-    of one study."""
+    """Folders of runs, such as those that --seeds makes, or a folder that holds runs, with those
+    that begin later; or the folder of one study."""
     port: int = 0
     """Port of 127.0.0.1; 0: any that is free."""
     episodes: int = 4
@@ -65,7 +65,7 @@ class Watch(Command):
         from innerattn.report.watch.pages import watch_pages
 
         folders = self._folders()
-        return watch_pages(folders, _scripts_beside(folders), self._play)
+        return watch_pages(folders, _scripts_beside(folders), self._play, self._there)
 
     def _check(self) -> None:
         if not self.runs:
@@ -94,6 +94,10 @@ class Watch(Command):
         if not found:
             raise RunError(f"{', '.join(self.runs)}: no run in it can be read")
         return list(found.values())
+
+    def _there(self) -> list[Path]:
+        """The runs in the folders that were named, as they are now."""
+        return [run for name in self.runs for run in runs_within(existing_run(name))]
 
     def _play(self, folder: Path) -> Record:
         from innerattn.evaluate import load_trained, run_episodes

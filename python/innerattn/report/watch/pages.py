@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from innerattn.errors import InnerattnError
 from innerattn.experiments.live import LiveRun, read_live
 from innerattn.records.record import Record
+from innerattn.records.run_folder import read_config
 from innerattn.report.html import fill, shared_text
 from innerattn.report.local_server import Answer
 from innerattn.report.replay.page import replay_page
@@ -48,14 +51,18 @@ class NewestEpisodes:
 
 
 def watch_pages(
-    folders: Sequence[Path], scripts: Mapping[str, float], play: PlayNewest
+    folders: Sequence[Path],
+    scripts: Mapping[str, float],
+    play: PlayNewest,
+    more: Callable[[], Iterable[Path]] = tuple,
 ) -> dict[str, Callable[[], Answer]]:
     """All pages by name, for `innerattn.report.local_server.LocalServer`.
 
     Args:
-        folders: of the runs.
+        folders: of the runs, at least one.
         scripts: rescues per episode of scripts, to show beside the first run's.
         play: plays the newest policy of a run.
+        more: gives the folders of all runs that there are later; those that are new get pages.
     """
     first = fill(
         _text("watch.html"),
@@ -64,11 +71,47 @@ def watch_pages(
     )
     pages: dict[str, Callable[[], Answer]] = {
         "": partial(Answer, "text/html", first),
-        "state": partial(_state, folders, scripts),
     }
-    for index, folder in enumerate(folders):
-        pages[f"episodes/{index}"] = NewestEpisodes(folder, play).page
+    runs = _Runs(pages, scripts, play)
+    for folder in folders:
+        runs.add(folder)
+    pages["state"] = partial(runs.state, more)
     return pages
+
+
+class _Runs:
+    """The runs that are watched, and their pages; runs that begin later come last."""
+
+    def __init__(
+        self, pages: dict[str, Callable[[], Answer]], scripts: Mapping[str, float], play: PlayNewest
+    ) -> None:
+        self._pages, self._scripts, self._play = pages, scripts, play
+        self._folders: dict[Path, Path] = {}
+        self._lock = threading.Lock()
+
+    def add(self, folder: Path) -> None:
+        """Watch one more run.
+
+        Raises:
+            RunError: it cannot be read.
+        """
+        scenario = read_config(folder).training_scenario
+        read_live(folder)
+        first = next(iter(self._folders.values()), folder)
+        if read_config(first).training_scenario != scenario:
+            self._scripts = {}  # they played other worlds
+        self._pages[f"episodes/{len(self._folders)}"] = NewestEpisodes(folder, self._play).page
+        self._folders[folder.resolve()] = folder
+
+    def state(self, more: Callable[[], Iterable[Path]]) -> Answer:
+        """How all runs stand, those that have begun in between, too."""
+        with self._lock:
+            for folder in more():
+                if folder.resolve() not in self._folders:
+                    with suppress(InnerattnError):  # it has only begun, or is none
+                        self.add(folder)
+            folders = list(self._folders.values())
+        return _state(folders, self._scripts)
 
 
 def _state(folders: Sequence[Path], scripts: Mapping[str, float]) -> Answer:
