@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from tiny_study import TINY
 
+from innerattn.cli.main import main
 from innerattn.config import RunConfig, Scenario
 from innerattn.errors import ConfigError, RunError
 from innerattn.evaluate import trained
@@ -94,6 +95,23 @@ def test_other_faults_are_measured_anew_and_runs_without_are_told(done: StudyFol
     changed = begin_study(file, done.path)
     assert len(to_measure(changed)) == 6
     assert len(to_measure(done)) == 5
+
+
+def test_the_command_measures_and_shows_what_is_retained(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In processes of their own, where the teams are what they are: untrained."""
+    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
+    file, out = tmp_path / "faults.toml", tmp_path / "study"
+    file.write_text(FAULTS.replace('"motor_gain", ', "").replace("episodes = 4", "episodes = 2"))
+    assert main(["study", "run", str(file), "--out", str(out)]) == 0
+    assert "retained, unavailable" in capsys.readouterr().out
+    assert len(list((out / "faults").iterdir())) == 6
+    study = open_study(out)
+    assert to_measure(study) == []
+    assert all(
+        retained(study, run).keys() == {"retained", "retained_unavailable"} for run in study.planned
+    )
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"run": "other", "retained": {}}', "{" * 2_000])
