@@ -97,21 +97,19 @@ def test_other_faults_are_measured_anew_and_runs_without_are_told(done: StudyFol
     assert len(to_measure(done)) == 5
 
 
-def test_the_command_measures_and_shows_what_is_retained(
-    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_the_command_measures_what_is_missing(
+    done: StudyFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """In processes of their own, where the teams are what they are: untrained."""
-    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
-    file, out = tmp_path / "faults.toml", tmp_path / "study"
+    """In a process of its own, where the team is what it is: untrained."""
+    file = done.path.parent / "faults.toml"
     file.write_text(FAULTS.replace('"motor_gain", ', "").replace("episodes = 4", "episodes = 2"))
-    assert main(["study", "run", str(file), "--out", str(out)]) == 0
+    begun = begin_study(file, done.path)
+    measure(begun, 5)
+    (missing,) = to_measure(begun)
+    assert main(["study", "run", str(file), "--out", str(done.path)]) == 0
     assert "retained, unavailable" in capsys.readouterr().out
-    assert len(list((out / "faults").iterdir())) == 6
-    study = open_study(out)
-    assert to_measure(study) == []
-    assert all(
-        retained(study, run).keys() == {"retained", "retained_unavailable"} for run in study.planned
-    )
+    assert to_measure(begun) == []
+    assert retained(begun, missing.run).keys() == {"retained", "retained_unavailable"}
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"run": "other", "retained": {}}', "{" * 2_000])
