@@ -48,9 +48,8 @@ class Batch:
 
     Arrays that are given are copied before they are checked. Those returned by `step` are the
     caller's own if `give`, else read-only and valid until the step after next, as those of
-    `reward_components` always are; all others are fresh. Not
-    to be used from two threads at once (RuntimeError), nor, with several threads, in a child
-    process after a fork (RuntimeError).
+    `reward_components` always are; all others are fresh. Not to be used from two threads at once
+    (RuntimeError), nor, with several threads, in a child process after a fork (RuntimeError).
 
     `autoreset` is "same_step", "next_step" or "disabled".
 

@@ -42,7 +42,8 @@ _MOST_ROWS = 40
 
 
 def write_study(study: StudyFolder, results: Results) -> tuple[Found, list[Path]]:
-    """Write the report of a study into its folder; the same runs give the same bytes.
+    """Write the report of a study into its folder; the same runs give the same bytes, but in the journal
+    of Optuna, which holds times.
 
     Figures need matplotlib; without it, and of archived runs, there are no learning curves.
 

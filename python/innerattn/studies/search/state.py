@@ -52,6 +52,7 @@ class Searching:
         assert study.study.search is not None
         self._study, self._search = study, study.study.search
         self._plans: dict[int, Trial] = {}
+        self._values: dict[str, float | None] = {}
 
     def look(self) -> SearchState:
         """How it stands now.
@@ -65,13 +66,7 @@ class Searching:
         study = replace(self._study, planned=runs)
         states = study.states()
         seeds = study.study.grid[0].numbers
-        done = [run for run in runs if states[run.key] == "done"]
-        found = {
-            (one.run.place["variant"], one.run.place["scenario"], one.run.seed): one.value(
-                self._search.measure, self._search.length
-            )
-            for one in read_summaries(replace(study, planned=done))
-        }
+        self._read(study, [run for run in runs if states[run.key] == "done"])
         scores: dict[Trial, dict[int, float]] = {}
         failed = [trial for trial in trials if trial.refused]
         for trial in trials:
@@ -82,7 +77,7 @@ class Searching:
                     failed.append(trial)
                 if any(states[run.key] != "done" for run in own):
                     continue
-                values = [found[trial.name, run.place["scenario"], seed] for run in own]
+                values = [self._values[run.key] for run in own]
                 known = [value for value in values if value is not None]
                 if len(known) < len(values):
                     failed.append(trial)
@@ -139,6 +134,13 @@ class Searching:
             add_values(self._study, number, values)  # or another worker was faster
             found = self.look()
         return iter(found.wanted)
+
+    def _read(self, study: StudyFolder, done: Sequence[PlannedRun]) -> None:
+        """Read the results of finished runs, each once: several looks a second are usual."""
+        search = self._search
+        new = [run for run in done if run.key not in self._values]
+        for one in read_summaries(replace(study, planned=new)) if new else ():
+            self._values[one.run.key] = one.value(search.measure, search.length)
 
     def _trials(self) -> list[Trial]:
         values: dict[int, dict[str, Value]] = {0: {}} | read_values(self._study)
