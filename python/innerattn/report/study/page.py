@@ -1,21 +1,18 @@
-"""The page and the document that a study is reported as."""
+"""The page that a study is reported as."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from innerattn.report.study.search import (
     SearchFound,
-    search_document,
     search_page,
     search_rules,
     search_sentences,
 )
 from innerattn.report.table import Table, columns, markdown, plain_table
 from innerattn.report.tables.text import plus_minus
-from innerattn.stats.estimate import as_json
 from innerattn.stats.text import (
     NONE,
     format_estimate,
@@ -28,7 +25,7 @@ from innerattn.studies.aggregates import THRESHOLDS, Aggregate
 from innerattn.studies.curves import EPISODES, LearningCurve
 from innerattn.studies.folder import Rules, StudyFolder
 from innerattn.studies.ledger import State
-from innerattn.studies.results import RULES, Compared, Mean, Result, Results, Values
+from innerattn.studies.results import RULES, Compared, Mean, Results, Values
 from innerattn.studies.space import Length, Value
 from innerattn.studies.study import RETAINED, StudyTable
 
@@ -183,96 +180,6 @@ def algorithm_names(found: Sequence[Aggregate]) -> dict[str, Aggregate]:
     """Algorithms by a name of their own: what differs between their places in the grid."""
     varied = varied_in([one.algorithm for one in found]) or ["method"]
     return {" ".join(str(one.algorithm[key]) for key in varied): one for one in found}
-
-
-def study_document(found: Found) -> dict[str, Any]:
-    """The same as a JSON document."""
-    study = found.study
-    return {
-        "schema_version": 2,
-        "note": found.note,
-        "question": study.study.question,
-        "rules": [as_json(one) for one in study.rules],
-        "runs": [_listed(one) for one in found.results.finished],
-        "left_out": [
-            {"place": dict(run.place), "seed": run.seed, "key": run.key, "why": why}
-            for run, why in found.results.left_out
-        ],
-        "tables": {
-            title: [
-                {
-                    "place": dict(one.place),
-                    "seeds": list(one.seeds),
-                    "values": {
-                        f"{measure}.{length}": {
-                            "each": list(values.each.values()),
-                            "mean": as_json(values.mean),
-                        }
-                        for (measure, length), values in one.values.items()
-                    },
-                }
-                for one in rows
-            ]
-            for title, (_, rows) in found.tables.items()
-        },
-        "search": None if found.search is None else search_document(found.search),
-        "curves": {title: [_curve(one) for one in own] for title, own in found.curves.items()},
-        "over_all_scenarios": [
-            {
-                "algorithm": dict(one.algorithm),
-                "length": length,
-                "iqm": as_json(one.iqm),
-                "above": dict(zip(map(str, THRESHOLDS), one.above, strict=True)),
-            }
-            for length, aggregates in found.aggregates.items()
-            for one in aggregates.values()
-        ],
-        "contrasts": [
-            {
-                **one.contrast.model_dump(mode="json"),
-                "length": one.length,
-                "family": one.family,
-                "of": {"a": dict(one.a), "b": dict(one.b)},
-                "seeds": list(one.seeds),
-                "mean": one.mean,
-                "difference": as_json(one.found.difference) if one.found else None,
-                "p": one.p,
-                "holm_p": one.holm_p,
-                "improvement": as_json(one.improvement),
-                "equivalence_p": one.found.equivalence_p if one.found else None,
-                "verdict": one.verdict,
-            }
-            for one in found.compared
-        ],
-    }
-
-
-def _listed(one: Result) -> dict[str, Any]:
-    """What names a run, and what made it."""
-    named = {"place": dict(one.run.place), "seed": one.run.seed, "key": one.run.key}
-    if one.finished is None:
-        return named
-    info = one.finished.info
-    return named | {
-        "folder": f"runs/{one.finished.folder.name}",
-        "archived": one.finished.archived,
-        "config_sha256": one.finished.config_sha256,
-        "weights_sha256": one.finished.weights_sha256,
-        "commit": info.commit,
-        "device": info.device,
-        "versions": info.versions,
-    }
-
-
-def _curve(curve: LearningCurve) -> dict[str, Any]:
-    return {
-        "situation": curve.situation,
-        "method": curve.method,
-        "env_steps": curve.env_steps.tolist(),
-        "seconds": curve.seconds.tolist(),
-        "rescues_per_episode": curve.rescues.to_json(),
-        "scripts": curve.scripts,
-    }
 
 
 def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:

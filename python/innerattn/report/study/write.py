@@ -16,11 +16,11 @@ from innerattn.report.folder import ReportFolder
 from innerattn.report.plots.arms import ArmDots, ArmPanel, draw_arms
 from innerattn.report.plots.curves import CurveLine, draw_curves
 from innerattn.report.plots.search import TrialDot, draw_search
+from innerattn.report.study.document import study_document
 from innerattn.report.study.exports import marl_eval_document, rliable_document
 from innerattn.report.study.page import (
     Found,
     algorithm_names,
-    study_document,
     study_page,
     varied_in,
 )
@@ -42,8 +42,9 @@ _MOST_ROWS = 40
 
 
 def write_study(study: StudyFolder, results: Results) -> tuple[Found, list[Path]]:
-    """Write the report of a study into its folder; the same runs give the same bytes, but in the journal
-    of Optuna, which holds times.
+    """Write the report of a study into its folder; the same runs give the same bytes.
+
+    Only the journal of Optuna holds times, and differs.
 
     Figures need matplotlib; without it, and of archived runs, there are no learning curves.
 
