@@ -160,7 +160,7 @@ def search_table(found: SearchFound, *, cost: bool = True) -> Table:
                 str(len(one.scores)),
                 NONE if one.mean is None else plus_minus(one.mean),
                 *([f"{found.core_s[one.trial.number]:.0f}"] if cost else []),
-                one.state,
+                "done" if one.state == "finished" else one.state,  # short: it is a wide table
             ]
         )
     measure = found.search.measure.replace("_", " ")
