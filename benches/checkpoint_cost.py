@@ -20,7 +20,7 @@ from page import machine, table
 
 from innerattn.config import load_run_config
 from innerattn.train import train
-from innerattn.train.stages import Stages
+from innerattn.train.recorded import RecordedStages
 
 SAVES = 20
 RUNS = (
@@ -46,21 +46,21 @@ class Stalls:
 
 @contextmanager
 def timed(name: str, into: list[float]) -> Iterator[None]:
-    """Let a method of `Stages` write down its seconds inside the block."""
-    original: Callable[..., Any] = getattr(Stages, name)
+    """Let a method of `RecordedStages` write down its seconds inside the block."""
+    original: Callable[..., Any] = getattr(RecordedStages, name)
 
-    def method(self: Stages) -> Any:
+    def method(self: RecordedStages) -> Any:
         start = time.perf_counter()
         try:
             return original(self)
         finally:
             into.append(time.perf_counter() - start)
 
-    setattr(Stages, name, method)
+    setattr(RecordedStages, name, method)
     try:
         yield
     finally:
-        setattr(Stages, name, original)
+        setattr(RecordedStages, name, original)
 
 
 def measure(method: str, budget: str, env_steps: int | None) -> tuple[Stalls, float]:

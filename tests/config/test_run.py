@@ -248,7 +248,7 @@ ADDED_SINCE = {
         *("episode_steps", "engine", "stagger_starts", "schedule"),
         *("potential", "potential_discount", "potential_env_steps"),
         *("checkpoint_every_env_steps", "checkpoint_every_minutes", "keep_checkpoints"),
-        *("keep_best", "on_divergence", "matmul_backend"),
+        *("keep_best", "on_divergence", "matmul_backend", "workers"),
     ),
 }
 

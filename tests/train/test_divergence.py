@@ -45,7 +45,8 @@ CASES = [("td-inner", TD), ("ppo-inner", PPO)]
 
 def break_the_actor(patched: pytest.MonkeyPatch, kind: type[ActorCritic]) -> list[int]:
     """Let one update fail in the actor; the list gets the env-step's updates before it."""
-    original: Any = kind._update_actor  # type: ignore[attr-defined]
+    name = "_actor_gradients" if kind is PPO else "_update_actor"
+    original: Any = getattr(kind, name)
     done: list[int] = []
     calls = 0
 
@@ -57,7 +58,7 @@ def break_the_actor(patched: pytest.MonkeyPatch, kind: type[ActorCritic]) -> lis
             obs = obs * math.nan
         return original(self, nets, obs, *rest)
 
-    patched.setattr(kind, "_update_actor", failing)
+    patched.setattr(kind, name, failing)
     return done
 
 

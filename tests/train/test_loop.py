@@ -18,7 +18,7 @@ from innerattn.evaluate.play import run_episodes
 from innerattn.learn.types import Learner
 from innerattn.policies import scripted_policy
 from innerattn.records.run_folder import read_info
-from innerattn.train import Progress, load_policy, loop, parts, train
+from innerattn.train import Progress, load_policy, parts, prepare, train
 from innerattn.train.build import build_learner, thread_count
 
 Configure = Callable[..., RunConfig]
@@ -81,7 +81,7 @@ def test_a_training_has_no_start_of_an_evaluation_with_its_seed(
         return made[-1]
 
     starts: list[Any] = []
-    monkeypatch.setattr(loop, "BatchEnv", remembered)
+    monkeypatch.setattr(prepare, "BatchEnv", remembered)
     config = small_config(**{"train.seed": 12_345})
     train(config, tmp_path / "run")
     script = scripted_policy("random", config.scenario)

@@ -103,7 +103,8 @@ class _Choice(_Sources):
         if self.seed is not None and self.seeds is not None:
             raise UsageError(f"--seed {self.seed}, --seeds {self.seeds}: must be one of the two")
         chosen = {"train.method": self.method, "train.warm_start": self.warm_start}
-        return self.load({key: value for key, value in chosen.items() if value is not None})
+        found = self.load({key: value for key, value in chosen.items() if value is not None})
+        return found if self.seeds is not None else _with_workers(found)
 
 
 _WITH_RESUME = ("--resume", "--log", "--debug", "--quiet")
@@ -163,7 +164,7 @@ class _Train(_Sources):
         overrides = chosen | changed(self, self.defaults)
         console = self.console()
         if self.seeds is None:
-            return self._train_one(console, self.load(overrides))
+            return self._train_one(console, _with_workers(self.load(overrides)))
         seeds = parse_seeds(self.seeds)
         threads = self.load(overrides).train.threads or 1
         configs = [
@@ -174,7 +175,9 @@ class _Train(_Sources):
     def _train_one(self, console: Console, config: RunConfig) -> int:
         with requests_handled_by(leave):
             from innerattn.train import train
+            from innerattn.train.workers.choose import with_number_of_workers
 
+        config = with_number_of_workers(config)
         run_dir = self.run_dir or self._new_run_dir(config, _stamp())
         refuse_what_cannot_run([Run(config, run_dir)])
         console.print(f"{_what(config)}, seed {config.train.seed}")
@@ -292,13 +295,21 @@ def _stamp() -> str:
     return time.strftime("%Y%m%d-%H%M%S")
 
 
+def _with_workers(config: RunConfig) -> RunConfig:
+    """A single training with as many workers as pay, where nobody says how many."""
+    if "workers" in config.train.model_fields_set:
+        return config
+    return config.replace(train=config.train.replace(workers="auto"))
+
+
 def _what(config: RunConfig) -> str:
     train, first = config.train, ""
+    workers = "" if train.workers == 1 else f", {train.workers} workers"
     if train.warm_start != "none":
         first = f"Imitating {train.warm_start} first: {config.imitation.env_steps:,} env-steps\n"
     return (
         f"{first}Training {train.method} on {config.scenario.situation}: "
-        f"{train.env_steps:,} env-steps in {train.num_envs} worlds"
+        f"{train.env_steps:,} env-steps in {train.num_envs} worlds{workers}"
     )
 
 

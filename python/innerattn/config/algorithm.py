@@ -49,6 +49,8 @@ class Algorithm:
         attends: Whether its critic takes any registered attention, so that there is a method
             NAME-ATTENTION for each, e.g. "td-inner".
         methods: Further methods by name, with the values they need.
+        averages_over_workers: Whether its learner averages what it learns from over
+            `innerattn.learn.workers`, so that several processes can train it together.
         continuous: Values that its methods need where actions are continuous; None: they learn
             discrete actions only.
         budgets: Folder of what the algorithm changes in a built-in budget, BUDGET.toml; a budget
@@ -59,6 +61,7 @@ class Algorithm:
     config: type[AlgorithmConfig]
     learner: str
     attends: bool = False
+    averages_over_workers: bool = False
     methods: Mapping[str, Needs] = field(default_factory=dict)
     continuous: Needs | None = None
     budgets: Traversable | None = None

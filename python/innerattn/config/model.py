@@ -127,7 +127,8 @@ class Model(BaseModel):
             raise PydanticCustomError("type", "Input should be true or false")
         parts = value if isinstance(value, (list, tuple)) else [value]
         others = any(isinstance(part, (bool, str)) for part in parts)
-        if kinds & {int, float} and str not in kinds and others:
+        words = str in kinds or any(isinstance(kind, str) for kind in kinds)
+        if kinds & {int, float} and not words and others:
             what = "valid numbers" if parts is value else "a valid number"
             raise PydanticCustomError("type", f"Input should be {what}")
         return value

@@ -90,6 +90,7 @@ PPO = Algorithm(
     config=PPOConfig,
     learner="innerattn.learn.ppo:PPO",
     attends=True,
+    averages_over_workers=True,
     methods={
         "mappo": {
             "network": {"attention": "none", "mask_unavailable": False, "encoder": "flat"},

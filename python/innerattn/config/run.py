@@ -82,6 +82,15 @@ class RunConfig(Model):
         chosen = {"episode_steps": self.train.episode_steps, "engine": self.train.engine}
         return self.scenario.replace(**{k: v for k, v in chosen.items() if v is not None})
 
+    def shared_by_workers(self) -> dict[str, int]:
+        """What `train.workers` must divide, by key."""
+        wholes = {"train.num_envs": self.train.num_envs}
+        if isinstance(self.algorithm, TDConfig):
+            wholes["td.batch_size"] = self.td.batch_size
+        if self.train.warm_start != "none":
+            wholes["imitation.batch_size"] = self.imitation.batch_size
+        return wholes
+
     def in_use(self) -> dict[str, dict[str, Any]]:
         """The values that the run depends on, as JSON values by section and key.
 
@@ -144,6 +153,7 @@ class RunConfig(Model):
         refuse_late_faults(self.scenario, self.evaluate)
         self._check_swap()
         self._check_potential()
+        self._check_workers()
         gamma, world = self.algorithm.gamma, self.scenario
         if world.shaping == "potential" and self.train.schedule.gamma is not None:
             raise ValueError(
@@ -188,6 +198,20 @@ class RunConfig(Model):
             raise ValueError(f"{key}: must be two robots of a kind, of {', '.join(kinds)}")
         if self.network.parameter_sharing != "none":
             raise ValueError(f"{key}: network.parameter_sharing must be 'none'")
+
+    def _check_workers(self) -> None:
+        """Refuse workers whose shares would differ."""
+        count, method = self.train.workers, self.train.method
+        if count == "auto" or count == 1:
+            return
+        if not methods()[method].algorithm.averages_over_workers:
+            raise ValueError(
+                f"train.workers = {count}: must be 1 for train.method = {method!r}, whose learner "
+                "does not average over workers"
+            )
+        for key, whole in self.shared_by_workers().items():
+            if whole % count:
+                raise ValueError(f"train.workers = {count}: must divide {key} = {whole}")
 
     def _check_potential(self) -> None:
         """Refuse keys of a potential that do not go together."""

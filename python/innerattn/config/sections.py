@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from innerattn.config.model import ADDED_LATER, MOST_ROWS, MOST_STEPS, Model, OneOf
 from innerattn.config.registry import attentions, methods
@@ -120,6 +121,21 @@ class ImitationConfig(Model):
     )
 
 
+_MOST_WORKERS = 256
+
+
+def _auto_or_workers(value: object) -> object:
+    if value == "auto" or (type(value) is int and 1 <= value <= _MOST_WORKERS):
+        return value
+    raise PydanticCustomError("workers", f"Input should be 'auto' or 1 to {_MOST_WORKERS}")
+
+
+_Workers = Annotated[
+    Literal["auto"] | Annotated[int, Field(ge=1, le=_MOST_WORKERS)],
+    BeforeValidator(_auto_or_workers),
+]
+
+
 class TrainConfig(Model):
     """How long to train, where, and how often to log."""
 
@@ -136,6 +152,11 @@ class TrainConfig(Model):
         ge=1,
         le=256,
         description="threads of worlds and networks; None: as many as pay",
+    )
+    workers: Annotated[_Workers, ADDED_LATER] = Field(
+        1,
+        description="processes that train together, each in its share of the worlds, with "
+        "train.threads or one thread each; auto: as many as pay here, one if threads is given",
     )
     compile: Literal["auto", "on", "off"] = Field(
         "auto", description="compile the update before training; auto: if the run is long enough"

@@ -84,4 +84,6 @@ class TDConfig(AlgorithmConfig):
         return env_steps // self.update_every_env_steps * self.batch_size
 
 
-TD = Algorithm(config=TDConfig, learner="innerattn.learn.td:TD", attends=True)
+TD = Algorithm(
+    config=TDConfig, learner="innerattn.learn.td:TD", attends=True, averages_over_workers=True
+)

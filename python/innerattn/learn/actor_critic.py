@@ -6,9 +6,8 @@ It acts, imitates, reports attention, saves and loads. Each learner decides when
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import partial
 from typing import Any, ClassVar, NoReturn
 
 import numpy as np
@@ -16,8 +15,8 @@ import torch
 from torch import Tensor, nn
 
 from innerattn.config import NetworkConfig
-from innerattn.learn import losses
-from innerattn.learn.adam import AdamStepper, Forward, Stepper
+from innerattn.learn import losses, workers
+from innerattn.learn.adam import AdamStepper, Forward, Gradients, Stepper
 from innerattn.learn.compiled import CompilerError, failed_to_compile, first_line, traced
 from innerattn.learn.divergence import DivergenceError, not_finite, refuse_not_finite_gradients
 from innerattn.learn.gradients import average_over_robots
@@ -103,9 +102,10 @@ class ActorCritic:
         self._bfloat16 = network.precision == "bfloat16"
         self._first_rate, self._final_share = learning_rate, final_learning_rate_share
         self._rate = learning_rate
+        weights, noise, data = np.random.SeedSequence(seed).spawn(3)
+        seeds = weights, workers.own_seed(noise), workers.own_seed(data)
         weights_seed, noise_seed, self._data_seed = (
-            int(child.generate_state(1, np.uint64)[0])
-            for child in np.random.SeedSequence(seed).spawn(3)
+            int(one.generate_state(1, np.uint64)[0]) for one in seeds
         )
         self._noise = torch.Generator(device).manual_seed(noise_seed)
         # Drawn on the CPU in float32 and then moved: a seed gives the same weights everywhere.
@@ -128,6 +128,7 @@ class ActorCritic:
         self._compiled_for: set[int] | None = None
         self._rows: list[Tensor] = []
         self._undo: Undo | None = None
+        self._not_finite: str | None = None
 
     @property
     def updates(self) -> int:
@@ -169,7 +170,8 @@ class ActorCritic:
             loss = -losses.gather_actions(log_prob, wanted).mean(dim=1)
             return loss.sum(), loss.detach().mean()
 
-        gradients, loss = self._actor_adam.gradients(loss_of)
+        found, loss = self._actor_adam.gradients(loss_of)
+        (gradients,), (loss,) = workers.averaged([found], [loss])
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         self._actor_adam.step(gradients, _as_tensor(learning_rate))
         return float(loss)
@@ -269,16 +271,27 @@ class ActorCritic:
             DivergenceError: Always.
         """
         plain = self._networks if self._plain_networks is None else self._plain_networks
-        robots, what = self._team.num_robots, not_finite(metrics, self._metric_names)
-        names = {"critic": self._critic_adam, "actor": self._actor_adam}
-        for name, adam in names.items():
-            adam.watch = partial(refuse_not_finite_gradients, what, name, robots)
+        self._not_finite = not_finite(metrics, self._metric_names)
         try:
             type(self)._update_networks(self, plain, *tensors, _as_tensor(self._rate))
+            raise DivergenceError(self._not_finite)
         finally:
-            for adam in names.values():
-                adam.watch = None
-        raise DivergenceError(what)
+            self._not_finite = None
+
+    def _averaged(
+        self, gradients: Mapping[str, Gradients], numbers: Sequence[Tensor]
+    ) -> tuple[list[Gradients], list[Tensor]]:
+        """Means of gradients, by name of their network, and of numbers over all workers.
+
+        Raises:
+            DivergenceError: A gradient is not finite, and `_refuse` wants to know.
+        """
+        means, numbers = workers.averaged(list(gradients.values()), numbers)
+        if self._not_finite is not None:
+            robots = self._team.num_robots
+            for name, found in zip(gradients, means, strict=True):
+                refuse_not_finite_gradients(self._not_finite, name, robots, found)
+        return means, numbers
 
     def _do_update(self, batch_size: int, update: Callable[[], Tensor]) -> bool:
         """Do one update of a call of `learn`, as a whole or, where it is interrupted, not at all.

@@ -72,14 +72,12 @@ class AdamStepper(Network):
         trained: The parameters that are trained, by name.
         moments: Adam's tensors by name of the parameter, then by Adam's own names.
         weight_decay: Weight of the L2 penalty.
-        watch: While set, is called with all gradients.
     """
 
     def __init__(self, module: nn.Module, weight_decay: float = 0.0) -> None:
         """Start with moments of zero."""
         super().__init__(module)
         self.weight_decay = weight_decay
-        self.watch: Callable[[Gradients], None] | None = None
         self.trained = {
             name: parameter
             for name, parameter in module.named_parameters()
@@ -103,10 +101,7 @@ class AdamStepper(Network):
         found = torch.autograd.grad(loss, tuple(self.trained.values()), materialize_grads=True)
         # The fused Adam takes every gradient for contiguous.
         pairs = zip(self.trained, found, strict=True)
-        gradients = {name: gradient.contiguous() for name, gradient in pairs}
-        if self.watch is not None:
-            self.watch(gradients)
-        return gradients, aux
+        return {name: gradient.contiguous() for name, gradient in pairs}, aux
 
     def step(self, gradients: Gradients, learning_rate: Tensor) -> None:
         """Do one step of Adam; see `Stepper.step`."""

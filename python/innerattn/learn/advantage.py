@@ -9,6 +9,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from innerattn.learn import workers
 from innerattn.learn.resume import State, take
 
 _ROUNDING = 1e-9  # share of a mean of returns in float64, by which equal ones differ at most
@@ -76,10 +77,11 @@ class ReturnScale:
             before = before * ~step_ended
         self._open = before
         seen = torch.stack(returns, dim=1).flatten(1)  # (R, T * E)
-        added = seen.shape[1]
+        added = seen.shape[1] * workers.count()
         # Chan's rule for the moments of two samples together.
-        apart = seen.mean(dim=1) - self.mean
-        self.squares += (seen - seen.mean(dim=1, keepdim=True)).square().sum(dim=1)
+        mean = workers.mean(seen.mean(dim=1))
+        apart = mean - self.mean
+        self.squares += workers.total((seen - mean.unsqueeze(1)).square().sum(dim=1))
         self.squares += apart.square() * self.count * added / (self.count + added)
         self.mean += apart * added / (self.count + added)
         self.count += added

@@ -15,8 +15,8 @@ import torch
 from torch import Tensor
 
 from innerattn.config import PPOConfig
-from innerattn.learn import losses
-from innerattn.learn.adam import AdamStepper, Forward
+from innerattn.learn import losses, workers
+from innerattn.learn.adam import AdamStepper, Forward, Gradients
 from innerattn.learn.gradients import clip_norm
 from innerattn.learn.resume import State, take, take_generator, under
 from innerattn.learn.rollout import Arrivals
@@ -71,9 +71,11 @@ class AfterstateCritic:
         Returns:
             (T, R, E).
         """
-        if not len(arrivals.step):
+        if not workers.total(torch.tensor(len(arrivals.step))):
             return next_value
         self._fit(arrivals.states, next_value[arrivals.step, :, arrivals.env].t(), rate)
+        if not len(arrivals.step):  # other workers have some
+            return next_value
         found = next_value.clone()
         found[arrivals.step, :, arrivals.env] = self._values(self.network, arrivals.states).t()
         return found
@@ -83,12 +85,25 @@ class AfterstateCritic:
         config, step_size = self._config, torch.tensor(rate, dtype=torch.float64)
         for _ in range(config.afterstate_epochs or config.epochs):
             order = torch.randperm(len(states), generator=self._draws).to(states.device)
-            for chosen in torch.split(order, config.minibatch_size):
-                loss_of = partial(self._loss, states[chosen], wanted[:, chosen])
-                gradients, _ = self._adam.gradients(loss_of)
+            for chosen in _minibatches(order, config.minibatch_size):
+                gradients = self._gradients(states[chosen], wanted[:, chosen])
                 norm = clip_norm(gradients, config.critic_grad_clip)
                 if bool(norm.isfinite()):
                     self._adam.step(gradients, step_size)
+
+    def _gradients(self, states: Tensor, wanted: Tensor) -> Gradients:
+        """Gradients over the rows of all workers, each of which counts alike."""
+        if workers.count() == 1:
+            return self._adam.gradients(partial(self._loss, states, wanted))[0]
+        rows = torch.tensor(float(len(states)))
+        share = rows / workers.mean(rows)
+        if len(states):
+            found, _ = self._adam.gradients(partial(self._loss, states, wanted))
+            own = {name: gradient * share for name, gradient in found.items()}
+        else:
+            own = {name: torch.zeros_like(value) for name, value in self._adam.values.items()}
+        (gradients,), _ = workers.averaged([own], [])
+        return gradients
 
     def resume_state(self) -> dict[str, Tensor]:
         """The fit, and what it goes on with; see `Resumable`."""
@@ -115,3 +130,11 @@ class AfterstateCritic:
         """(R, n) values of states (n, S)."""
         values: Tensor = network(states.unsqueeze(0), _NO_ACTIONS).q[0]
         return values
+
+
+def _minibatches(order: Tensor, size: int) -> tuple[Tensor, ...]:
+    """Parts of this worker's rows, as many for every worker: an exchange needs all of them."""
+    if workers.count() == 1:
+        return torch.split(order, size)
+    rows = int(workers.total(torch.tensor(len(order))))
+    return torch.tensor_split(order, -(-rows // size))

@@ -7,9 +7,11 @@ worlds instead, which only teaches it the symmetry.
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from innerattn.learn import workers
 from innerattn.learn.interruptions import Interruptions
 from innerattn.learn.resume import State, inside, take_generator, under
 from innerattn.learn.ring import Ring
@@ -48,7 +50,7 @@ class FramedLearner:
         """
         self.learner = learner
         self._symmetry, self._states = symmetry, states
-        self._generator = None if drawn is None else torch.Generator().manual_seed(drawn)
+        self._generator = None if drawn is None else torch.Generator().manual_seed(_own(drawn))
         self._acted: tuple[Tensor, Tensor, Tensor] | None = None
 
     @property
@@ -173,3 +175,10 @@ class FramedLearner:
             worlds = torch.randint(NUM_ELEMENTS, (len(obs), 1), generator=self._generator)
             element = worlds.to(obs.device).expand(obs.shape[:2])
         return element, self._symmetry.turn(obs, element)
+
+
+def _own(seed: int) -> int:
+    """The seed of this worker's turns: that of worker 0 is ``seed``."""
+    if workers.rank() == 0:
+        return seed
+    return int(workers.own_seed(np.random.SeedSequence(seed)).generate_state(1, np.uint64)[0])

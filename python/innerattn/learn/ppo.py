@@ -13,9 +13,9 @@ import torch
 from torch import Tensor
 
 from innerattn.config import NetworkConfig, PPOConfig
-from innerattn.learn import losses
+from innerattn.learn import losses, workers
 from innerattn.learn.actor_critic import ActorCritic, Networks
-from innerattn.learn.adam import Forward
+from innerattn.learn.adam import Forward, Gradients
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
 from innerattn.learn.afterstate import AfterstateCritic
 from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
@@ -170,7 +170,7 @@ class PPO(ActorCritic):
         rollout = passes.rollout
         if passes.order is None:
             passes.order = torch.randperm(rollout.obs.shape[1], generator=self._shuffle)
-        minibatches = _split(passes.order, self._config.minibatch_size)
+        minibatches = _split(passes.order, self._config.minibatch_size, workers.count())
         for chosen in minibatches[passes.done :]:
             rows = rollout.take(chosen.to(self._device))
             passes.learnt += self._do_update(len(chosen), partial(self.update, rows))
@@ -205,16 +205,24 @@ class PPO(ActorCritic):
         entropy_weight: Tensor,
         rate: Tensor,
     ) -> Tensor:
-        critic_metrics = self._update_critic(nets, obs, actions, target, rate)
-        actor_metrics = self._update_actor(
-            nets, obs, actions, log_prob, advantage, entropy_weight, rate
+        of_critic, (critic_loss, q_mean) = self._critic_gradients(nets, obs, actions, target)
+        of_actor, found = self._actor_gradients(
+            nets, obs, actions, log_prob, advantage, entropy_weight
         )
-        return torch.stack([*critic_metrics, *actor_metrics])
+        (of_critic, of_actor), numbers = self._averaged(
+            {"critic": of_critic, "actor": of_actor}, [critic_loss, q_mean, *found]
+        )
+        critic_loss, q_mean, actor_loss, entropy, kl, clipped = numbers
+        critic_norm = self._step_critic(nets, of_critic, rate)
+        actor_norm = self._step_actor(nets, of_actor, rate)
+        return torch.stack(
+            [critic_loss, q_mean, critic_norm, actor_loss, entropy, actor_norm, kl, clipped]
+        )
 
-    def _update_critic(
-        self, nets: Networks, obs: Tensor, actions: Tensor, target: Tensor, rate: Tensor
-    ) -> tuple[Tensor, ...]:
-        """One step of the critic towards the targets: loss, mean value, gradient norm."""
+    def _critic_gradients(
+        self, nets: Networks, obs: Tensor, actions: Tensor, target: Tensor
+    ) -> tuple[Gradients, tuple[Tensor, Tensor]]:
+        """Gradients of the critic towards the targets; its loss and mean value."""
         config = self._config
 
         def loss_of(critic: Forward) -> tuple[Tensor, tuple[Tensor, Tensor]]:
@@ -226,13 +234,17 @@ class PPO(ActorCritic):
             )
             return loss, (loss.detach(), value.detach().mean())
 
-        gradients, (loss, mean) = nets.critic.gradients(loss_of)
-        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
-        norm = clip_norm(gradients, config.critic_grad_clip)
-        nets.critic.step(gradients, rate)
-        return loss, mean, norm
+        found: tuple[Gradients, tuple[Tensor, Tensor]] = nets.critic.gradients(loss_of)
+        return found
 
-    def _update_actor(
+    def _step_critic(self, nets: Networks, gradients: Gradients, rate: Tensor) -> Tensor:
+        """One step of the critic; () the norm of its gradient."""
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
+        norm = clip_norm(gradients, self._config.critic_grad_clip)
+        nets.critic.step(gradients, rate)
+        return norm
+
+    def _actor_gradients(
         self,
         nets: Networks,
         obs: Tensor,
@@ -240,9 +252,8 @@ class PPO(ActorCritic):
         before: Tensor,
         advantage: Tensor,
         entropy_weight: Tensor,
-        rate: Tensor,
-    ) -> tuple[Tensor, ...]:
-        """One step of the policies: loss, entropy, mean gradient norm, KL, clipped share."""
+    ) -> tuple[Gradients, tuple[Tensor, Tensor, Tensor, Tensor]]:
+        """Gradients of the policies; their loss, entropy, KL and clipped share."""
         config = self._config
 
         def loss_of(actor: Forward) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
@@ -253,14 +264,18 @@ class PPO(ActorCritic):
             return loss, (loss.detach(), entropy.detach().mean(), taken.detach() - before)
 
         gradients, (loss, entropy, change) = nets.actor.gradients(loss_of)
-        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
-        norms = clip_norm_by_robot(gradients, config.actor_grad_clip)
-        if not self.actor_frozen:
-            nets.actor.step(gradients, rate)
         ratio = change.exp()
         kl = (ratio - 1.0 - change).mean()
         clipped = ((ratio - 1.0).abs() > config.clip).to(kl.dtype).mean()
-        return loss, entropy, norms.mean(), kl, clipped
+        return gradients, (loss, entropy, kl, clipped)
+
+    def _step_actor(self, nets: Networks, gradients: Gradients, rate: Tensor) -> Tensor:
+        """One step of the policies, unless they are frozen; () the mean norm of their gradients."""
+        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
+        norms = clip_norm_by_robot(gradients, self._config.actor_grad_clip)
+        if not self.actor_frozen:
+            nets.actor.step(gradients, rate)
+        return norms.mean()
 
     @torch.no_grad()
     def _rollout(self) -> Rollout:
@@ -383,9 +398,9 @@ class PPO(ActorCritic):
         return {f"scale.{name}": tensor for name, tensor in self.scale.tensors().items()}
 
 
-def _split(order: Tensor, size: int) -> tuple[Tensor, ...]:
-    """Parts of at most ``size`` rows that differ by one row at most.
+def _split(order: Tensor, size: int, count: int = 1) -> tuple[Tensor, ...]:
+    """Parts, of at most ``size`` rows over all ``count`` workers, that differ by one row at most.
 
     The few rows of a short last part would weigh as much as all rows of another part.
     """
-    return torch.tensor_split(order, -(-len(order) // size))
+    return torch.tensor_split(order, -(-len(order) * count // size))

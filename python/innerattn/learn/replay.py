@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from innerattn.learn import workers
 from innerattn.learn.resume import State, take, take_generator
 from innerattn.learn.ring import Ring
 from innerattn.learn.types import Team, Transitions
@@ -83,14 +84,15 @@ class Replay:
 
     @property
     def reward_mean(self) -> Tensor:
-        """(R,) float64, mean reward of each robot over the transitions held; 0 when empty."""
-        return self._sum @ self._weights.double() / max(len(self), 1)
+        """(R,) float64, mean reward of each robot over all that workers hold; 0 when empty."""
+        return workers.mean(self._sum) @ self._weights.double() / max(len(self), 1)
 
     @property
     def reward_std(self) -> Tensor:
         """(R,) float64, its population standard deviation; 0 when empty."""
         weights = self._weights.double()
-        mean_of_squares = self._sum_of_products @ weights @ weights / max(len(self), 1)
+        products = workers.mean(self._sum_of_products)
+        mean_of_squares = products @ weights @ weights / max(len(self), 1)
         return (mean_of_squares - self.reward_mean.square()).clamp_min(0.0).sqrt()
 
     def add(self, batch: Transitions) -> None:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
+from innerattn.learn import workers
 from innerattn.learn.resume import State, take, take_within
 from innerattn.learn.types import Team, Transitions
 
@@ -270,13 +271,17 @@ def steps_of(rows: Tensor, num_steps: int) -> Tensor:
 
 
 def standardised(advantage: Tensor) -> Tensor:
-    """Advantages (R, B) with mean 0 and standard deviation 1 for each robot.
+    """Advantages (R, B) with mean 0 and standard deviation 1 for each robot, over all workers.
 
     They are 0 where they differ by no more than rounding: divided by their deviation, rounding
     would pass for advantages.
     """
-    centred = advantage - advantage.mean(dim=1, keepdim=True)
-    deviation = advantage.std(dim=1, correction=0, keepdim=True)
-    rounding = _ROUNDING * torch.finfo(advantage.dtype).eps * advantage.abs().amax(1, keepdim=True)
+    centred = advantage - workers.mean(advantage.mean(dim=1, keepdim=True))
+    if workers.count() == 1:
+        deviation = advantage.std(dim=1, correction=0, keepdim=True)
+    else:
+        deviation = workers.mean(centred.square().mean(dim=1, keepdim=True)).sqrt()
+    highest = workers.largest(advantage.abs().amax(dim=1, keepdim=True))
+    rounding = _ROUNDING * torch.finfo(advantage.dtype).eps * highest
     # Asked in this way, so that NaN stays NaN and divergence is found.
     return torch.where(deviation <= rounding, 0.0, centred / (deviation + 1e-8))

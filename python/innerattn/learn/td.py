@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 
 from innerattn.config import NetworkConfig, TDConfig
-from innerattn.learn import losses
+from innerattn.learn import losses, workers
 from innerattn.learn.actor_critic import ActorCritic, Networks
 from innerattn.learn.adam import Forward, Network
 from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
@@ -130,8 +130,9 @@ class TD(ActorCritic):
         """Store one control step of E worlds; see `Learner.observe`."""
         del truncated  # a time limit is no termination: the target looks past it
         self.replay.add(batch)
-        if len(self.replay) >= min(self._config.warmup_env_steps, self.replay.capacity):
-            self._pending_env_steps += len(batch.obs)
+        warm = workers.share_of(self._config.warmup_env_steps)
+        if len(self.replay) >= min(warm, self.replay.capacity):
+            self._pending_env_steps += len(batch.obs) * workers.count()
 
     @torch.no_grad()
     def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
@@ -153,7 +154,7 @@ class TD(ActorCritic):
             `critic_grad_norm` and `actor_grad_norm` (its mean over robots) are before clipping.
         """
         every = self._config.update_every_env_steps
-        size = self._config.batch_size
+        size = workers.share_of(self._config.batch_size)
         while self._pending_env_steps >= every:
             self._do_update(size, lambda: self.update(self.replay.sample(size)))
             self._pending_env_steps -= every
@@ -207,11 +208,12 @@ class TD(ActorCritic):
         return [*super()._generators(), self.replay.generator]
 
     def _new_replay(self, reward_parts: int) -> Replay:
-        capacity = self._config.replay_capacity
+        capacity = workers.share_of(self._config.replay_capacity)
         try:
             return Replay(capacity, self._team, self._data_seed, self._device, reward_parts)
         except MemoryError as error:
-            raise MemoryError(f"td.replay_capacity = {capacity}: {error}") from error
+            key = f"td.replay_capacity = {self._config.replay_capacity}"
+            raise MemoryError(f"{key}: {error}") from error
 
     def _update_networks(
         self,
@@ -267,7 +269,8 @@ class TD(ActorCritic):
             )
             return loss, (loss.detach(), q_taken.detach().mean())
 
-        gradients, (loss, q_mean) = nets.critic.gradients(loss_of)
+        found, numbers = nets.critic.gradients(loss_of)
+        (gradients,), (loss, q_mean) = self._averaged({"critic": found}, numbers)
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norm = clip_norm(gradients, config.critic_grad_clip)
         nets.critic.step(gradients, rate)
@@ -287,7 +290,8 @@ class TD(ActorCritic):
             loss = self._policy_loss(log_prob, q, actions, temperature)
             return loss, (loss.detach(), entropy)
 
-        gradients, (loss, entropy) = nets.actor.gradients(loss_of)
+        found, numbers = nets.actor.gradients(loss_of)
+        (gradients,), (loss, entropy) = self._averaged({"actor": found}, numbers)
         average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
         norms = clip_norm_by_robot(gradients, self._config.actor_grad_clip)
         if not self.actor_frozen:

@@ -67,7 +67,13 @@ class PlannedRun:
 
 
 def run_digest(config: RunConfig) -> str:
-    """The digest that tells runs apart: of a configuration, but for the device of its training."""
+    """The digest that tells runs apart: of a configuration, but for the device of its training.
+
+    Raises:
+        ConfigError: it depends on the machine how many workers train.
+    """
+    if config.train.workers == "auto":
+        raise ConfigError("train.workers = 'auto': must be a number in a study")
     return digest_of(_on_any_device(config.digest_values()))
 
 

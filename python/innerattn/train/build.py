@@ -158,6 +158,8 @@ def thread_count(config: RunConfig) -> int:
     A second thread gains little on small batches. Torch's threads wait for each other, so that two
     are many times slower than one where another program takes one of the cores.
     """
+    if config.train.workers != 1:
+        return config.train.threads or 1
     worth = max(1, config.algorithm.rows_per_update // _ROWS_PER_THREAD)
     return config.train.threads or min(worth, usable_cores())
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from innerattn.envs import BatchEnv
+from innerattn.learn import workers
 from innerattn.learn.divergence import refuse_not_finite_reward
 from innerattn.learn.resume import State, take, take_within
 from innerattn.learn.types import Afterstates, Learner, Transitions
@@ -104,10 +105,10 @@ class Collector:
         return transitions, truncated
 
     def take_tally(self) -> Tally:
-        """Counts since the last call."""
-        tally = Tally(self._episodes, self._rescues, self._total, self._all_rescues)
+        """Counts since the last call, of all workers."""
+        own = torch.tensor([self._episodes, self._rescues, self._total, self._all_rescues])
         self._episodes = self._rescues = self._all_rescues = 0
-        return tally
+        return Tally(*workers.total(own).tolist())
 
     def resume_state(self) -> dict[str, Tensor]:
         """All but the worlds; see `Resumable`."""
@@ -151,7 +152,7 @@ def _staggered(env: BatchEnv) -> NDArray[np.float32]:
     length = env.scenario.episode_steps
     shape = (env.num_envs, env.num_robots, *([2] if env.continuous else []))
     still = np.zeros(shape, np.float32 if env.continuous else np.int64)
-    begins = np.arange(env.num_envs) % length
+    begins = (np.arange(env.num_envs) + workers.rank() * env.num_envs) % length
     for step in range(1, length):
         env.step(still)
         obs = env.reset(mask=begins == step)

@@ -16,6 +16,7 @@ from torch import Tensor
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
+from innerattn.learn import workers
 from innerattn.learn.resume import State, inside, take_generator, take_whole, under, whole
 from innerattn.learn.ring import Ring
 from innerattn.learn.types import Learner, Transitions
@@ -38,12 +39,16 @@ class Imitation:
         self._config = config.imitation
         self._script = scripted_policy(config.train.warm_start, env.scenario)
         self._env, self._learner, self._collector = env, learner, collector
-        capacity = min(self._config.memory_env_steps, self._config.env_steps + env.num_envs)
+        capacity = min(
+            workers.share_of(self._config.memory_env_steps),
+            workers.share_of(self._config.env_steps) + env.num_envs,
+        )
         shape = (capacity, env.num_robots, env.obs_width)
         try:
             self._memory = _Memory(shape, config.train.seed)
         except MemoryError as error:
-            raise MemoryError(f"imitation.memory_env_steps = {capacity}: {error}") from error
+            given = capacity * workers.count()
+            raise MemoryError(f"imitation.memory_env_steps = {given}: {error}") from error
         self._pending_env_steps = 0
 
     @property
@@ -67,7 +72,8 @@ class Imitation:
         )
         transitions, truncated = self._collector.step()
         self._memory.add(transitions.obs, wanted)
-        metrics = {"agreement": float((transitions.actions.cpu() == wanted).float().mean())}
+        agreement = (transitions.actions.cpu() == wanted).float().mean()
+        metrics = {"agreement": float(workers.mean(agreement))}
         losses = self._imitate(share)
         if losses:
             metrics["imitation_loss"] = sum(losses) / len(losses)
@@ -111,14 +117,13 @@ class Imitation:
     def _imitate(self, share: float) -> list[float]:
         """Do the training steps of the actors that are due, and return their losses."""
         config = self._config
-        self._pending_env_steps += self._env.num_envs
+        self._pending_env_steps += self._env.num_envs * workers.count()
         due, self._pending_env_steps = divmod(
             self._pending_env_steps, config.update_every_env_steps
         )
         rate = config.learning_rate * (1.0 - (1.0 - config.final_learning_rate_share) * share)
-        return [
-            self._learner.imitate(*self._memory.sample(config.batch_size), rate) for _ in range(due)
-        ]
+        size = workers.share_of(config.batch_size)
+        return [self._learner.imitate(*self._memory.sample(size), rate) for _ in range(due)]
 
 
 class _Memory:
@@ -133,7 +138,8 @@ class _Memory:
         self._obs = torch.from_numpy(np.empty(shape, np.float32))
         self._actions = torch.from_numpy(np.empty(shape[:2], np.uint8))
         self.ring = Ring(obs=self._obs, actions=self._actions)
-        number = np.random.SeedSequence([seed, 1]).generate_state(1, np.uint64)[0]
+        own = workers.own_seed(np.random.SeedSequence([seed, 1]))
+        number = own.generate_state(1, np.uint64)[0]
         self._generator = torch.Generator().manual_seed(int(number))
 
     def add(self, obs: Tensor, actions: Tensor) -> None:

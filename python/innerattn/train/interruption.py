@@ -12,6 +12,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+import torch
+
+from innerattn.learn import workers
 from innerattn.signals import Interrupted, exit_code, interrupt
 
 _OURS = (signal.default_int_handler, interrupt)
@@ -36,6 +39,22 @@ class Interruptions:
 
     def check(self) -> None:
         """Raise if there was a request; to be called regularly.
+
+        Raises:
+            Interrupted: there was one.
+        """
+        self.raise_if_asked()
+
+    def take(self, error: KeyboardInterrupt) -> None:
+        """Take over a request that was raised outside of training.
+
+        Raises:
+            KeyboardInterrupt: it is to be heard at once.
+        """
+        raise error
+
+    def raise_if_asked(self) -> None:
+        """Raise if there was a request that no `check` has found.
 
         Raises:
             Interrupted: there was one.
@@ -74,6 +93,44 @@ class Interruptions:
             raise Interrupted(number)
 
 
+class CommonInterruptions(Interruptions):
+    """Requests to several workers, of which all learn at the same call of `check`.
+
+    The first request always waits, also for the compiler: what all workers have is saved together.
+    """
+
+    _EVERY = 8
+    """Calls of `check` between two exchanges, each of which takes some time."""
+
+    def __init__(self) -> None:
+        """Nobody has asked yet."""
+        super().__init__()
+        self._deferred = True
+        self._calls = 0
+
+    def check(self) -> None:
+        """Raise if there was a request to any worker; all of them call this equally often.
+
+        Raises:
+            Interrupted: there was one.
+        """
+        self._calls += 1
+        if self._calls % self._EVERY == 0:
+            newest = self._asked[-1] if self._asked else 0
+            asked = int(workers.largest(torch.tensor(newest)))
+            if asked:
+                raise Interrupted(asked)
+
+    def take(self, error: KeyboardInterrupt) -> None:
+        """Take over a request, which waits for `check`."""
+        self._asked.append(error.number if isinstance(error, Interrupted) else signal.SIGINT)
+
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Let a request wait here, too."""
+        yield
+
+
 @contextmanager
 def remembered_interruptions() -> Iterator[Interruptions]:
     """Remember every signal that raises KeyboardInterrupt.
@@ -83,7 +140,7 @@ def remembered_interruptions() -> Iterator[Interruptions]:
     Yields:
         What tells whether there has been such a signal.
     """
-    interruptions = Interruptions()
+    interruptions = Interruptions() if workers.count() == 1 else CommonInterruptions()
     before = {}
     if threading.current_thread() is threading.main_thread():
         handlers = {one: signal.getsignal(one) for one in signal.valid_signals()}

@@ -6,30 +6,23 @@ It knows the `Learner` protocol and no algorithm, and does not evaluate.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import torch
-
 from innerattn.config import RunConfig
-from innerattn.config.streams import stream_seed
-from innerattn.envs import BatchEnv
 from innerattn.records.run_files import RunFiles
 from innerattn.records.run_folder import config_of
-from innerattn.train.build import keep_heap_small, thread_count, torch_threads
+from innerattn.train.build import thread_count
 from innerattn.train.checkpoint import RunFolder, refuse_existing, versions
-from innerattn.train.checkpoint_info import Stage
-from innerattn.train.compilation import compiles
-from innerattn.train.interruption import Interruptions, remembered_interruptions
-from innerattn.train.matmul_backend import chosen_matmul_backend
-from innerattn.train.parts import Parts
+from innerattn.train.prepare import prepared
 from innerattn.train.progress import Progress
+from innerattn.train.recorded import RecordedStages
 from innerattn.train.resume import NothingSavedError, NothingToResumeError, Saved, read_saved
 from innerattn.train.run_lock import only_training_in
 from innerattn.train.saved import Checkpoints
-from innerattn.train.stages import Stages
+from innerattn.train.workers.choose import with_number_of_workers
+from innerattn.train.workers.start import started_workers
 
 __all__ = ["Progress", "resume", "train"]
 
@@ -61,12 +54,16 @@ def train(
     """
     path = Path(run_dir)
     refuse_existing(path)
+    config = with_number_of_workers(config)
     threads = thread_count(config)
-    with _prepared(config, threads, "imitating") as (parts, compiled, backend, interruptions):
-        folder = RunFolder.create(path, config, threads, compiled, backend)
+    with (
+        started_workers(config, path, resumes=False),
+        prepared(config, threads, "imitating") as ready,
+    ):
+        folder = RunFolder.create(path, config, threads, ready.compiled, ready.matmul_backend)
         with only_training_in(path):
-            Stages(parts, folder, interruptions, progress).run()
-            interruptions.check()
+            RecordedStages(ready.parts, folder, ready.interruptions, progress).run()
+            ready.interruptions.raise_if_asked()
     return path
 
 
@@ -96,66 +93,44 @@ def resume(run_dir: str | Path, *, progress: Callable[[Progress], None] | None =
         except NothingSavedError:
             _begin_anew(path, progress)
             return path
-        info, stage = saved.run_info, saved.info.counters.stage
-        # A run that was not compiled goes on alike.
-        prepared = _prepared(saved.config, info.threads, stage, compilable=info.compiled)
-        with prepared as (parts, compiled, backend, stops):
-            if parts.resumable is None:
-                method = saved.config.train.method
-                raise NothingToResumeError(f"{path}: method {method!r} cannot go on from a file")
-            saved.load_into(parts)
-            _warn_of_changes(saved, compiled, backend)
-            folder = RunFolder(path, replace(info, resumed=info.resumed + 1))
-            counters = saved.info.counters
-            folder.mark("running", saved.number, parts.learner.updates, counters.seconds)
-            keep = saved.config.train.keep_checkpoints
-            Checkpoints(path, saved.config.digest(), keep).sweep(saved.number)
-            Stages(parts, folder, stops, progress, saved.info).run()
-            stops.check()
+        _go_on(path, saved, progress)
     return path
+
+
+def _go_on(path: Path, saved: Saved, progress: Callable[[Progress], None] | None) -> None:
+    info, stage = saved.run_info, saved.info.counters.stage
+    with (
+        started_workers(saved.config, path, resumes=True),
+        # A run that was not compiled goes on alike.
+        prepared(saved.config, info.threads, stage, compilable=info.compiled) as ready,
+    ):
+        parts = ready.parts
+        if parts.resumable is None:
+            method = saved.config.train.method
+            raise NothingToResumeError(f"{path}: method {method!r} cannot go on from a file")
+        saved.load_into(parts)
+        _warn_of_changes(saved, ready.compiled, ready.matmul_backend)
+        folder = RunFolder(path, replace(info, resumed=info.resumed + 1))
+        counters = saved.info.counters
+        folder.mark("running", saved.number, parts.learner.updates, counters.seconds)
+        keep = saved.config.train.keep_checkpoints
+        Checkpoints(path, saved.config.digest(), keep).sweep(saved.number)
+        RecordedStages(parts, folder, ready.interruptions, progress, saved.info).run()
+        ready.interruptions.raise_if_asked()
 
 
 def _begin_anew(path: Path, progress: Callable[[Progress], None] | None) -> None:
     """Train in a folder whose training was stopped before it saved anything."""
     files = RunFiles(path)
     config = config_of(files)
-    with _prepared(config, files.info.threads, "imitating") as (parts, compiled, backend, stops):
-        folder = RunFolder.begin_anew(path, config, files.info, compiled, backend)
-        Stages(parts, folder, stops, progress).run()
-        stops.check()
-
-
-@contextmanager
-def _prepared(
-    config: RunConfig, threads: int, stage: Stage, *, compilable: bool = True
-) -> Iterator[tuple[Parts, bool, str, Interruptions]]:
-    """The parts of a training, whether updates are compiled, and by what matrices are multiplied.
-
-    Raises:
-        ConfigError: the configuration cannot be run here.
-    """
-    keep_heap_small()
     with (
-        torch_threads(threads),
-        chosen_matmul_backend(config.train.matmul_backend) as matmul_backend,
-        remembered_interruptions() as interruptions,
+        started_workers(config, path, resumes=False),
+        prepared(config, files.info.threads, "imitating") as ready,
     ):
-        env = BatchEnv(
-            config.training_scenario,
-            config.train.num_envs,
-            seed=stream_seed(config.train.seed, "training"),
-            num_threads=config.train.threads,
-            copy=False,
-        )
-        with closing(env):
-            parts = Parts(config, env, stage)
-            compiled = compilable and compiles(config)
-            if compiled:
-                # The compiler counts the graphs of a process, and gives up after eight. Those of
-                # earlier runs are of no use to this one, which shall be compiled, too.
-                torch.compiler.reset()
-                parts.learner.compile()
-            yield parts, compiled, matmul_backend, interruptions
+        compiled, backend = ready.compiled, ready.matmul_backend
+        folder = RunFolder.begin_anew(path, config, files.info, compiled, backend)
+        RecordedStages(ready.parts, folder, ready.interruptions, progress).run()
+        ready.interruptions.raise_if_asked()
 
 
 def _warn_of_changes(saved: Saved, compiled: bool, backend: str) -> None:

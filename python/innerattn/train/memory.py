@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from innerattn.config import RunConfig
+from innerattn.learn import workers
 from innerattn.learn.ring import Ring
 
 _KEYS = {
@@ -43,15 +44,17 @@ def refuse_what_does_not_fit(rings: Mapping[str, Ring], config: RunConfig) -> No
     steps = config.train.env_steps + config.train.num_envs
     if config.train.warm_start != "none":
         steps += config.imitation.env_steps
+    each = -(-steps // workers.count())
     needed = {
-        name: min(ring.capacity, steps) * ring.row_bytes
+        name: min(ring.capacity, each) * ring.row_bytes * workers.count()
         for name, ring in rings.items()
         if all(column.device.type == "cpu" for column in ring.columns.values())
     }
     if free is None or sum(needed.values()) <= free:
         return
     name = max(needed, key=lambda one: needed[one])
+    capacity = rings[name].capacity * workers.count()
     raise MemoryError(
-        f"{_KEYS.get(name, name)} = {rings[name].capacity}: takes {needed[name] / _GIB:,.1f} GiB; "
+        f"{_KEYS.get(name, name)} = {capacity}: takes {needed[name] / _GIB:,.1f} GiB; "
         f"{free / _GIB:,.1f} GiB are free"
     )

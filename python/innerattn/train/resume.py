@@ -22,6 +22,7 @@ from innerattn.train.row_files import FORMAT as ROWS_FORMAT
 from innerattn.train.row_files import file_name, read_rows
 from innerattn.train.saved import INFO, STATE_FORMAT, nothing_was_saved, whole_checkpoints
 from innerattn.train.weights import FORMAT, MOST_BYTES, tensors_in
+from innerattn.train.workers.states import own_name, own_part
 
 
 class NothingToResumeError(RunError):
@@ -66,17 +67,17 @@ class Saved:
         """
         stage = self.info.counters.stage
         folder = self.run / "checkpoints"
-        rings = parts.rings(stage)
+        rings, rows = parts.rings(stage), own_part(self.info.rows)
         place = folder / str(self.number)
-        if rings.keys() != self.info.rows.keys():
+        if rings.keys() != rows.keys():
             raise _damaged(f"{place / INFO}: rows {sorted(self.info.rows)}: not those of this run")
         try:
             for name, ring in rings.items():
-                read_rows(folder / "rows", name, ring, self.info.rows[name])
+                read_rows(folder / "rows", own_name() + name, ring, rows[name])
         except RunError as error:
             raise _damaged(str(error)) from error
         try:
-            parts.load(self.weights, self.state, stage)
+            parts.load(self.weights, own_part(self.state), stage)
         except ValueError as error:
             raise _damaged(f"{place / 'state.safetensors'}: {error}") from error
 

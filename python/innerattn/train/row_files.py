@@ -6,6 +6,7 @@ whatever the size of the memory.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -73,6 +74,50 @@ class RowFiles:
         segment = Segment(first, count, "")
         path = self._folder / file_name(self._name, segment)
         return replace(segment, sha256=write_weights(path, self._ring.rows(first, count), FORMAT))
+
+
+class RowsOnDisk:
+    """The files of all memories of a stage of training."""
+
+    def __init__(self, folder: Path, known: Mapping[str, RowsInfo], owner: str = "") -> None:
+        """Write to a folder that need not be there yet.
+
+        Args:
+            folder: the place of the files.
+            known: files that hold what is in the memories of the first stage already, by name.
+            owner: what names of files begin with, so that several can write to the folder.
+        """
+        self._folder, self._known, self._owner = folder, known, owner
+        self._files: dict[str, RowFiles] = {}
+
+    def open(self, rings: Mapping[str, Ring]) -> None:
+        """Write the rows of these memories from now on."""
+        if rings:
+            self._folder.mkdir(exist_ok=True)
+        known, self._known = self._known, {}
+        self._files = {
+            name: RowFiles(self._folder, self._owner + name, ring, known.get(name))
+            for name, ring in rings.items()
+        }
+
+    def write_whole_files(self) -> None:
+        """Write the rows that fill a file.
+
+        Raises:
+            OSError: a file cannot be written; a later call writes it.
+        """
+        for files in self._files.values():
+            files.write_whole_files()
+
+    def write(self, rings: Mapping[str, Ring]) -> dict[str, RowsInfo]:
+        """Write all rows that are not written yet, of these memories if none were opened yet.
+
+        Raises:
+            OSError: a file cannot be written.
+        """
+        if not self._files:
+            self.open(rings)
+        return {name: files.write() for name, files in self._files.items()}
 
 
 def file_name(name: str, segment: Segment) -> str:

@@ -24,11 +24,12 @@ from innerattn.train.checkpoint_info import (
     Best,
     CheckpointInfo,
     Counters,
+    RowsInfo,
     checkpoint_info,
     checkpoint_text,
 )
 from innerattn.train.metrics import MetricsFile
-from innerattn.train.row_files import RowFiles, files_of
+from innerattn.train.row_files import files_of
 from innerattn.train.weights import write_weights
 
 STATE_FORMAT = "innerattn.state"
@@ -45,7 +46,7 @@ class Content:
         counters: how far the run is.
         weights: everything learnt, by name.
         state: everything else but the large memories, by name.
-        rows: the large memories by name.
+        rows: the files of the large memories by name; they are written already.
         metrics: the lines so far.
         best: the weights that `Counters.best` speaks of, unless they are saved already.
     """
@@ -53,7 +54,7 @@ class Content:
     counters: Counters
     weights: Mapping[str, Tensor]
     state: Mapping[str, Tensor]
-    rows: Mapping[str, RowFiles]
+    rows: Mapping[str, RowsInfo]
     metrics: MetricsFile
     best: Mapping[str, Tensor] | None
 
@@ -83,7 +84,6 @@ class Checkpoints:
         for tensors in (content.weights, content.state):
             refuse_not_finite(tensors, counters.env_steps)
         content.metrics.sync()
-        rows = {name: files.write() for name, files in content.rows.items()}
         self.save_best(counters.best, content.best)
         target = self.folder / str(counters.env_steps)
         if (target / INFO).is_file():  # of the midst of the same control step
@@ -99,7 +99,7 @@ class Checkpoints:
                 state_sha256=write_weights(
                     partial / "state.safetensors", content.state, STATE_FORMAT
                 ),
-                rows=rows,
+                rows=dict(content.rows),
                 metrics_bytes=content.metrics.bytes,
                 metrics_sha256=content.metrics.sha256,
             )

@@ -1,0 +1,1 @@
+"""Several processes of one machine that train one learner: started, heard, and kept in step."""
