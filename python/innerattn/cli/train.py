@@ -176,9 +176,13 @@ class _Train(_Sources):
         with requests_handled_by(leave):
             from innerattn.train import train
             from innerattn.train.workers.choose import with_number_of_workers
+            from innerattn.train.workers.torchrun import is_other_worker
 
         config = with_number_of_workers(config)
         run_dir = self.run_dir or self._new_run_dir(config, _stamp())
+        if is_other_worker():
+            train(config, run_dir)
+            return 0
         refuse_what_cannot_run([Run(config, run_dir)])
         console.print(f"{_what(config)}, seed {config.train.seed}")
         console.print(f"Run folder: {run_dir}", soft_wrap=True)
@@ -193,7 +197,11 @@ class _Train(_Sources):
             from innerattn.records.run_folder import read_config, read_info
             from innerattn.train import newest_checkpoint, resume
             from innerattn.train.saved import nothing_was_saved
+            from innerattn.train.workers.torchrun import is_other_worker
 
+        if is_other_worker():
+            resume(run_dir)
+            return 0
         config, info = read_config(run_dir), read_info(run_dir)
         measured = (run_dir / "evaluation" / "summary.json").exists()
         if info.state == "done" and not measured:
@@ -248,8 +256,9 @@ class _Train(_Sources):
         stamp = _stamp()
         runs = [Run(one, self._folder_of_seed(one, stamp), log=self.log) for one in configs]
         refuse_what_cannot_run(runs)
-        threads = configs[0].train.threads or 1
-        at_once = max(1, min(usable_cores() // threads, len(runs)))
+        workers = configs[0].train.workers
+        cores = (configs[0].train.threads or 1) * (1 if workers == "auto" else workers)
+        at_once = max(1, min(usable_cores() // cores, len(runs)))
         console.print(f"{_what(configs[0])}, {len(runs)} seeds, {at_once} at a time")
         console.print(f"Run folders: {runs[0].folder} to {runs[-1].folder}", soft_wrap=True)
         try:

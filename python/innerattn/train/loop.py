@@ -20,9 +20,11 @@ from innerattn.train.progress import Progress
 from innerattn.train.recorded import RecordedStages
 from innerattn.train.resume import NothingSavedError, NothingToResumeError, Saved, read_saved
 from innerattn.train.run_lock import only_training_in
-from innerattn.train.saved import Checkpoints
+from innerattn.train.saved import Checkpoints, nothing_was_saved
 from innerattn.train.workers.choose import with_number_of_workers
 from innerattn.train.workers.start import started_workers
+from innerattn.train.workers.torchrun import is_other_worker, joined_of_torchrun
+from innerattn.train.workers.worker import take_part
 
 __all__ = ["Progress", "resume", "train"]
 
@@ -53,8 +55,12 @@ def train(
             `resume` goes on.
     """
     path = Path(run_dir)
-    refuse_existing(path)
     config = with_number_of_workers(config)
+    if is_other_worker():
+        with joined_of_torchrun(config.train.workers, path) as path:
+            take_part(path, config)
+        return path
+    refuse_existing(path)
     threads = thread_count(config)
     with (
         started_workers(config, path, resumes=False),
@@ -87,6 +93,12 @@ def resume(run_dir: str | Path, *, progress: Callable[[Progress], None] | None =
             training in the folder.
     """
     path = Path(run_dir)
+    if is_other_worker():
+        files = RunFiles(path)
+        config, anew = config_of(files), nothing_was_saved(path, files.info)
+        with joined_of_torchrun(config.train.workers, path):
+            take_part(path, config if anew else None)
+        return path
     with only_training_in(path):
         try:
             saved = read_saved(path)

@@ -7,6 +7,7 @@ import sys
 from innerattn.config import RunConfig
 from innerattn.config.registry import methods
 from innerattn.cores import usable_cores
+from innerattn.train.workers.torchrun import started_by_torchrun
 
 _WORTH_ROWS = 1_000_000
 """Rows of training from which another worker pays: it takes some seconds to start."""
@@ -15,9 +16,15 @@ _LEAST_ROWS = 128
 
 
 def with_number_of_workers(config: RunConfig) -> RunConfig:
-    """The configuration with a number for `train.workers`, so that it says what was run."""
+    """The configuration with a number for `train.workers`, so that it says what was run.
+
+    It is that of torchrun's processes where it has started this one.
+    """
     if config.train.workers != "auto":
         return config
+    started = started_by_torchrun()
+    if started is not None:
+        return config.replace(train=config.train.replace(workers=started))
     return config.replace(train=config.train.replace(workers=workers_that_pay(config)))
 
 

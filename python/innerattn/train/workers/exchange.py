@@ -30,12 +30,14 @@ class WorkerEndedError(RunError):
     """Another worker failed, or its process is gone.
 
     Attributes:
-        rank: Its number.
+        rank: Its number; None where that is not known.
+        text: What it told of itself; empty if it told nothing.
     """
 
-    def __init__(self, rank: int, text: str = "") -> None:
-        """Say what it told of itself; empty if it told nothing."""
-        super().__init__(f"worker {rank}: {text}" if text else f"worker {rank} is gone")
+    def __init__(self, rank: int | None, text: str = "") -> None:
+        """Say which one, and why."""
+        name = "another worker" if rank is None else f"worker {rank}"
+        super().__init__(f"{name}: {text}" if text else f"{name} is gone")
         self.rank, self.text = rank, text
 
 

@@ -19,6 +19,7 @@ from innerattn.cores import usable_cores
 from innerattn.errors import ConfigError, RunError
 from innerattn.learn import workers
 from innerattn.train.workers.exchange import Exchange, WorkerEndedError, memory_bytes
+from innerattn.train.workers.torchrun import joined_of_torchrun, started_by_torchrun
 
 MODULE = "innerattn.train.workers.worker"
 _MOST_PER_CORE = 4
@@ -31,7 +32,8 @@ def started_workers(config: RunConfig, run: Path, *, resumes: bool) -> Iterator[
     """Let this process be worker 0 of `train.workers` inside the block.
 
     The others are processes that end with the block, however it ends, and with this process. A
-    signal from a terminal does not reach them: worker 0 tells them when to stop.
+    signal from a terminal does not reach them: worker 0 tells them when to stop. Where torchrun has
+    started this process, it has started the others, too.
 
     Args:
         config: the run.
@@ -46,7 +48,18 @@ def started_workers(config: RunConfig, run: Path, *, resumes: bool) -> Iterator[
     if count == "auto" or count == 1:  # `train` puts a number for "auto"
         yield
         return
-    _refuse_what_cannot_be(count, config.train.device)
+    key = f"train.workers = {count}"
+    if config.train.device != "cpu":
+        raise ConfigError(f"{key}: must be 1 where train.device = {config.train.device!r}")
+    if started_by_torchrun() is not None:
+        with joined_of_torchrun(count, run):
+            yield
+        return
+    most = _MOST_PER_CORE * usable_cores()
+    if sys.platform == "win32":
+        raise ConfigError(f"{key}: must be 1 on Windows")
+    if count > most:
+        raise ConfigError(f"{key}: must be at most {most}, {_MOST_PER_CORE} for each core here")
     with ExitStack() as open_until_the_end:
         memory = open_until_the_end.enter_context(_memory_without_a_name())
         os.ftruncate(memory, memory_bytes(count))
@@ -71,7 +84,7 @@ def started_workers(config: RunConfig, run: Path, *, resumes: bool) -> Iterator[
             with workers.joined(exchange):
                 yield
         except WorkerEndedError as error:
-            raise _what_happened(error, others[error.rank - 1], run) from error
+            raise _what_happened(error, others, run) from error
         finally:
             for one in sockets:
                 one.close()
@@ -108,25 +121,14 @@ def _started(told: dict[str, object]) -> subprocess.Popen[bytes]:
     return process
 
 
-def _refuse_what_cannot_be(count: int, device: str) -> None:
-    key = f"train.workers = {count}"
-    if sys.platform == "win32":
-        raise ConfigError(f"{key}: must be 1 on Windows")
-    most = _MOST_PER_CORE * usable_cores()
-    if count > most:
-        raise ConfigError(f"{key}: must be at most {most}, {_MOST_PER_CORE} for each core here")
-    if device != "cpu":
-        raise ConfigError(f"{key}: must be 1 where train.device = {device!r}")
-
-
 def _what_happened(
-    error: WorkerEndedError, process: subprocess.Popen[bytes], run: Path
+    error: WorkerEndedError, others: list[subprocess.Popen[bytes]], run: Path
 ) -> RunError:
     """Why a worker ended, by what it told or by its exit code."""
-    if error.text:
-        return RunError(f"worker {error.rank}: {error.text}")
+    if error.text or error.rank is None:
+        return error
     try:
-        code = process.wait(_PATIENCE_S)
+        code = others[error.rank - 1].wait(_PATIENCE_S)
     except subprocess.TimeoutExpired:
         return RunError(f"worker {error.rank} does not answer")
     how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"

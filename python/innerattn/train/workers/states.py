@@ -41,7 +41,7 @@ def state_of_all(state: State) -> dict[str, Tensor]:
     """Every worker's state by name, for worker 0; the others get their own back."""
     found = dict(state)
     sent = b"" if workers.rank() == 0 else save(_plain(state))
-    for rank, data in enumerate(_bytes_of_all(sent)):
+    for rank, data in enumerate(bytes_of_all(sent)):
         if rank and workers.rank() == 0:
             found |= {_name(rank) + name: tensor for name, tensor in load(data).items()}
     return found
@@ -60,7 +60,7 @@ def rows_of_others(write: Callable[[], Mapping[str, RowsInfo]]) -> dict[str, Row
         except OSError as error:
             told = {"errno": error.errno, "why": error.strerror, "file": str(error.filename)}
     found: dict[str, RowsInfo] = {}
-    for rank, data in enumerate(_bytes_of_all(json.dumps(told).encode())):
+    for rank, data in enumerate(bytes_of_all(json.dumps(told).encode())):
         one = json.loads(data)
         if "why" in one:
             raise OSError(one["errno"], one["why"], one["file"])
@@ -73,7 +73,7 @@ def _name(rank: int) -> str:
     return f"worker{rank}." if rank else ""
 
 
-def _bytes_of_all(own: bytes) -> list[bytes]:
+def bytes_of_all(own: bytes) -> list[bytes]:
     """What every worker gives, in the order of ranks."""
     sizes = workers.gathered(torch.tensor([len(own)]))[:, 0].tolist()
     padded = torch.zeros(max(1, *sizes), dtype=torch.uint8)

@@ -13,7 +13,6 @@ import socket
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import torch
 
@@ -104,7 +103,8 @@ def main() -> int:
     )
     try:
         with workers.joined(exchange):
-            _work(told)
+            config = None if told["resumes"] else RunConfig.model_validate(told["config"])
+            take_part(Path(told["run"]), config)
     except (KeyboardInterrupt, WorkerEndedError):  # worker 0 stops, or is gone
         return 1
     except Exception as error:
@@ -117,19 +117,23 @@ def main() -> int:
     return 0
 
 
-def _work(told: dict[str, Any]) -> None:
-    run = Path(told["run"])
-    if told["resumes"]:
-        saved = read_saved(run)
-        config, info = saved.config, saved.info
-        with prepared(config, saved.run_info.threads, info.counters.stage) as ready:
-            saved.load_into(ready.parts)
-            stops, known = ready.interruptions, own_part(info.rows)
-            SharedStages(ready.parts, run, stops, info.counters, known).run()
-    else:
-        config = RunConfig.model_validate(told["config"])
+def take_part(run: Path, config: RunConfig | None) -> None:
+    """Do this worker's part of a training; it has joined the others.
+
+    Args:
+        run: the folder of the run, which worker 0 makes.
+        config: of a run that begins; None: go on from the newest checkpoint.
+    """
+    if config is not None:
         with prepared(config, thread_count(config), "imitating") as ready:
             SharedStages(ready.parts, run, ready.interruptions, None, {}).run()
+        return
+    saved = read_saved(run)
+    info = saved.info
+    with prepared(saved.config, saved.run_info.threads, info.counters.stage) as ready:
+        saved.load_into(ready.parts)
+        stops, known = ready.interruptions, own_part(info.rows)
+        SharedStages(ready.parts, run, stops, info.counters, known).run()
 
 
 if __name__ == "__main__":

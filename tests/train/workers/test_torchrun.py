@@ -1,0 +1,83 @@
+"""Workers that torchrun has started learn what those learn that `train` has started."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from test_runs import left_by
+
+from innerattn.config import RunConfig, load_run_config, write_toml
+from innerattn.records.run_folder import read_info
+from innerattn.train import train
+
+pytestmark = pytest.mark.timeout(240)
+
+VALUES = {
+    "train.workers": 2,
+    "train.method": "td-inner",
+    "train.num_envs": 12,
+    "train.env_steps": 480,
+    "train.log_every_env_steps": 120,
+    "train.checkpoint_every_env_steps": 120,
+    "td.batch_size": 16,
+    "td.replay_capacity": 300,
+    "td.update_every_env_steps": 5,
+    "td.warmup_env_steps": 100,
+    "network.hidden_width": 16,
+    "evaluate.episodes": 2,
+    "evaluate.score_episodes": 2,
+    "evaluate.long_episodes": 2,
+}
+
+
+def started(folder: Path, *options: str, processes: int = 2) -> subprocess.Popen[str]:
+    """`torchrun` with the command that trains."""
+    torchrun = [sys.executable, "-m", "torch.distributed.run", "--standalone"]
+    command = [*torchrun, f"--nproc-per-node={processes}", "-m", "innerattn", "train", *options]
+    return subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def config(**values: object) -> RunConfig:
+    return load_run_config("mixed", overrides={**VALUES, **values})
+
+
+def test_the_same_bits_as_with_one_command(tmp_path: Path) -> None:
+    write_toml(config(), tmp_path / "config.toml")
+    with started(tmp_path, "--config", "config.toml", "--run-dir", "run") as process:
+        out, error = process.communicate(timeout=120)
+    assert process.returncode == 0, error
+    assert out.count("Run folder: run") == 1  # the first worker alone prints
+    whole = train(config(), tmp_path / "whole")
+    assert left_by(tmp_path / "run") == left_by(whole)
+    summary = json.loads((tmp_path / "run" / "evaluation" / "summary.json").read_text())
+    assert summary
+
+
+def test_a_request_to_end_saves_what_all_have(tmp_path: Path) -> None:
+    long = config(**{"train.env_steps": 10_000_000})
+    write_toml(long, tmp_path / "config.toml")
+    latest = tmp_path / "run" / "checkpoints" / "latest"
+    with started(tmp_path, "--config", "config.toml", "--run-dir", "run") as process:
+        while not latest.exists():
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.05)
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=60)
+    info = read_info(tmp_path / "run")
+    assert info.state == "interrupted"
+    assert int(latest.read_text()) == info.env_steps
+
+
+def test_another_number_than_torchrun_started_is_refused(tmp_path: Path) -> None:
+    write_toml(config(**{"train.workers": 3, "td.batch_size": 15}), tmp_path / "config.toml")
+    with started(tmp_path, "--config", "config.toml", "--run-dir", "run") as process:
+        _, error = process.communicate(timeout=120)
+    assert process.returncode != 0
+    assert "train.workers = 3: must be 2, as many as torchrun started" in error
+    assert not (tmp_path / "run").exists()
