@@ -219,6 +219,10 @@ def test_other_commands_name_what_is_there() -> None:
                     assert given <= set(project["optional-dependencies"]), line
                 case ["python", "-m", "robot", *_]:
                     assert (ROOT / "examples/robot/robot/__main__.py").is_file()
+                case ["torchrun", *rest]:
+                    started = rest[rest.index("-m") + 1 :]
+                    assert started[0] == "innerattn"
+                    _parse(started[1:])  # SystemExit if a word is wrong
                 case ["python" | "pytest", path, *_]:
                     assert (ROOT / path).is_file(), line
                 case ["cargo", "test" | "bench", *_]:

@@ -203,6 +203,7 @@ def test_no_worker_outlives_the_first(
         assert process.returncode == 130
         assert f"go on with: innerattn train --resume {run}" in error
         assert "Traceback" not in error
+        assert "Warning" not in error
         assert read_info(run).state == "interrupted"
     shutil.rmtree(run)
 

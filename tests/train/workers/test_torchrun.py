@@ -11,8 +11,10 @@ import pytest
 from test_runs import left_by
 
 from innerattn.config import RunConfig, load_run_config, write_toml
+from innerattn.errors import ConfigError
 from innerattn.records.run_folder import read_info
 from innerattn.train import train
+from innerattn.train.workers.choose import with_number_of_workers
 
 pytestmark = pytest.mark.timeout(240)
 
@@ -34,10 +36,10 @@ VALUES = {
 }
 
 
-def started(folder: Path, *options: str, processes: int = 2) -> subprocess.Popen[str]:
+def started(folder: Path, *options: str) -> subprocess.Popen[str]:
     """`torchrun` with the command that trains."""
     torchrun = [sys.executable, "-m", "torch.distributed.run", "--standalone"]
-    command = [*torchrun, f"--nproc-per-node={processes}", "-m", "innerattn", "train", *options]
+    command = [*torchrun, "--nproc-per-node=2", "-m", "innerattn", "train", *options]
     return subprocess.Popen(
         command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -59,6 +61,7 @@ def test_the_same_bits_as_with_one_command(tmp_path: Path) -> None:
     assert summary
 
 
+@pytest.mark.slow
 def test_a_request_to_end_saves_what_all_have(tmp_path: Path) -> None:
     long = config(**{"train.env_steps": 10_000_000})
     write_toml(long, tmp_path / "config.toml")
@@ -74,10 +77,20 @@ def test_a_request_to_end_saves_what_all_have(tmp_path: Path) -> None:
     assert int(latest.read_text()) == info.env_steps
 
 
-def test_another_number_than_torchrun_started_is_refused(tmp_path: Path) -> None:
-    write_toml(config(**{"train.workers": 3, "td.batch_size": 15}), tmp_path / "config.toml")
-    with started(tmp_path, "--config", "config.toml", "--run-dir", "run") as process:
-        _, error = process.communicate(timeout=120)
-    assert process.returncode != 0
-    assert "train.workers = 3: must be 2, as many as torchrun started" in error
+def test_another_number_than_torchrun_started_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in {"TORCHELASTIC_RUN_ID": "a", "WORLD_SIZE": "2", "RANK": "0"}.items():
+        monkeypatch.setenv(name, value)
+    wrong = config(**{"train.workers": 3, "td.batch_size": 15})
+    with pytest.raises(ConfigError) as found:
+        train(wrong, tmp_path / "run")
+    assert str(found.value) == "train.workers = 3: must be 2, as many as torchrun started"
     assert not (tmp_path / "run").exists()
+
+
+def test_what_torchrun_started_is_as_many_as_pay(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in {"TORCHELASTIC_RUN_ID": "a", "WORLD_SIZE": "4", "RANK": "1"}.items():
+        monkeypatch.setenv(name, value)
+    chosen = with_number_of_workers(config(**{"train.workers": "auto"}))
+    assert chosen.train.workers == 4

@@ -21,7 +21,7 @@ from innerattn.learn import workers
 from innerattn.train.workers.exchange import Exchange, WorkerEndedError, memory_bytes
 from innerattn.train.workers.torchrun import joined_of_torchrun, started_by_torchrun
 
-MODULE = "innerattn.train.workers.worker"
+MODULE = "innerattn.train.workers"
 _MOST_PER_CORE = 4
 _PATIENCE_S = 10.0
 """How long a worker may take to end by itself."""

@@ -1,4 +1,4 @@
-"""The process of every worker of a training but the first: ``python -m`` with a job on its input.
+"""The process of every worker of a training but the first, which gets a job on its input.
 
 It does its share and writes nothing but rows of its memories. It stops when the first worker says
 so, or is gone.
@@ -134,7 +134,3 @@ def take_part(run: Path, config: RunConfig | None) -> None:
         saved.load_into(ready.parts)
         stops, known = ready.interruptions, own_part(info.rows)
         SharedStages(ready.parts, run, stops, info.counters, known).run()
-
-
-if __name__ == "__main__":
-    sys.exit(main())
