@@ -75,8 +75,9 @@ def joined_of_torchrun(count: int | Literal["auto"], run: Path) -> Iterator[Path
     found = started_by_torchrun()
     if found != count:
         raise ConfigError(f"train.workers = {count}: must be {found}, as many as torchrun started")
+    others = OfTorchrun()
     try:
-        with workers.joined(OfTorchrun()):
+        with workers.joined(others):
             yield Path(os.fsdecode(bytes_of_all(os.fsencode(run.absolute()))[0]))
     finally:
         dist.destroy_process_group()
