@@ -85,15 +85,20 @@ class Replay:
     @property
     def reward_mean(self) -> Tensor:
         """(R,) float64, mean reward of each robot over all that workers hold; 0 when empty."""
-        return workers.mean(self._sum) @ self._weights.double() / max(len(self), 1)
+        return self.reward_moments()[0]
 
     @property
     def reward_std(self) -> Tensor:
         """(R,) float64, its population standard deviation; 0 when empty."""
-        weights = self._weights.double()
-        products = workers.mean(self._sum_of_products)
-        mean_of_squares = products @ weights @ weights / max(len(self), 1)
-        return (mean_of_squares - self.reward_mean.square()).clamp_min(0.0).sqrt()
+        return self.reward_moments()[1]
+
+    def reward_moments(self) -> tuple[Tensor, Tensor]:
+        """`reward_mean` and `reward_std`, in one exchange of all workers."""
+        _, (total, products) = workers.averaged([], [self._sum, self._sum_of_products])
+        weights, held = self._weights.double(), max(len(self), 1)
+        mean = total @ weights / held
+        mean_of_squares = products @ weights @ weights / held
+        return mean, (mean_of_squares - mean.square()).clamp_min(0.0).sqrt()
 
     def add(self, batch: Transitions) -> None:
         """Take in transitions, oldest first; of more than `capacity` only the last are kept.

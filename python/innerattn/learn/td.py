@@ -173,9 +173,10 @@ class TD(ActorCritic):
         """
         floor = self._config.reward_std_floor
         reward = batch.reward.to(self._device)
+        mean, std = self.replay.reward_moments()
         if not self._team.terminates:  # else a policy would be paid for the length of its episodes
-            reward = reward - self.replay.reward_mean
-        reward = reward / self.replay.reward_std.clamp_min(floor)
+            reward = reward - mean
+        reward = reward / std.clamp_min(floor)
         continues = ~batch.terminated.to(self._device)
         shape = (self._team.num_robots, self._team.num_actions, len(batch.obs))
         return self._update(

@@ -123,7 +123,7 @@ def averaged(
 
     Args:
         gradients: Of some networks, by name.
-        numbers: () each.
+        numbers: Of any shapes.
 
     Returns:
         The same, averaged; what was given where there is one worker.
@@ -133,12 +133,12 @@ def averaged(
     parts = [part for one in gradients for part in one.values()]
     packed = torch.cat([part.reshape(-1) for part in (*parts, *numbers)])
     found = torch.ops.innerattn.mean_over_workers(packed)
-    sizes = [part.numel() for part in parts] + [1] * len(numbers)
+    sizes = [part.numel() for part in (*parts, *numbers)]
     means = iter(found.split_with_sizes(sizes))
     averages = [
         {name: next(means).view(part.shape) for name, part in one.items()} for one in gradients
     ]
-    return averages, [next(means).view(()) for _ in numbers]
+    return averages, [next(means).view(number.shape) for number in numbers]
 
 
 @torch.library.custom_op("innerattn::mean_over_workers", mutates_args=())
