@@ -255,12 +255,9 @@ class ActorCritic:
     def _kept_for_undoing(self) -> Undo:
         """What undoes an update: it remembers all networks and moments as they are now."""
         if self._undo is None:
-            parameters = [p for module in self._modules().values() for p in module.parameters()]
-            adams = (self._actor_adam, self._critic_adam)
-            moments = [
-                one for adam in adams for parts in adam.moments.values() for one in parts.values()
-            ]
-            self._undo = Undo([*parameters, *moments])
+            plain = self._plain_networks or self._networks
+            networks = [getattr(plain, field.name) for field in fields(plain)]
+            self._undo = Undo([tensor for network in networks for tensor in network.memory()])
         self._undo.keep()
         return self._undo
 

@@ -6,7 +6,7 @@ These are the plain forms. `innerattn.learn.compiled` has the forms of a compile
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -23,13 +23,30 @@ class Network:
 
     Attributes:
         module: The network.
-        values: Its parameters by name: the same memory, unknown to autograd.
+        shapes: Of its parameters, by name.
+        flat: (P,) its parameters in one piece of memory, in their order.
+        values: Its parameters by name: views of `flat`, unknown to autograd.
     """
 
     def __init__(self, module: nn.Module) -> None:
-        """Take over a network that exists."""
+        """Take over a network that exists: its parameters become views of one tensor."""
         self.module = module
-        self.values = {name: value.detach() for name, value in module.named_parameters()}
+        parameters = dict(module.named_parameters())
+        self.shapes = {name: value.shape for name, value in parameters.items()}
+        self.flat = torch.cat([value.detach().reshape(-1) for value in parameters.values()])
+        self.values = self.by_name(self.flat)
+        for name, parameter in parameters.items():
+            parameter.data = self.values[name]
+
+    def by_name(self, flat: Tensor) -> dict[str, Tensor]:
+        """Views of numbers (P,), one for each parameter, by name and in its shape."""
+        parts = flat.split_with_sizes([shape.numel() for shape in self.shapes.values()])
+        pairs = zip(self.shapes.items(), parts, strict=True)
+        return {name: part.view(shape) for (name, shape), part in pairs}
+
+    def memory(self) -> list[Tensor]:
+        """Everything that updates change, in few tensors."""
+        return [self.flat]
 
     def __call__(self, *inputs: Tensor | None) -> Any:
         """The forward pass."""
@@ -39,7 +56,7 @@ class Network:
 class Stepper(Protocol):
     """A network that an update trains."""
 
-    values: dict[str, Tensor]
+    flat: Tensor
 
     def __call__(self, *inputs: Tensor | None) -> Any:
         """The forward pass."""
@@ -65,12 +82,28 @@ class Stepper(Protocol):
         """
 
 
+class Run(NamedTuple):
+    """Trained parameters that lie side by side in memory.
+
+    Attributes:
+        names: Of the parameters, in their order.
+        part: Which part of the network's numbers they are.
+        step: () Adam's count of steps.
+    """
+
+    names: list[str]
+    part: slice
+    step: Tensor
+
+
 class AdamStepper(Network):
-    """A network and its Adam (Kingma & Ba 2015), operation by operation.
+    """A network and its Adam (Kingma & Ba 2015), run by run.
 
     Attributes:
         trained: The parameters that are trained, by name.
-        moments: Adam's tensors by name of the parameter, then by Adam's own names.
+        runs: The same, as they lie in memory; a network has few runs.
+        mean: (P,) Adam's running mean of the gradient; 0 where nothing is trained.
+        square: (P,) that of its square.
         weight_decay: Weight of the L2 penalty.
     """
 
@@ -83,30 +116,71 @@ class AdamStepper(Network):
             for name, parameter in module.named_parameters()
             if parameter.requires_grad
         }
-        self._adam = torch.optim.Adam(module.parameters(), weight_decay=weight_decay, fused=True)
-        for parameter in module.parameters():
-            self._adam.state[parameter] = {
-                "step": torch.zeros((), dtype=torch.float32, device=parameter.device),
-                "exp_avg": torch.zeros_like(parameter),
-                "exp_avg_sq": torch.zeros_like(parameter),
+        self.mean, self.square = torch.zeros_like(self.flat), torch.zeros_like(self.flat)
+        self.runs = self._found_runs()
+        self._parts = [nn.Parameter(self.flat[run.part]) for run in self.runs]
+        self._adam = torch.optim.Adam(self._parts, weight_decay=weight_decay, fused=True)
+        for run, part in zip(self.runs, self._parts, strict=True):
+            self._adam.state[part] = {
+                "step": run.step,
+                "exp_avg": self.mean[run.part],
+                "exp_avg_sq": self.square[run.part],
             }
-        self.moments: dict[str, dict[str, Tensor]] = {
-            name: self._adam.state[parameter] for name, parameter in module.named_parameters()
+
+    def _found_runs(self) -> list[Run]:
+        runs: list[Run] = []
+        first = 0
+        for name, value in self.values.items():
+            last = first + value.numel()
+            if name in self.trained:
+                if runs and runs[-1].part.stop == first:
+                    names, part, step = runs.pop()
+                    runs.append(Run([*names, name], slice(part.start, last), step))
+                else:
+                    step = torch.zeros((), dtype=torch.float32, device=self.flat.device)
+                    runs.append(Run([name], slice(first, last), step))
+            first = last
+        return runs
+
+    @property
+    def moments(self) -> dict[str, dict[str, Tensor]]:
+        """Adam's live tensors by name of the parameter, then by Adam's own names.
+
+        Parameters of a run share their count of steps.
+        """
+        steps = {name: run.step for run in self.runs for name in run.names}
+        means, squares = self.by_name(self.mean), self.by_name(self.square)
+        return {
+            name: {
+                "step": steps.get(name, torch.zeros(())),
+                "exp_avg": means[name],
+                "exp_avg_sq": squares[name],
+            }
+            for name in self.values
         }
+
+    def memory(self) -> list[Tensor]:
+        """Everything that updates change, in few tensors."""
+        return [self.flat, self.mean, self.square, *(run.step for run in self.runs)]
 
     def gradients(self, loss_of: Callable[[Forward], tuple[Tensor, Aux]]) -> tuple[Gradients, Aux]:
         """Gradients of a loss; see `Stepper.gradients`."""
         with torch.enable_grad():
             loss, aux = loss_of(self.module)
         found = torch.autograd.grad(loss, tuple(self.trained.values()), materialize_grads=True)
-        # The fused Adam takes every gradient for contiguous.
-        pairs = zip(self.trained, found, strict=True)
-        return {name: gradient.contiguous() for name, gradient in pairs}, aux
+        return dict(zip(self.trained, found, strict=True)), aux
 
     def step(self, gradients: Gradients, learning_rate: Tensor) -> None:
-        """Do one step of Adam; see `Stepper.step`."""
+        """Do one step of Adam; see `Stepper.step`. Each parameter keeps its gradient as `grad`."""
         for name, parameter in self.trained.items():
             parameter.grad = gradients[name]
+        for run, part in zip(self.runs, self._parts, strict=True):
+            part.grad = joined(gradients, run)
         for group in self._adam.param_groups:
             group["lr"] = float(learning_rate)
         self._adam.step()
+
+
+def joined(gradients: Gradients, run: Run) -> Tensor:
+    """(n,) the gradients of a run in one piece."""
+    return torch.cat([gradients[name].reshape(-1) for name in run.names])

@@ -107,7 +107,9 @@ class AfterstateCritic:
 
     def resume_state(self) -> dict[str, Tensor]:
         """The fit, and what it goes on with; see `Resumable`."""
-        return {"draws": self._draws.get_state(), **self._tensors()}
+        # Copies: parameters share counts of steps, which a file cannot hold twice.
+        held = {name: tensor.clone() for name, tensor in self._tensors().items()}
+        return {"draws": self._draws.get_state(), **held}
 
     @torch.no_grad()
     def load_resume_state(self, state: State) -> None:

@@ -22,7 +22,7 @@ import torch
 from torch import Tensor, nn
 from torch.func import functional_call, grad
 
-from innerattn.learn.adam import AdamStepper, Aux, Forward, Gradients, Network
+from innerattn.learn.adam import AdamStepper, Aux, Forward, Gradients, Network, joined
 from innerattn.nn.attention import (
     Attended,
     InnerAttention,
@@ -55,46 +55,46 @@ def first_line(error: BaseException) -> str:
 
 
 class TracedNetwork(Network):
-    """A network whose parameters are inputs of the graph."""
+    """A network whose numbers are one input of the graph."""
 
     def __init__(self, plain: Network) -> None:
-        """Use the values of the plain form, as the same memory."""
+        """Use the numbers of the plain form, as the same memory."""
         self.module = _with_fused_attention(plain.module)
-        self.values = plain.values
+        self.shapes, self.flat, self.values = plain.shapes, plain.flat, plain.values
 
     def __call__(self, *inputs: Tensor | None) -> Any:
         """The forward pass."""
-        return functional_call(self.module, self.values, inputs)
+        return functional_call(self.module, self.by_name(self.flat), inputs)
 
 
 class TracedStepper(TracedNetwork):
     """A network and its Adam, written out; its contract is `innerattn.learn.adam.Stepper`."""
 
     def __init__(self, plain: AdamStepper) -> None:
-        """Use values and moments of the plain form, as the same memory."""
+        """Use numbers and moments of the plain form, as the same memory."""
         super().__init__(plain)
-        self._trained = tuple(plain.trained)
-        self._moments = plain.moments
+        self._runs, self._mean, self._square = plain.runs, plain.mean, plain.square
         self._weight_decay = plain.weight_decay
 
     def gradients(self, loss_of: Callable[[Forward], tuple[Tensor, Aux]]) -> tuple[Gradients, Aux]:
         """Gradients of a loss; see `Stepper.gradients`."""
+        values = self.by_name(self.flat)
+        trained = {name: values[name] for run in self._runs for name in run.names}
 
-        def loss_at(values: dict[str, Tensor]) -> tuple[Tensor, Aux]:
-            return loss_of(lambda *inputs: functional_call(self.module, values, inputs))
+        def loss_at(trained: dict[str, Tensor]) -> tuple[Tensor, Aux]:
+            return loss_of(lambda *inputs: functional_call(self.module, values | trained, inputs))
 
-        values = {name: self.values[name] for name in self._trained}
-        found: tuple[Gradients, Aux] = grad(loss_at, has_aux=True)(values)
+        found: tuple[Gradients, Aux] = grad(loss_at, has_aux=True)(trained)
         return found
 
     def step(self, gradients: Gradients, learning_rate: Tensor) -> None:
         """Do one step of Adam; see `Stepper.step`."""
-        for name in self._trained:
-            value, moments = self.values[name], self._moments[name]
-            gradient = gradients[name] + self._weight_decay * value
-            step = moments["step"].add_(1.0)
-            mean = moments["exp_avg"].lerp_(gradient, 1.0 - _BETA_1)
-            square = moments["exp_avg_sq"].lerp_(gradient.square(), 1.0 - _BETA_2)
+        for run in self._runs:
+            value = self.flat[run.part]
+            gradient = joined(gradients, run) + self._weight_decay * value
+            step = run.step.add_(1.0)
+            mean = self._mean[run.part].lerp_(gradient, 1.0 - _BETA_1)
+            square = self._square[run.part].lerp_(gradient.square(), 1.0 - _BETA_2)
             # The corrections for the start: few numbers, so float64 costs nothing.
             mean_share = (1.0 - _BETA_1 ** step.double()).to(value.dtype)
             square_share = (1.0 - _BETA_2 ** step.double()).sqrt().to(value.dtype)

@@ -32,7 +32,7 @@ class Steps(NamedTuple):
     """T control steps of E worlds; rows go through the worlds of a step, step after step.
 
     Attributes:
-        obs: (R, T * E, D).
+        obs: (R, T * E, D), in memory (T * E, R, D).
         actions: (R, T * E) int64, or (R, T * E, W) float32.
         log_probs: (R, A, T * E) of all actions when these were drawn; None if they are not known.
         reward: (T, R, E).
@@ -94,7 +94,7 @@ class RolloutBuffer:
         if len(batch.obs) != self._envs:
             self._reserve(len(batch.obs))
         step = self._filled
-        self._obs[:, step].copy_(batch.obs.transpose(0, 1))
+        self._obs[step].copy_(batch.obs)
         self._actions[:, step].copy_(batch.actions.transpose(0, 1))
         self._reward[step].copy_(batch.reward.t())
         self._terminated[step].copy_(batch.terminated)
@@ -116,7 +116,7 @@ class RolloutBuffer:
         cut = self._ended.clone()
         cut[-1] = True
         return Steps(
-            obs=self._obs.flatten(1, 2),
+            obs=self._obs.flatten(0, 1).transpose(0, 1),
             actions=self._actions.flatten(1, 2),
             log_probs=self._log_probs.flatten(2) if self._all_known else None,
             reward=self._reward,
@@ -136,7 +136,7 @@ class RolloutBuffer:
             return {}
         held = self._filled
         state = {
-            "obs": self._obs[:, :held],
+            "obs": self._obs[:held].permute(2, 0, 1, 3),
             "actions": self._actions[:, :held],
             "reward": self._reward[:held],
             "terminated": self._terminated[:held].to(torch.uint8),
@@ -160,7 +160,7 @@ class RolloutBuffer:
                 f"'obs' has {held} steps of {envs} worlds: must be 1 to {self._num_steps}"
             )
         self._reserve(envs)
-        self._obs[:, :held] = found
+        self._obs[:held] = found.permute(1, 2, 0, 3)
         self._actions[:, :held] = _take_actions(state, self._team, held, envs)
         self._reward[:held] = take(state, "reward", torch.float32, held, robots, envs)
         flags = {
@@ -195,7 +195,9 @@ class RolloutBuffer:
         robots, steps = self._team.num_robots, self._num_steps
         self._envs = envs
         like = torch.empty((), dtype=self._dtype, device=self._device)
-        self._obs = like.new_empty(robots, steps, envs, self._team.obs_width)
+        # Worlds before robots, as the worlds give them: a minibatch then copies a row in one piece,
+        # and a critic takes the robots' observations side by side without a copy.
+        self._obs = like.new_empty(steps, envs, robots, self._team.obs_width)
         self._log_probs = like.new_empty(robots, self._team.num_actions, steps, envs)
         kind = self._team.actions
         self._actions = like.new_empty(robots, steps, envs, *kind.shape, dtype=kind.dtype)
@@ -209,7 +211,7 @@ class Rollout(NamedTuple):
     """Rows of a rollout, robots first.
 
     Attributes:
-        obs: (R, B, D).
+        obs: (R, B, D), in memory (B, R, D).
         actions: (R, B) int64, or (R, B, W) float32.
         log_prob: (R, B) of the actions, under the policy that acted.
         advantage: (R, B).
@@ -223,8 +225,10 @@ class Rollout(NamedTuple):
     target: Tensor
 
     def take(self, rows: Tensor) -> Rollout:
-        """Some rows, by their indices (n,) int64."""
-        return Rollout._make(tensor.index_select(1, rows) for tensor in self)
+        """Some rows, by their indices (n,) int64; observations keep their order in memory."""
+        obs, *others = self
+        taken = obs.transpose(0, 1).index_select(0, rows).transpose(0, 1)
+        return Rollout(taken, *(tensor.index_select(1, rows) for tensor in others))
 
     @classmethod
     def taken_from(cls, state: State, team: Team, like: Tensor) -> Rollout:
@@ -241,7 +245,7 @@ class Rollout(NamedTuple):
         robots, width = team[:2]
         obs = take(state, "obs", like.dtype, robots, None, width)
         shape = (robots, obs.shape[1])
-        found: dict[str, Any] = {"obs": obs}
+        found: dict[str, Any] = {"obs": obs.transpose(0, 1).contiguous().transpose(0, 1)}
         found["actions"] = _take_actions(state, team, shape[1])
         for name in ("log_prob", "advantage", "target"):
             found[name] = take(state, name, like.dtype, *shape)

@@ -141,8 +141,7 @@ class TD(ActorCritic):
         The critic's targets are then those of the policies that imitate.
         """
         loss = super().imitate(obs, actions, learning_rate)
-        slow, fast = self._networks.target_actor.values, self._networks.actor.values
-        torch._foreach_copy_(list(slow.values()), list(fast.values()))
+        self._networks.target_actor.flat.copy_(self._networks.actor.flat)
         return loss
 
     def learn(self) -> dict[str, float] | None:
@@ -233,9 +232,7 @@ class TD(ActorCritic):
         critic_metrics = self._update_critic(nets, obs, actions, target, rate)
         actor_metrics = self._update_actor(nets, obs, noise, temperature, rate)
         for slow, fast in ((nets.target_actor, nets.actor), (nets.target_critic, nets.critic)):
-            torch._foreach_lerp_(
-                list(slow.values.values()), list(fast.values.values()), self._config.polyak
-            )
+            slow.flat.lerp_(fast.flat, self._config.polyak)
         return torch.stack([*critic_metrics, *actor_metrics])
 
     def _targets(
