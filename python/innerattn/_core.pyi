@@ -6,7 +6,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["FAULT_KINDS", "REWARD_COMPONENTS", "Batch", "Rules", "__version__"]
+__all__ = ["FAULT_KINDS", "REWARD_COMPONENTS", "Batch", "Instance", "Rules", "__version__"]
 
 __version__: str
 
@@ -38,6 +38,51 @@ class Rules:
     def __copy__(self) -> Rules: ...
     def __deepcopy__(self, memo: object) -> Rules: ...
     def __getnewargs__(self) -> tuple[str]: ...
+
+@final
+class Instance:
+    """A valid instance of task allocation, ready to be planned for. It never changes.
+
+    R robots and T tasks. A robot is (depot, skills), a task (position, skills, duration); skills
+    are numbers from 0 to 31. A schedule is a list of R lists of tasks, in the order in which the
+    robot goes to them. Times have the units of durations. All methods let other threads go on.
+
+    Raises:
+        ValueError: (of `Instance(...)`) one line that names the robot or task, the value and what
+            is allowed.
+    """
+
+    def __new__(
+        cls,
+        speed: float,
+        robots: Sequence[tuple[Sequence[float], Sequence[int]]],
+        tasks: Sequence[tuple[Sequence[float], Sequence[int], float]],
+    ) -> Instance: ...
+    def plan(
+        self, seed: int, evaluations: int | None, seconds: float | None
+    ) -> tuple[list[list[int]], int]:
+        """The best schedule of a search, and how many orders of tasks it tried.
+
+        It ends at the first limit. With `evaluations` alone it gives the same bits on every
+        machine.
+
+        Raises:
+            ValueError: there is no limit, or `seconds` is not 0 to 1e6.
+        """
+
+    def greedy(self) -> list[list[int]]:
+        """The schedule in which always the task that can begin soonest comes next."""
+
+    def random(self, seed: int) -> list[list[int]]:
+        """Tasks in a random order, each with random robots."""
+
+    def simulate(self, schedule: Sequence[Sequence[int]]) -> tuple[list[float], list[float], float]:
+        """When each task begins (T), when each robot is back (R), and the makespan.
+
+        Raises:
+            ValueError: a task does not get exactly the robots that it needs, or robots wait for
+                each other for ever (deadlock).
+        """
 
 @final
 class Batch:

@@ -65,6 +65,10 @@ class ConfigError(InnerattnError, ValueError):
     """A configuration, preset or scenario is not valid; the message names the key."""
 
 
+class ScheduleError(InnerattnError, ValueError):
+    """A schedule does not serve the tasks of its instance, or its robots wait for ever."""
+
+
 class RunError(InnerattnError):
     """A run folder is missing, foreign, damaged, or already there."""
 

@@ -161,7 +161,7 @@ def test_underscores_are_taken_too() -> None:
 
 
 def test_option_names() -> None:
-    assert option_names(Info) == ["--debug", "--help-all", "--scenario", "--schema"]
+    assert option_names(Info) == ["--debug", "--help-all", "--scenario", "--instance", "--schema"]
     names = option_names(command_type([]))
     wanted = {"--seed", "--train.seed", "--scenario", "--scenario.observe-faults", "--td.gamma"}
     assert wanted | {"--scenario.no-observe-faults", "--quiet"} <= set(names)

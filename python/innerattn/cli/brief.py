@@ -70,11 +70,13 @@ BRIEF: Mapping[str, Brief] = {
             ("--score-episodes N", "episodes that rescues are averaged over (1000)"),
             ("--episodes N", "episodes that cooperation is counted in (80)"),
             ("--episode-steps N", "length of an episode (that of the run)"),
-            ("--seed N", "seed of the worlds (12345)"),
+            ("--seed N", "seed of the worlds (12345), or of the planner (0)"),
+            ("--instances FILE", "measure planner, greedy or random on these (also ral)"),
+            ("--time-limit-ms N", "how long planner searches for an instance (1000)"),
             _JSON,
             _QUIET,
         ),
-        ("latest", "zoo:double", "hungarian --situation double", "runs/mine --json - > mine.json"),
+        ("latest", "zoo:double", "planner --instances ral", "runs/mine --json - > mine.json"),
     ),
     "study": Brief(
         "[OPTIONS] run|work|status|report|retry|slurm STUDY",
@@ -149,9 +151,10 @@ BRIEF: Mapping[str, Brief] = {
         "[OPTIONS]",
         (
             ("--scenario FILE", "check a scenario, print it with all defaults, draw it"),
+            ("--instance FILE:NAME", "describe an instance (also ral:ral_03) and plan for it"),
             ("--schema NAME", "print the JSON Schema of a file: scenario, run or study"),
         ),
-        ("", "--scenario flood.toml"),
+        ("", "--scenario flood.toml", "--instance ral:ral_03"),
     ),
     "replay": Brief(
         "[OPTIONS] RUN|POLICY|FILE ...",

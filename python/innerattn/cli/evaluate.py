@@ -1,35 +1,58 @@
-"""`innerattn evaluate`: measures a trained or scripted policy; shows or writes the results."""
+"""`innerattn evaluate`: measures a policy or a planner; shows or writes the results."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from innerattn.cli.options import LongCommand, UsageError, check_target, option_values
-from innerattn.cli.progress import Evaluating
+from innerattn.cli.options import (
+    LongCommand,
+    UsageError,
+    check_seed,
+    check_target,
+    option_values,
+)
+from innerattn.cli.progress import Evaluating, Planning
 from innerattn.cli.runs import named_policy
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
+from innerattn.config.instances import read_instances
+from innerattn.config.near import did_you_mean
 from innerattn.errors import ConfigError
 from innerattn.policies import SCRIPTED
+from innerattn.policies.scripted.planner import PLANNERS
+from innerattn.report.table import print_table
 from innerattn.report.tables.evaluation import print_summary, result_line
+from innerattn.report.tables.instances import results_line, results_table
 from innerattn.zoo import in_zoo
 
 if TYPE_CHECKING:
     from innerattn.evaluate import Evaluation
 
+_OF_WORLDS = (
+    "scenario",
+    "situation",
+    "episode_steps",
+    "episodes",
+    "score_episodes",
+    "long_episodes",
+    "long_episode_steps",
+)
+"""Options that have no meaning for instances."""
+_MOST_MS = 86_400_000
+
 
 @dataclass(kw_only=True)
 class Evaluate(LongCommand):
-    """Measure a trained or scripted policy."""
+    """Measure a trained or scripted policy, or a planner on instances."""
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
     """A run, or one of random, greedy, hungarian. A run is a folder, latest, or the beginning of
-    the name of one in runs."""
+    the name of one in runs. With --instances: planner, greedy or random."""
     scenario: Path | None = None
     """TOML file with the scenario to measure in; None: that of the run, or mixed."""
     situation: Literal["single", "double", "mixed"] | None = None
@@ -46,7 +69,13 @@ class Evaluate(LongCommand):
     long_episode_steps: int | None = None
     """The second length [control steps]; None: as the run says, or 100."""
     seed: int | None = None
-    """Seed of the worlds; None: as the run says, or 12345."""
+    """Seed of the worlds; None: as the run says, or 12345. With --instances, of the planner; None:
+    0."""
+    instances: str | None = None
+    """Measure a planner on these instances instead: a JSON file, or ral, which comes with the
+    package."""
+    time_limit_ms: int | None = None
+    """How long planner searches for each instance [ms]; None: 1000."""
     json: Path | None = None
     """Write the results to this file too; - for standard output, and nothing else there."""
 
@@ -62,20 +91,54 @@ class Evaluate(LongCommand):
         """
         if self.json is not None:
             check_target(self.json)
+        if self.instances is not None:
+            return self._on_instances(self.instances)
+        if self.policy == "planner" or self.time_limit_ms is not None:
+            given = "planner" if self.policy == "planner" else "--time-limit-ms"
+            raise UsageError(f"{given}: needs --instances")
         evaluation = self._measure()
-        document = json.dumps(evaluation.summary.to_json(), indent=1, allow_nan=False)
-        if self.json == Path("-"):
-            print(document)
+        if self._wrote(evaluation.summary.to_json()):
             return 0
         print_summary(
             self.console(),
             evaluation.summary,
             evaluation.records[0].scenario,
         )
-        if self.json is not None:
-            write_whole(self.json, f"{document}\n".encode())
         shown = self.policy if in_zoo(self.policy) else named_policy(self.policy, SCRIPTED)
         self.say_result(f"{shown}: {result_line(evaluation.summary)}")
+        return 0
+
+    def _wrote(self, document: dict[str, Any]) -> bool:
+        """Write the results where they shall go. Whether that was standard output."""
+        text = json.dumps(document, indent=1, allow_nan=False)
+        if self.json == Path("-"):
+            print(text)
+            return True
+        if self.json is not None:
+            write_whole(self.json, f"{text}\n".encode())
+        return False
+
+    def _on_instances(self, source: str) -> int:
+        """Measure a planner."""
+        from innerattn.evaluate.instances import solve_instances
+
+        if self.policy not in PLANNERS:
+            near = did_you_mean(self.policy, PLANNERS)
+            known = ", ".join(PLANNERS)
+            raise UsageError(f"{self.policy}: with --instances must be one of {known}{near}")
+        for name in self._given(*_OF_WORLDS):
+            raise UsageError(f"--{name.replace('_', '-')}: has no meaning with --instances")
+        limit_ms = 1000 if self.time_limit_ms is None else self.time_limit_ms
+        if not 1 <= limit_ms <= _MOST_MS:
+            raise UsageError(f"--time-limit-ms {limit_ms}: must be 1 to {_MOST_MS}")
+        check_seed(self.seed)
+        instances = read_instances(source)
+        with Planning(self.progress_console()) as progress:
+            found = solve_instances(self.policy, instances, limit_ms, self.seed or 0, progress)
+        if self._wrote(found.to_json()):
+            return 0
+        print_table(self.console(), results_table(found))
+        self.say_result(f"{self.policy}: {results_line(found)}")
         return 0
 
     def _measure(self) -> Evaluation:

@@ -1,4 +1,4 @@
-"""`innerattn info`: what is installed, and whether a scenario file is valid."""
+"""`innerattn info`: what is installed, and whether the file of a scenario or instances is valid."""
 
 from __future__ import annotations
 
@@ -21,10 +21,13 @@ _PACKAGES = ("torch", "numpy", "pydantic", "gymnasium", "pettingzoo")
 
 @dataclass(kw_only=True)
 class Info(Command):
-    """Show versions, threads, device and presets, or check a scenario file."""
+    """Show versions, threads, device and presets, or check a file."""
 
     scenario: Path | None = None
     """TOML file with a scenario: check it, print it with all defaults, and draw its arena."""
+    instance: str | None = None
+    """JSON file with instances of task allocation, or ral, and a name, as in ral:ral_03: check the
+    file, describe the instance (without a name the first), and plan for it for a second."""
     schema: Literal["scenario", "run", "study"] | None = None
     """Print the JSON Schema of the file of a scenario, a run or a study, for editors."""
 
@@ -35,8 +38,16 @@ class Info(Command):
             The exit code, 0.
 
         Raises:
-            ConfigError: the scenario file is not valid.
+            ConfigError: the file of a scenario or of instances is not valid.
         """
+        if self.instance is not None:
+            from innerattn.config.instances import named_instance
+            from innerattn.policies.scripted.planner import plan
+            from innerattn.report.tables.instances import instance_words
+
+            instance = named_instance(self.instance)
+            print(instance_words(instance, plan(instance)))
+            return 0
         if self.schema == "study":
             from innerattn.studies.schema import study_schema_text
 

@@ -177,6 +177,16 @@ class Evaluating(Work):
         self.show(done, total, f"{done:,} of {total:,} episodes")
 
 
+class Planning(Work):
+    """Shows planning; call it with the instances done and the instances to do."""
+
+    title = "planning"
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show how far planning is."""
+        self.show(done, total, f"{done:,} of {total:,} instances")
+
+
 class MeasuringRobustness(Work):
     """Shows `innerattn.evaluate.robustness.measure_robustness`; call it as that calls back."""
 

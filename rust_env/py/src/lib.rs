@@ -1,9 +1,10 @@
-//! `innerattn._core`: batches of rescue worlds over numpy arrays. Checks every argument at the door,
-//! releases the GIL while worlds step, and knows no rule of the worlds itself.
+//! `innerattn._core`: batches of rescue worlds over numpy arrays, and the planner. Checks every argument at
+//! the door, releases the GIL while worlds step and plans are made, and knows no rule of the worlds itself.
 
 mod arrays;
 mod batch;
 mod door;
+mod instance;
 mod rules;
 
 /// rapier makes and frees hundreds of small things a period, which this does faster than the system.
@@ -56,5 +57,6 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("FAULT_KINDS", fault_kinds(module.py())?)?;
     module.add("REWARD_COMPONENTS", reward_components(module.py())?)?;
     module.add_class::<rules::Rules>()?;
+    module.add_class::<instance::Instance>()?;
     module.add_class::<batch::Batch>()
 }

@@ -1,0 +1,77 @@
+"""Reads JSON files of instances: a list of objects with the keys of `Instance`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from innerattn.config.instances.instance import NAME, Instance
+from innerattn.config.model import config_error
+from innerattn.config.near import did_you_mean
+from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json, read_plain
+from innerattn.errors import ConfigError, RunError
+
+SHIPPED: Mapping[str, str] = {"ral": "ral_00_29.json"}
+"""Sets of instances that come with the package, and their files."""
+
+
+def read_instances(source: str | Path) -> tuple[Instance, ...]:
+    """The instances in a JSON file, or in a set of `SHIPPED`.
+
+    Raises:
+        ConfigError: there is no such file, or it is not such a list; the message names the file,
+            the instance, and the robot or task.
+    """
+    if str(source) not in SHIPPED:
+        return _read(Path(source), str(source))
+    with as_file(files(__package__) / SHIPPED[str(source)]) as path:
+        return _read(path, str(source))
+
+
+def named_instance(written: str) -> Instance:
+    """The instance that `FILE:NAME` means, or `FILE` alone: the first of the file.
+
+    Raises:
+        ConfigError: as of `read_instances`, or there is none of this name.
+    """
+    source, _, name = written.rpartition(":")
+    if not source or Path(written).exists():
+        return read_instances(written)[0]
+    instances = {instance.name: instance for instance in read_instances(source)}
+    if name not in instances:
+        near = did_you_mean(name, instances, repr)
+        raise ConfigError(f"{source}: no instance is named {name!r}{near}")
+    return instances[name]
+
+
+def _read(path: Path, shown: str) -> tuple[Instance, ...]:
+    try:
+        entries = parse_json(read_plain(path, MOST_JSON_BYTES, follow_link=True))
+    except RunError as error:
+        raise ConfigError(f"{error}{did_you_mean(shown, SHIPPED, repr)}") from error
+    except OSError as error:
+        raise ConfigError(f"cannot read {shown}: {error.strerror}") from error
+    except ValueError as error:
+        raise ConfigError(f"{shown}: is not a JSON file: {error}") from error
+    if not isinstance(entries, list) or not entries:
+        raise ConfigError(f"{shown}: must be a list of one instance or more")
+    instances = [_instance(entry, index, shown) for index, entry in enumerate(entries)]
+    names = [instance.name for instance in instances]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise ConfigError(f"{shown}: the name {twice!r} comes twice")
+    return tuple(instances)
+
+
+def _instance(entry: Any, index: int, shown: str) -> Instance:
+    name = entry.get("name") if isinstance(entry, dict) else None
+    named = isinstance(name, str) and re.fullmatch(NAME, name)
+    root = str(name) if named else f"instances[{index}]"
+    try:
+        return Instance.model_validate(entry)
+    except ValidationError as error:
+        raise config_error(error, root, shown, Instance) from error

@@ -1,0 +1,117 @@
+"""Measures planners on instances of task allocation."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from innerattn.config.instances import Instance
+from innerattn.policies.scripted.planner import schedule_by
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What a planner found for one instance.
+
+    Attributes:
+        instance: which one.
+        makespan: of the planner's schedule, in the instance's units.
+        seconds: what the planner took [s].
+    """
+
+    instance: Instance
+    makespan: float
+    seconds: float
+
+    def to_json(self) -> dict[str, Any]:
+        """As a part of `InstanceResults.to_json`."""
+        return {
+            "name": self.instance.name,
+            "makespan": self.makespan,
+            "seconds": self.seconds,
+            "published_makespan": self.instance.makespan_milp_600s,
+            "lower_bound": self.instance.lower_bound_milp,
+        }
+
+
+@dataclass(frozen=True)
+class InstanceResults:
+    """What a planner found for several instances.
+
+    Attributes:
+        policy: name of the planner.
+        seed: of the planner.
+        time_limit_ms: how long it was to search for each instance [ms].
+        solved: one for each instance, in order.
+    """
+
+    policy: str
+    seed: int
+    time_limit_ms: int
+    solved: tuple[Solved, ...]
+
+    @property
+    def mean_makespan(self) -> float:
+        """Mean over all instances."""
+        return sum(one.makespan for one in self.solved) / len(self.solved)
+
+    @property
+    def mean_seconds(self) -> float:
+        """What the planner took for an instance [s]."""
+        return sum(one.seconds for one in self.solved) / len(self.solved)
+
+    @property
+    def published_mean_makespan(self) -> float | None:
+        """Mean of the published makespans; None where an instance has none."""
+        published = [one.instance.makespan_milp_600s for one in self.solved]
+        known = [makespan for makespan in published if makespan is not None]
+        return sum(known) / len(known) if len(known) == len(published) else None
+
+    @property
+    def ratio(self) -> float | None:
+        """Mean makespan divided by the published mean; None where an instance has none."""
+        published = self.published_mean_makespan
+        return None if published is None else self.mean_makespan / published
+
+    def to_json(self) -> dict[str, Any]:
+        """The document that `innerattn evaluate --instances` writes."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "policy": self.policy,
+            "seed": self.seed,
+            "time_limit_ms": self.time_limit_ms,
+            "instances": [one.to_json() for one in self.solved],
+            "mean_makespan": self.mean_makespan,
+            "published_mean_makespan": self.published_mean_makespan,
+            "ratio": self.ratio,
+        }
+
+
+def solve_instances(
+    policy: str,
+    instances: Sequence[Instance],
+    time_limit_ms: int,
+    seed: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> InstanceResults:
+    """Let a planner make a schedule for each instance, and simulate it.
+
+    Args:
+        policy: one of `innerattn.policies.scripted.planner.PLANNERS`.
+        instances: one or more.
+        time_limit_ms: how long ``planner`` searches for each [ms].
+        seed: of ``planner`` and ``random``, the same for each instance.
+        progress: is told how many instances of how many are done.
+    """
+    solved = []
+    for instance in instances:
+        began = time.perf_counter()
+        schedule = schedule_by(policy, instance, time_limit_ms / 1000, seed)
+        solved.append(Solved(instance, schedule.makespan, time.perf_counter() - began))
+        if progress is not None:
+            progress(len(solved), len(instances))
+    return InstanceResults(policy, seed, time_limit_ms, tuple(solved))

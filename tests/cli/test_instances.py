@@ -1,0 +1,106 @@
+"""`innerattn evaluate --instances` and `innerattn info --instance`."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from innerattn.cli.main import main
+from innerattn.config.instances import read_instances
+from innerattn.policies.scripted.planner import schedule_by
+
+Captured = pytest.CaptureFixture[str]
+
+
+def document(capsys: Captured, policy: str, *options: str) -> dict[str, Any]:
+    assert main(["evaluate", policy, *options, "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert isinstance(found, dict)
+    return found
+
+
+@pytest.mark.parametrize("policy", ["planner", "greedy", "random"])
+def test_the_document_has_every_instance(policy: str, capsys: Captured) -> None:
+    found = document(capsys, policy, "--instances", "ral", "--time-limit-ms", "2", "--seed", "4")
+    assert (found["schema_version"], found["policy"], found["seed"]) == (1, policy, 4)
+    instances = read_instances("ral")
+    assert [one["name"] for one in found["instances"]] == [one.name for one in instances]
+    for one, instance in zip(found["instances"], instances, strict=True):
+        assert one["published_makespan"] == instance.makespan_milp_600s
+        assert one["lower_bound"] == instance.lower_bound_milp <= one["makespan"]
+        assert one["seconds"] > 0.0
+        if policy != "planner":
+            assert one["makespan"] == schedule_by(policy, instance, 0.0, 4).makespan
+    makespans = [one["makespan"] for one in found["instances"]]
+    assert found["mean_makespan"] == pytest.approx(sum(makespans) / 30)
+    assert found["published_mean_makespan"] == pytest.approx(23.9242, abs=1e-4)
+    ratio = found["mean_makespan"] / found["published_mean_makespan"]
+    assert found["ratio"] == pytest.approx(ratio)
+
+
+def test_instances_without_published_values(tmp_path: Path, capsys: Captured) -> None:
+    table = read_instances("ral")[0].model_dump(mode="json")
+    table |= {"makespan_milp_600s": None, "lower_bound_milp": None}
+    path, results = tmp_path / "mine.json", tmp_path / "found.json"
+    path.write_text(json.dumps([table]))
+    words = ["evaluate", "greedy", "--instances", str(path)]
+    assert main([*words, "--json", str(results)]) == 0
+    (row,) = [line for line in capsys.readouterr().out.splitlines() if "greedy" in line]
+    assert row.split()[:5] == ["greedy", "1", "30.01", "-", "-"]
+    found = json.loads(results.read_text())
+    assert (found["ratio"], found["published_mean_makespan"]) == (None, None)
+    assert found["instances"][0]["published_makespan"] is None
+    assert main([*words, "--quiet"]) == 0
+    assert capsys.readouterr().out == "greedy: mean makespan 30.01, 1 instances\n"
+
+
+def test_the_table_fits_a_terminal(capsys: Captured) -> None:
+    assert main(["evaluate", "planner", "--instances", "ral", "--time-limit-ms", "3"]) == 0
+    printed = capsys.readouterr().out
+    assert "23.92" in printed
+    assert max(map(len, printed.splitlines())) <= 80
+
+
+def test_wrong_words(tmp_path: Path, capsys: Captured) -> None:
+    bad = tmp_path / "bad.json"
+    bad.write_text("[{}]")
+    cases = [
+        (2, "planner", "planner: needs --instances"),
+        (2, "greedy --time-limit-ms 3", "--time-limit-ms: needs --instances"),
+        (2, "gredy --instances ral", "gredy: with --instances must be one of planner, greedy, ra"),
+        (2, "planner --instances ral --episodes 3", "--episodes: has no meaning with --instances"),
+        (2, "planner --instances ral --time-limit-ms 0", "--time-limit-ms 0: must be 1 to 8640000"),
+        (2, "planner --instances ral --seed -1", "--seed -1: must be 0 to 2**63 - 1"),
+        (1, "planner --instances rall", "rall: missing, or not a plain file, did you mean 'ral'?"),
+        (1, f"planner --instances {bad}", f"{bad}: instances[0].name: must be given"),
+    ]
+    for code, line, told in cases:
+        assert main(["evaluate", *line.split()]) == code, line
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert err.startswith(f"innerattn: error: {told}"), err
+        assert err.count("\n") == 1
+
+
+def test_an_instance_is_described(tmp_path: Path, capsys: Captured) -> None:
+    tiny = {
+        "name": "tiny",
+        "speed": 1.0,
+        "robots": [{"depot": [0.0, 0.0], "skills": [0, 1]}] * 2,
+        "tasks": [{"position": [3.0, 4.0], "skills": [0, 1], "duration": 2.0}],
+    }
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps([tiny]))
+    assert main(["info", "--instance", f"{path}:tiny"]) == 0
+    rows = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    assert rows == {
+        "instance": "tiny",
+        "robots": "2, speed 1",
+        "skills": "0 (2), 1 (2) (robots that have it)",
+        "tasks": "1, each for 2 to 2 robots, 2.00 of work for each robot",
+        "published": "makespan -, lower bound -",
+        "planner": "makespan 12.00",
+    }
+    assert main(["info", "--instance", "ral:ral_77"]) == 1
+    assert "ral: no instance is named 'ral_77', did you mean" in capsys.readouterr().err
