@@ -80,7 +80,7 @@ format: setup ## format all code
 	ruff check --fix
 	ruff format
 
-bench: setup ## speed of worlds and learner on this machine, beside their peers; fills docs/performance.md; MAAC=PATH adds MAAC's public code
+bench: setup ## speed of worlds, learner and planner on this machine, beside their peers; fills docs/performance.md and others; MAAC=PATH adds MAAC's public code
 	maturin develop --release --quiet --locked --extras dev,peers || \
 	{ echo "Without peers: they cannot be installed here."; maturin develop --release --quiet --locked --extras dev; }
 	cargo bench --quiet -p innerattn-benches
@@ -92,6 +92,7 @@ bench: setup ## speed of worlds and learner on this machine, beside their peers;
 	python benches/frame_time.py
 	python benches/checkpoint_cost.py
 	python benches/exported_call.py
+	python benches/planner_quality.py
 	python benches/time_to_score.py
 	python benches/compare_learner.py $(if $(MAAC),--maac "$(MAAC)")
 

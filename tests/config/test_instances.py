@@ -96,7 +96,7 @@ def test_wrong_files_are_named(tmp_path: Path) -> None:
         "[]": "must be a list of one instance or more",
         "{}": "must be a list of one instance or more",
         "[": "is not a JSON file",
-        json.dumps([SMALL, SMALL]): "the name 'small' comes twice",
+        json.dumps([SMALL, SMALL]): "the name 'small' comes 2 times",
         json.dumps([changed("speed", value=float("nan"))]): "is not a JSON file: NaN is not",
         json.dumps([changed("speed", value=0.0)]).replace("0.0", "1e999", 1): "is not a JSON file",
     }

@@ -72,7 +72,7 @@ impl Instance {
     }
 
     fn simulate(&self, py: Python, schedule: Schedule) -> PyResult<(Vec<f64>, Vec<f64>, f64)> {
-        let outcome = py.detach(|| simulate(&self.0, &schedule)).map_err(|error| raised(&error))?;
+        let outcome = py.detach(move || simulate(&self.0, &schedule)).map_err(|error| raised(&error))?;
         Ok((outcome.starts, outcome.returns, outcome.makespan))
     }
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -61,9 +62,10 @@ def _read(path: Path, shown: str) -> tuple[Instance, ...]:
     if not isinstance(entries, list) or not entries:
         raise ConfigError(f"{shown}: must be a list of one instance or more")
     instances = [_instance(entry, index, shown) for index, entry in enumerate(entries)]
-    names = [instance.name for instance in instances]
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        raise ConfigError(f"{shown}: the name {twice!r} comes twice")
+    names = Counter(instance.name for instance in instances)
+    name, count = names.most_common(1)[0]
+    if count > 1:
+        raise ConfigError(f"{shown}: the name {name!r} comes {count} times")
     return tuple(instances)
 
 
