@@ -147,6 +147,17 @@ fn a_search_ends_when_it_is_told() {
 }
 
 #[test]
+fn what_takes_no_time_is_planned_for() {
+    let robots = vec![Robot { depot: [0.0; 2], skills: 1 }; 2];
+    let tasks = vec![Task { position: [0.0; 2], needs: vec![0], duration: 0.0 }; 3];
+    let found = planned(&Instance::new(1.0, robots, tasks.clone()).unwrap(), 0, 50);
+    assert_eq!(found.evaluations, 50);
+    let alone = Instance::new(1.0, vec![Robot { depot: [3.0, 4.0], skills: 1 }], tasks).unwrap();
+    let outcome = simulate(&alone, &planned(&alone, 0, 50).schedule).unwrap();
+    assert_eq!((outcome.starts, outcome.returns), (vec![5.0; 3], vec![10.0]));
+}
+
+#[test]
 fn instances_that_are_none_are_refused() {
     let robot = |skills: u32| Robot { depot: [0.0; 2], skills };
     let task = |needs: &[u8]| Task { position: [0.0; 2], needs: needs.to_vec(), duration: 1.0 };

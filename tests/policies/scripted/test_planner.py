@@ -1,6 +1,8 @@
 """Schedules of instances beside plain Python code that plays and makes them."""
 
 import math
+import signal
+import time
 from collections.abc import Sequence
 from random import Random
 
@@ -129,6 +131,22 @@ def test_a_number_of_evaluations_gives_the_same_bits_everywhere() -> None:
         "0x1.6c40cbd700451p+4",
         "0x1.80126bad05b38p+4",
     ]
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="only POSIX has this timer")
+def test_a_search_can_be_interrupted() -> None:
+    def ring(*_: object) -> None:
+        raise TimeoutError("it rang")
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, 0.3)
+    began = time.monotonic()
+    try:
+        with pytest.raises(TimeoutError, match="it rang"):
+            plan(RAL[0], 200.0)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert time.monotonic() - began < 60.0
 
 
 def test_limits_are_checked() -> None:
