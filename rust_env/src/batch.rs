@@ -18,7 +18,7 @@ use crate::robot::{Commands, MAX_SET_SPEED_MPS, NUM_ACTIONS};
 use crate::rules::Rules;
 use crate::scenario::Actions;
 use crate::snapshot;
-use crate::task::Rescue;
+use crate::tasks::{Loss, Rescue};
 use crate::world::World;
 
 pub use buffers::StepBuffers;
@@ -209,9 +209,14 @@ impl Batch {
         self.last_step = began.elapsed();
         self.broken = self.shards.iter().flat_map(|shard| &shard.failures).map(|(env, _)| *env).collect();
         match self.shards.iter().flat_map(|shard| &shard.failures).next() {
-            None => Ok(self.shards.iter().flat_map(|shard| &shard.rescues).copied().collect()),
+            None => Ok(self.shards.iter().flat_map(|shard| &shard.events.rescues).copied().collect()),
             Some((_, said)) => Err(Error::Panicked { envs: self.broken.clone(), message: said.clone() }),
         }
+    }
+
+    /// The victims that were lost in the last step, in order of env.
+    pub fn losses(&self) -> impl Iterator<Item = &Loss> {
+        self.shards.iter().flat_map(|shard| &shard.events.losses)
     }
 
     /// Lets these worlds panic in the next step, to test what happens then.

@@ -17,7 +17,7 @@ pub mod rng;
 pub mod robot;
 
 pub mod place;
-pub mod task;
+pub mod tasks;
 
 pub mod meeting;
 

@@ -6,7 +6,7 @@
 use crate::geometry::Vec2;
 use crate::matching::fillable;
 use crate::robot::Body;
-use crate::task::Needs;
+use crate::tasks::Needs;
 
 /// Deepest overlap of two robots in contact, as a share of a radius.
 const MOST_OVERLAP: f32 = 0.15;

@@ -4,7 +4,9 @@ use crate::fault::{HEALTHY, KINDS, Kind, Levels};
 use crate::geometry::Vec2;
 use crate::robot::{Body, bodies};
 use crate::scenario::{MAX_VICTIMS, Scenario, VictimOrder};
-use crate::task::{Needs, Victim};
+use crate::tasks::deadline::Deadlines;
+use crate::tasks::service::Service;
+use crate::tasks::{Needs, Victim};
 
 /// The true state of a world, as far as robots can see it.
 #[derive(Debug, Clone, Copy)]
@@ -19,6 +21,8 @@ pub struct Scene<'a> {
     pub velocities: &'a [Vec2],
     /// Victims by slot.
     pub victims: &'a [Option<Victim>],
+    /// Steps done in the episode.
+    pub step: u32,
 }
 
 /// What stands between a robot and what there is to see.
@@ -47,6 +51,9 @@ pub struct Layout {
     faults: bool,
     /// For each task, how many of each ability it needs.
     needs: Vec<Vec<f32>>,
+    /// For each task, how long its victims are served; none where all are rescued at touch.
+    services: Option<Vec<Service>>,
+    deadlines: Option<Deadlines>,
     /// The columns that never change, of all robots (R × D); zeros elsewhere.
     fixed: Vec<f32>,
 }
@@ -66,6 +73,8 @@ impl Layout {
             victims: scenario.num_victims(),
             order: scenario.victim_order,
             faults: scenario.observe_faults,
+            services: Some(Service::of_tasks(scenario)).filter(|_| scenario.has_services()),
+            deadlines: Deadlines::new(scenario),
             abilities,
             needs,
             fixed: vec![],
@@ -113,6 +122,8 @@ impl Layout {
     /// Columns of one victim.
     fn victim_width(&self) -> usize {
         3 + self.abilities.len()
+            + usize::from(self.services.is_some())
+            + usize::from(self.deadlines.is_some())
     }
 
     /// Width D of a row.
@@ -121,7 +132,8 @@ impl Layout {
         self.robots * self.robot_width() + self.victims * self.victim_width()
     }
 
-    /// The name of every column; units are m and m/s, flags and abilities are 0 or 1, needs are counts.
+    /// The name of every column; units are m and m/s, flags and abilities are 0 or 1, needs are counts,
+    /// `served` and `time_left` are shares.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let mut names = Vec::with_capacity(self.width());
@@ -147,6 +159,8 @@ impl Layout {
             names.push(format!("victim_{victim}.present"));
             names.extend(self.abilities.iter().map(|ability| format!("victim_{victim}.need.{ability}")));
             names.extend(["x", "y"].map(|axis| format!("victim_{victim}.relative_position.{axis}")));
+            names.extend(self.services.iter().map(|_| format!("victim_{victim}.served")));
+            names.extend(self.deadlines.iter().map(|_| format!("victim_{victim}.time_left")));
         }
         names
     }
@@ -204,17 +218,11 @@ impl Layout {
         for other in (0..self.robots).filter(|other| *other != own) {
             write(scene.positions[other] - position, scene.velocities[other] - velocity);
         }
-        self.write_victims(&scene.team[own], scene.tasks, position, scene.victims, rest);
+        self.write_victims(scene, &scene.team[own], position, rest);
     }
 
-    fn write_victims(
-        &self,
-        body: &Body,
-        tasks: &[Needs],
-        own: Vec2,
-        victims: &[Option<Victim>],
-        rows: &mut [f32],
-    ) {
+    fn write_victims(&self, scene: Scene, body: &Body, own: Vec2, rows: &mut [f32]) {
+        let Scene { tasks, victims, step, .. } = scene;
         let mut sorted = [(0_u8, 0.0_f32, 0_u8); MAX_VICTIMS];
         for (slot, victim) in victims.iter().enumerate() {
             let (kind, distance) = match self.order {
@@ -240,6 +248,12 @@ impl Layout {
                 *column = *need;
             }
             (row[1 + abilities], row[2 + abilities]) = (place.x, place.y);
+            if let Some(services) = &self.services {
+                row[3 + abilities] = services[victim.task as usize].share(victim);
+            }
+            if let Some(deadlines) = &self.deadlines {
+                row[self.victim_width() - 1] = deadlines.share_left(victim, step);
+            }
         }
     }
 }
@@ -266,14 +280,20 @@ mod tests {
         scenario.tasks[1].needs = vec!["food".into()];
         let (team, tasks) = (bodies(&scenario), Needs::of_tasks(&scenario));
         let layout = Layout::new(&scenario, &tasks);
-        let victim = |task, x| Some(Victim { id: 0, task, appeared_step: 0, position: Vec2::new(x, 0.0) });
+        let victim = |task, x| Some(Victim::new(0, task, 0, Vec2::new(x, 0.0)));
         // The near one needs food alone; the far one food and medicine.
         let victims = [victim(1, 0.5), victim(0, -0.5)];
         let (at, moving) =
             ([Vec2::new(0.1, 0.2), Vec2::new(0.4, 0.0)], [Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0)]);
         let mut rows = vec![f32::NAN; 2 * layout.width()];
-        let scene =
-            Scene { team: &team, tasks: &tasks, positions: &at, velocities: &moving, victims: &victims };
+        let scene = Scene {
+            team: &team,
+            tasks: &tasks,
+            positions: &at,
+            velocities: &moving,
+            victims: &victims,
+            step: 0,
+        };
         layout.write(scene, &mut rows);
         (layout.names(), rows.split_off(layout.width()))
     }

@@ -4,7 +4,7 @@
 use crate::geometry::Vec2;
 use crate::robot::Body;
 use crate::scenario::{RescueCredit, Scenario, Shaping};
-use crate::task::{Needs, Rescue, Victim};
+use crate::tasks::{Loss, Needs, Rescue, Victim};
 
 /// One term of a robot's reward.
 pub struct Component {
@@ -51,6 +51,11 @@ pub const COMPONENTS: &[Component] = &[
         meaning: "minus `action_cost` times the squared length of the robot's drive",
         value: |weights, happened, robot| -weights.action * happened.effort[robot],
     },
+    Component {
+        name: "lost",
+        meaning: "minus `lost_cost` for each victim that is lost, for every robot",
+        value: |weights, happened, _| -weights.lost * happened.losses.len() as f32,
+    },
 ];
 
 /// Number C of reward components.
@@ -73,12 +78,16 @@ pub struct Weights {
     pub contact: f32,
     /// Cost of a step of full drive.
     pub action: f32,
+    /// Cost of a victim that is lost.
+    pub lost: f32,
 }
 
 /// What happened in a step, as far as rewards care.
 pub struct Happened<'a> {
     /// Rescues of this step.
     pub rescues: &'a [Rescue],
+    /// Victims that were lost in it.
+    pub losses: &'a [Loss],
     /// Σ of needs' distances before the robots moved, m.
     pub distance_before: f32,
     /// The same after the step: over the same victims for progress, over those now present for
@@ -102,6 +111,7 @@ impl Weights {
             discount: scenario.shaping_discount as f32,
             contact: scenario.contact_cost as f32,
             action: scenario.action_cost as f32,
+            lost: scenario.lost_cost as f32,
         }
     }
 }
@@ -147,6 +157,7 @@ mod tests {
             shaping_discount: 0.5,
             contact_cost: 3.0,
             action_cost: 0.5,
+            lost_cost: 0.25,
             ..Scenario::default()
         };
         change(&mut scenario);
@@ -155,6 +166,7 @@ mod tests {
         let rescue = Rescue { env: 0, episode: 0, step: 0, slot: 0, victim: 0, task: 0, helpers };
         let happened = Happened {
             rescues: &[rescue],
+            losses: &[Loss { env: 0, episode: 0, step: 0, slot: 1, victim: 1, task: 0 }; 2],
             distance_before: 2.0,
             distance_after: 1.5,
             touched: 0b0100,
@@ -175,6 +187,7 @@ mod tests {
         assert_eq!(column(rows, 1), [1000; 4]);
         assert_eq!(column(rows, 2), [0, 0, -3000, 0]);
         assert_eq!(column(rows, 3), [-500, -125, 0, 0]);
+        assert_eq!(column(rows, 4), [-500; 4]);
     }
 
     #[test]

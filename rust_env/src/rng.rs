@@ -17,6 +17,8 @@ pub enum Purpose {
     FaultStrikes = 3,
     /// Errors of sensors.
     SensorNoise = 4,
+    /// How long victims wait before they are lost.
+    Deadlines = 5,
 }
 
 /// A stream of random numbers whose state is its key and the count of words drawn.

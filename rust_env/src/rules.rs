@@ -11,7 +11,9 @@ use crate::reward::Weights;
 use crate::robot::{Body, bodies};
 use crate::scenario::Scenario;
 use crate::spawn::{Crowded, Spawn};
-use crate::task::Needs;
+use crate::tasks::Needs;
+use crate::tasks::deadline::Deadlines;
+use crate::tasks::service::Service;
 
 /// One of the scenario's faults, as numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +41,10 @@ pub struct Rules {
     pub team: Vec<Body>,
     /// What each task needs.
     pub tasks: Vec<Needs>,
+    /// How long each task's victims are served.
+    pub services: Vec<Service>,
+    /// When victims are lost, if ever.
+    pub deadlines: Option<Deadlines>,
     /// The obstacles' forms.
     pub solids: Vec<Solid>,
     /// Motion and contacts.
@@ -82,6 +88,8 @@ impl Rules {
         Ok(Self {
             physics: Physics::new(&scenario, &team, &solids),
             layout: Layout::new(&scenario, &tasks),
+            services: Service::of_tasks(&scenario),
+            deadlines: Deadlines::new(&scenario),
             weights: Weights::new(&scenario),
             faults: processes(&scenario),
             spawn,

@@ -23,6 +23,8 @@ pub const MAX_ABILITIES: usize = 32;
 pub const MAX_FAULTS: usize = 256;
 /// Most helpers that one victim may need.
 pub const MAX_NEEDS: usize = 8;
+/// Longest service or deadline of a victim, s; no episode takes longer.
+pub const MAX_TIME_S: f64 = 1e6;
 /// Gap between robots, and between robots and solids, when an episode starts, m.
 pub const START_GAP_M: f64 = 1e-3;
 /// Most that the heaviest robot may weigh, in weights of the lightest: contacts are true up to here.
@@ -99,6 +101,38 @@ pub enum Engine {
     Discs,
 }
 
+/// What happens to the service of a victim when its needs are not met any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Interrupted {
+    /// It goes on later where it stopped.
+    #[default]
+    Keep,
+    /// It starts anew.
+    Restart,
+}
+
+/// How long a victim waits before it is lost, s.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "deadline_s must be a number or a pair [low, high]")]
+pub enum Deadline {
+    /// As long as every other of its task.
+    Same(f64),
+    /// Drawn for each victim between a least and a largest time.
+    Between([f64; 2]),
+}
+
+impl Deadline {
+    /// The least and the largest, s.
+    #[must_use]
+    pub fn range(self) -> [f64; 2] {
+        match self {
+            Self::Same(seconds) => [seconds, seconds],
+            Self::Between(range) => range,
+        }
+    }
+}
+
 /// An obstacle's form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -150,6 +184,23 @@ pub struct Task {
     pub name: String,
     /// Needed abilities, with repeats if several robots of one ability are needed.
     pub needs: Vec<String>,
+    /// How long all needs of a victim must be met before it is rescued, s.
+    #[serde(default)]
+    pub service_s: f64,
+    /// What happens to its service when they are not met any more.
+    #[serde(default)]
+    pub service: Interrupted,
+    /// How long after it appeared a victim is lost, s; never if absent.
+    #[serde(default)]
+    pub deadline_s: Option<Deadline>,
+}
+
+impl Task {
+    /// A task whose victims are rescued at touch and wait for ever.
+    #[must_use]
+    pub fn new(name: &str, needs: Vec<String>) -> Self {
+        Self { name: name.into(), needs, service_s: 0.0, service: Interrupted::Keep, deadline_s: None }
+    }
 }
 
 /// Something solid that does not move.
@@ -226,6 +277,8 @@ pub struct Scenario {
     pub contact_cost: f64,
     /// Subtracted for each step of full drive (times the square of a continuous action's length).
     pub action_cost: f64,
+    /// Subtracted from every robot's reward for each victim that is lost.
+    pub lost_cost: f64,
     /// The order in which a robot sees the victims.
     pub victim_order: VictimOrder,
     /// What goes wrong with which robot, and when.
@@ -246,10 +299,7 @@ impl Default for Scenario {
             drive_force_n: default_drive_force_n(),
             start_m: None,
         };
-        let task = |name: &str, needs: [&str; 2]| Task {
-            name: name.into(),
-            needs: needs.map(String::from).to_vec(),
-        };
+        let task = |name: &str, needs: [&str; 2]| Task::new(name, needs.map(String::from).to_vec());
         Self {
             situation: Situation::Mixed,
             robots: vec![
@@ -282,6 +332,7 @@ impl Default for Scenario {
             shaping_discount: 0.95,
             contact_cost: 0.0,
             action_cost: 0.0,
+            lost_cost: 0.0,
             victim_order: VictimOrder::Relevant,
             faults: vec![],
             observe_faults: false,
@@ -318,6 +369,18 @@ impl Scenario {
             Situation::Double => self.tasks.len(),
             Situation::Mixed => self.max_victims,
         }
+    }
+
+    /// Whether the rescue of some victims takes time.
+    #[must_use]
+    pub fn has_services(&self) -> bool {
+        self.tasks.iter().any(|task| task.service_s > 0.0)
+    }
+
+    /// Whether some victims can be lost.
+    #[must_use]
+    pub fn has_deadlines(&self) -> bool {
+        self.tasks.iter().any(|task| task.deadline_s.is_some())
     }
 
     /// All abilities named by robots, sorted; the order of ability columns.

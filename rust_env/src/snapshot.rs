@@ -8,6 +8,7 @@ use crate::geometry::Vec2;
 use crate::robot::MAX_SET_SPEED_MPS;
 use crate::rules::Rules;
 use crate::scenario::Scenario;
+use crate::tasks::Victim;
 use crate::world::World;
 
 const MAGIC: &[u8; 8] = b"innerATT";
@@ -28,13 +29,46 @@ struct Head {
     num_envs: usize,
 }
 
+/// What follows a world where victims take time, so that the images of other scenarios stay what they were.
+/// When a victim is lost follows from the world.
+#[derive(Serialize, Deserialize)]
+struct Care {
+    lost: u32,
+    /// Steps of service by slot, 0 where it is empty.
+    served: Vec<u32>,
+}
+
+impl Care {
+    fn is_kept(scenario: &Scenario) -> bool {
+        scenario.has_services() || scenario.has_deadlines()
+    }
+
+    fn of(world: &World) -> Self {
+        let served = world.victims.iter().map(|victim| victim.map_or(0, |victim| victim.served_steps));
+        Self { lost: world.lost, served: served.collect() }
+    }
+
+    /// Puts it back; returns whether each empty slot has none.
+    fn restore(self, world: &mut World) -> bool {
+        world.lost = self.lost;
+        self.served.len() == world.victims.len()
+            && world.victims.iter_mut().zip(self.served).all(|(victim, served)| match victim {
+                Some(victim) => {
+                    victim.served_steps = served;
+                    true
+                }
+                None => served == 0,
+            })
+    }
+}
+
 /// Most bytes of an image of so many worlds of these rules.
 #[must_use]
 pub fn most_bytes(rules: &Rules, num_envs: usize) -> usize {
     // Numbers of 64 bits take at most 10 bytes, of 32 bits 5, floats 4; a list names its length, too.
     let (robots, slots, width) = (rules.team.len(), rules.scenario.num_victims(), rules.layout.width());
     let counts = 16 * 10;
-    let places = 8 * (2 * robots + rules.solids.len()) + (1 + 3 * 5 + 8) * slots;
+    let places = 8 * (2 * robots + rules.solids.len()) + (1 + 3 * 5 + 8 + 5) * slots;
     let faults = 2 * 5 * rules.faults.len() + NUM_KINDS * (10 + 4 * robots) + robots * (11 + 4 * width);
     let head = MAGIC.len() + 2 * 10 + rules.scenario.to_json().len() + CHECKSUM_BYTES;
     head + num_envs * (counts + places + faults)
@@ -48,7 +82,14 @@ pub fn most_bytes(rules: &Rules, num_envs: usize) -> usize {
 pub fn save<'a>(rules: &Rules, num_envs: usize, worlds: impl Iterator<Item = &'a World>) -> Vec<u8> {
     let head = Head { version: VERSION, scenario: rules.scenario.to_json(), num_envs };
     let bytes = postcard::to_extend(&head, MAGIC.to_vec()).expect("plain data serialises");
-    let add = |bytes, world| postcard::to_extend(world, bytes).expect("plain data serialises");
+    let cares = Care::is_kept(&rules.scenario);
+    let add = |mut bytes, world: &World| {
+        bytes = postcard::to_extend(world, bytes).expect("plain data serialises");
+        if cares {
+            bytes = postcard::to_extend(&Care::of(world), bytes).expect("plain data serialises");
+        }
+        bytes
+    };
     sealed(worlds.fold(bytes, add))
 }
 
@@ -92,10 +133,18 @@ pub fn load(rules: &Rules, num_envs: usize, bytes: &[u8]) -> Result<Vec<World>> 
     }
     let mut worlds = Vec::with_capacity(num_envs);
     for env in 0..num_envs {
-        let (world, later) = postcard::take_from_bytes::<World>(rest).map_err(|_| unread())?;
+        let (mut world, mut later) = postcard::take_from_bytes::<World>(rest).map_err(|_| unread())?;
+        if Care::is_kept(&rules.scenario) {
+            let (care, rest) = postcard::take_from_bytes::<Care>(later).map_err(|_| unread())?;
+            if !care.restore(&mut world) {
+                return refuse(format!("env {env} does not fit the scenario: its services"));
+            }
+            later = rest;
+        }
         if let Some(what) = misfit(rules, &world) {
             return refuse(format!("env {env} does not fit the scenario: its {what}"));
         }
+        world.set_deadlines(rules);
         worlds.push(world);
         rest = later;
     }
@@ -122,18 +171,24 @@ fn misfit(rules: &Rules, world: &World) -> Option<&'static str> {
     let within = |vectors: &[Vec2], most: f32| {
         vectors.iter().flat_map(Vec2::iter).all(|number| (-most..=most).contains(number))
     };
+    let served = |victim: &Victim| {
+        rules.services.get(victim.task as usize).is_some_and(|service| service.may_be(victim))
+    };
     let checks = [
         ("episode", world.episode < MOST_EPISODES),
         ("step", world.step <= scenario.episode_steps),
         ("over", world.over == (time_is_up || goal_is_reached)),
         ("fresh", !world.fresh || (world.episode == 0 && world.step == 0)),
         ("rescued", u64::from(world.rescued) <= slots * u64::from(world.step)),
-        ("appeared", u64::from(world.appeared) == u64::from(world.rescued) + present),
+        ("lost", u64::from(world.lost) <= slots * u64::from(world.step)),
+        ("lost", world.lost == 0 || rules.deadlines.is_some()),
+        ("appeared", u64::from(world.appeared) == u64::from(world.rescued) + u64::from(world.lost) + present),
         ("victim_words", world.victim_words <= turns * rules.spawn.most_words()),
         ("positions", world.positions.len() == robots && within(&world.positions, arena)),
         ("velocities", world.velocities.len() == robots && within(&world.velocities, MAX_SET_SPEED_MPS)),
         ("obstacles", rules.spawn.may_be_obstacles(&world.obstacles)),
         ("victims", rules.spawn.may_be_victims(&world.victims, world.step, world.appeared)),
+        ("services", world.victims.iter().flatten().all(served)),
         ("faults", world.faults.fits(rules, world.now())),
     ];
     checks.into_iter().find(|(_, fits)| !fits).map(|(what, _)| what)

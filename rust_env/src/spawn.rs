@@ -8,7 +8,7 @@ use crate::place::{DRAWS, Placed, Placing};
 use crate::rng::{Purpose, Stream};
 use crate::robot::Body;
 use crate::scenario::{Scenario, Situation};
-use crate::task::Victim;
+use crate::tasks::Victim;
 
 /// How often everything is drawn for one start. A scenario in which a draw fails more often than about once in
 /// twenty is refused, see [`Spawn::find_crowding`]; so 64 draws fail in none of 10^80 starts.
@@ -185,8 +185,7 @@ impl Spawn {
             let others = slots.iter().flatten().map(|victim| victim.position);
             let place = self.placing.victim(stream, robots, &others, &solids);
             clear &= place.clear;
-            slots[index] =
-                Some(Victim { id: *appeared, task: task as u32, appeared_step: step, position: place.at });
+            slots[index] = Some(Victim::new(*appeared, task as u32, step, place.at));
             *appeared += 1;
         }
         clear

@@ -12,7 +12,7 @@ use crate::rng::{Purpose, Stream};
 use crate::robot::Commands;
 use crate::rules::Rules;
 use crate::scenario::{MAX_ROBOTS, Shaping};
-use crate::task::{Rescue, Victim};
+use crate::tasks::{Events, Loss, Rescue, Victim};
 
 /// Whether and how an episode ended with a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +48,9 @@ pub struct World {
     pub fresh: bool,
     /// Victims rescued in this episode.
     pub rescued: u32,
+    /// Victims lost in this episode. Images have it apart, where a scenario has deadlines.
+    #[serde(skip)]
+    pub lost: u32,
     /// Victims that appeared in this episode.
     pub appeared: u32,
     /// Words drawn from the victims' stream.
@@ -76,6 +79,7 @@ impl World {
             over: false,
             fresh: true,
             rescued: 0,
+            lost: 0,
             appeared: 0,
             victim_words: 0,
             positions: vec![Vec2::zeros(); rules.team.len()],
@@ -105,6 +109,7 @@ impl World {
         self.step = 0;
         self.over = false;
         self.rescued = 0;
+        self.lost = 0;
         self.appeared = 0;
         self.victim_words = 0;
         self.victims.fill(None);
@@ -125,11 +130,20 @@ impl World {
             let appeared = &mut self.appeared;
             rules.spawn.place_victims(&mut words, *step, appeared, positions, obstacles, victims);
             self.victim_words = words.words();
+            self.set_deadlines(rules);
         }
     }
 
-    /// Does one control step of world number `env` of a batch, whose `commands` are E × R. Adds rescues
-    /// to `rescues`; `components` is R × C and `reward` R.
+    /// Says of every victim when it is lost.
+    pub fn set_deadlines(&mut self, rules: &Rules) {
+        let Some(deadlines) = &rules.deadlines else { return };
+        for victim in self.victims.iter_mut().flatten() {
+            victim.deadline_step = deadlines.step_of(victim, self.seed, self.stream, self.episode);
+        }
+    }
+
+    /// Does one control step of world number `env` of a batch, whose `commands` are E × R. Adds what becomes
+    /// of victims to `events`; `components` is R × C and `reward` R.
     #[allow(clippy::too_many_arguments)]
     pub fn step(
         &mut self,
@@ -137,7 +151,7 @@ impl World {
         workspace: &mut Workspace,
         commands: Commands,
         env: usize,
-        rescues: &mut Vec<Rescue>,
+        events: &mut Events,
         components: &mut [f32],
         reward: &mut [f32],
     ) -> Ending {
@@ -156,8 +170,11 @@ impl World {
             rules.physics.advance(workspace, &mut self.positions, &mut self.velocities, &self.obstacles);
         let mut distance_after = if shaping == Shaping::Progress { self.distance(rules) } else { 0.0 };
 
-        let earlier = rescues.len();
-        self.settle(rules, env, rescues);
+        let earlier = (events.rescues.len(), events.losses.len());
+        self.settle(rules, env, &mut events.rescues);
+        if rules.deadlines.is_some() {
+            self.lose(env, &mut events.losses);
+        }
         self.step += 1;
         self.fresh = false;
         self.fill_slots(rules);
@@ -173,7 +190,8 @@ impl World {
             distance_after = self.distance(rules);
         }
         let happened = Happened {
-            rescues: &rescues[earlier..],
+            rescues: &events.rescues[earlier.0..],
+            losses: &events.losses[earlier.1..],
             distance_before,
             distance_after,
             touched,
@@ -183,17 +201,23 @@ impl World {
         ending
     }
 
-    /// Applies the rescue rule, slot by slot; no robot helps twice in one step.
+    /// Serves and rescues victims by the rescue rule, slot by slot; no robot helps twice in one step.
     fn settle(&mut self, rules: &Rules, env: usize, rescues: &mut Vec<Rescue>) {
         let radius = rules.scenario.rescue_radius_m as f32;
         let mut busy = self.faults.unavailable();
         for (slot, place) in self.victims.iter_mut().enumerate() {
-            let Some(victim) = *place else { continue };
+            let Some(victim) = place else { continue };
+            let service = rules.services[victim.task as usize];
             let needs = &rules.tasks[victim.task as usize];
             let found = needs.helpers(victim.position, &rules.team, &self.positions, radius, busy);
-            let Some(helpers) = found else { continue };
+            let Some(helpers) = found else {
+                service.interrupt(victim);
+                continue;
+            };
             helpers.iter().flatten().for_each(|robot| busy |= 1 << robot);
-            *place = None;
+            if !service.serve(victim) {
+                continue;
+            }
             self.rescued += 1;
             rescues.push(Rescue {
                 env: env as u32,
@@ -203,6 +227,24 @@ impl World {
                 victim: victim.id,
                 task: victim.task,
                 helpers,
+            });
+            *place = None;
+        }
+    }
+
+    /// Takes away the victims whose deadline comes with the end of this step.
+    fn lose(&mut self, env: usize, losses: &mut Vec<Loss>) {
+        for (slot, place) in self.victims.iter_mut().enumerate() {
+            let Some(victim) = place.filter(|victim| victim.deadline_step <= self.step + 1) else { continue };
+            *place = None;
+            self.lost += 1;
+            losses.push(Loss {
+                env: env as u32,
+                episode: self.episode,
+                step: self.step,
+                slot: slot as u32,
+                victim: victim.id,
+                task: victim.task,
             });
         }
     }
@@ -259,6 +301,7 @@ impl World {
             positions: &self.positions,
             velocities: &self.velocities,
             victims: &self.victims,
+            step: self.step,
         }
     }
 

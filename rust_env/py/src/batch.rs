@@ -9,7 +9,7 @@ use innerattn_env::fault_state::FaultState;
 use innerattn_env::robot::Commands;
 use innerattn_env::scenario::Actions;
 use innerattn_env::snapshot::most_bytes;
-use innerattn_env::task::Rescue;
+use innerattn_env::tasks::Rescue;
 use innerattn_env::world::World;
 use numpy::{IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};

@@ -4,7 +4,7 @@ use super::*;
 use crate::fault::{Fault, KINDS};
 use crate::reward::NUM_COMPONENTS;
 use crate::rng::{Purpose, Stream};
-use crate::scenario::{Engine, Scenario, Situation};
+use crate::scenario::{Deadline, Engine, Scenario, Situation};
 
 const CHECKSUM_BYTES: usize = 4;
 
@@ -27,8 +27,12 @@ fn played(engine: Engine, steps: usize) -> Batch {
             duration_steps: Some(3),
         })
     });
+    let mut tasks = Scenario::default().tasks;
+    tasks[0].service_s = 0.3;
+    tasks[1].deadline_s = Some(Deadline::Between([0.5, 2.0]));
     let scenario = Scenario {
         engine,
+        tasks,
         faults: faults.collect(),
         situation: Situation::Double,
         arena_half_width_m: 0.5,

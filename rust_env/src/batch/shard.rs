@@ -13,7 +13,7 @@ use crate::physics::Workspace;
 use crate::reward::NUM_COMPONENTS;
 use crate::robot::Commands;
 use crate::rules::Rules;
-use crate::task::Rescue;
+use crate::tasks::Events;
 use crate::world::{Ending, World};
 
 /// Time between two polls of the caller.
@@ -70,7 +70,8 @@ pub(super) struct Stepping<'a> {
 pub(super) struct Shard {
     pub first: usize,
     pub worlds: Vec<World>,
-    pub rescues: Vec<Rescue>,
+    /// What became of victims in the last step.
+    pub events: Events,
     /// Worlds that panicked in the last step, and what they said.
     pub failures: Vec<(usize, String)>,
     workspace: Workspace,
@@ -81,12 +82,12 @@ pub(super) struct Shard {
 impl Shard {
     pub(super) fn new(first: usize, worlds: Vec<World>) -> Self {
         let workspace = Workspace::default();
-        Self { first, worlds, rescues: vec![], failures: vec![], workspace, before: vec![] }
+        Self { first, worlds, events: Events::default(), failures: vec![], workspace, before: vec![] }
     }
 
     /// Steps the worlds, all but those after an interruption.
     pub(super) fn step(&mut self, stepping: &Stepping, buffers: &mut StepBuffers) {
-        self.rescues.clear();
+        self.events.clear();
         self.failures.clear();
         if let Some(watch) = stepping.watch {
             if watch.stopped() {
@@ -126,7 +127,7 @@ impl Shard {
             reward.fill(0.0);
             Ending { terminated: false, truncated: false }
         } else {
-            world.step(rules, &mut self.workspace, commands, env, &mut self.rescues, components, reward)
+            world.step(rules, &mut self.workspace, commands, env, &mut self.events, components, reward)
         };
         assert!(!stepping.doomed.contains(&env), "a test asked for it");
         buffers.terminated[index] = ending.terminated;
@@ -146,7 +147,8 @@ impl Shard {
     fn give_up(&mut self, index: usize, panic: &(dyn Any + Send), rules: &Rules, buffers: &mut StepBuffers) {
         let env = self.first + index;
         self.failures.push((env, said(panic)));
-        self.rescues.retain(|rescue| rescue.env as usize != env);
+        self.events.rescues.retain(|rescue| rescue.env as usize != env);
+        self.events.losses.retain(|loss| loss.env as usize != env);
         self.workspace = Workspace::default();
         let world = &mut self.worlds[index];
         let again = AssertUnwindSafe(|| world.begin(rules, world.episode));
@@ -164,6 +166,9 @@ impl Shard {
     /// Ends a step that may have been interrupted: forgets the worlds before it, or goes back to them.
     pub(super) fn settle(&mut self, interrupted: bool) {
         let before = std::mem::take(&mut self.before);
+        if interrupted {
+            self.events.clear();
+        }
         if interrupted && !before.is_empty() {
             self.worlds = before;
         }

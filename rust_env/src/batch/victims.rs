@@ -5,13 +5,13 @@ use std::iter::zip;
 use super::Batch;
 use crate::error::{Error, Result};
 use crate::geometry::Vec2;
-use crate::task::Victim;
+use crate::tasks::Victim;
 
 impl Batch {
     /// Moves victims, changes their tasks, and lets new ones appear in empty slots. `present` and `tasks`
     /// are E × V, `places` E × V × 2 in m, all in C order; the task and the place of a slot that stays empty
-    /// are not looked at. A victim that was there keeps its number and the step at which it appeared; a
-    /// new one gets the next number. Obstacles and robots are not looked at, and nothing is drawn.
+    /// are not looked at. A victim that was there keeps its number and the step at which it appeared, and
+    /// its service as long as it keeps its task; a new one gets the next number. Obstacles and robots are not looked at, and nothing is drawn.
     ///
     /// # Errors
     /// [`Error::Argument`] for too many or too few values; [`Error::Victim`] for a victim that is taken
@@ -37,13 +37,16 @@ impl Batch {
         for (world, wanted) in zip(worlds, wanted.chunks_exact(slots)) {
             for (slot, wanted) in zip(&mut world.victims, wanted) {
                 let Some((task, position)) = *wanted else { continue };
-                let (id, appeared_step) = match slot {
-                    Some(victim) => (victim.id, victim.appeared_step),
-                    None => (world.appeared, world.step),
+                let task = task as u32;
+                let victim = match slot {
+                    Some(victim) if victim.task == task => Victim { position, ..*victim },
+                    Some(victim) => Victim::new(victim.id, task, victim.appeared_step, position),
+                    None => Victim::new(world.appeared, task, world.step, position),
                 };
                 world.appeared += u32::from(slot.is_none());
-                *slot = Some(Victim { id, task: task as u32, appeared_step, position });
+                *slot = Some(victim);
             }
+            world.set_deadlines(&self.rules);
             world.freeze(&self.rules);
         }
         Ok(())
@@ -53,7 +56,7 @@ impl Batch {
     fn check_victim(&self, env: usize, slot: usize, there: bool, wanted: Option<(i64, Vec2)>) -> Result<()> {
         let refuse = |field, value: String, rule| Err(Error::Victim { field, env, slot, value, rule });
         let Some((task, at)) = wanted else {
-            let rule = "must be true: a victim leaves when it is rescued".into();
+            let rule = "must be true: a victim leaves when it is rescued or lost".into();
             return if there { refuse("present", "false".into(), rule) } else { Ok(()) };
         };
         let allowed = self.rules.spawn.tasks_of_slot(slot);

@@ -4,7 +4,8 @@
 use super::check::{broken, counts, named, within};
 use super::{
     Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_MASS_RATIO_RAPIER, MAX_NEEDS, MAX_OBSTACLES,
-    MAX_PLACES, MAX_ROBOTS, MAX_TRAVEL_RADII, MAX_VICTIMS, Robot, START_GAP_M, Scenario, Shape,
+    MAX_PLACES, MAX_ROBOTS, MAX_TIME_S, MAX_TRAVEL_RADII, MAX_VICTIMS, Robot, START_GAP_M, Scenario, Shape,
+    Task,
 };
 use crate::error::Result;
 use crate::fault::{Fault, Spec};
@@ -36,6 +37,7 @@ impl Scenario {
         within("shaping_discount", self.shaping_discount, 0.0, 1.0, "")?;
         within("contact_cost", self.contact_cost, -1e6, 1e6, "")?;
         within("action_cost", self.action_cost, -1e6, 1e6, "")?;
+        within("lost_cost", self.lost_cost, -1e6, 1e6, "")?;
         if self.engine == Engine::Discs && self.friction != 0.0 {
             return broken("friction", &self.friction, "must be 0 where engine = \"discs\"");
         }
@@ -103,6 +105,7 @@ impl Scenario {
                 let needs = task.needs.join(" + ");
                 return broken(&key("needs"), &needs, "the team has no distinct able robot for each need");
             }
+            validate_times(task, key)?;
         }
         Ok(())
     }
@@ -256,4 +259,23 @@ impl Scenario {
             _ => Ok(()),
         }
     }
+}
+
+/// Refuses services and deadlines out of range, and a deadline that comes before the service can end.
+fn validate_times(task: &Task, key: impl Fn(&str) -> String) -> Result<()> {
+    within(&key("service_s"), task.service_s, 0.0, MAX_TIME_S, "s")?;
+    let Some(deadline) = task.deadline_s else { return Ok(()) };
+    let [low, high] = deadline.range();
+    for seconds in [low, high] {
+        within(&key("deadline_s"), seconds, 0.001, MAX_TIME_S, "s")?;
+    }
+    if low > high {
+        let rule = "must be a pair [low, high] whose low is at most its high";
+        return broken(&key("deadline_s"), &format!("[{low}, {high}]"), rule);
+    }
+    if low < task.service_s {
+        let rule = format!("must be at least service_s = {}, or no victim can be rescued", task.service_s);
+        return broken(&key("deadline_s"), &low, &rule);
+    }
+    Ok(())
 }

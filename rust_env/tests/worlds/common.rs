@@ -8,8 +8,8 @@ use innerattn_env::reward::{COMPONENTS, NUM_COMPONENTS};
 use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
-use innerattn_env::scenario::{Actions, Engine, Obstacle, Robot, Scenario, Shape};
-use innerattn_env::task::Rescue;
+use innerattn_env::scenario::{Actions, Deadline, Engine, Interrupted, Obstacle, Robot, Scenario, Shape};
+use innerattn_env::tasks::{Loss, Rescue};
 
 /// Every engine: each must keep every promise.
 pub const ENGINES: [Engine; 2] = [Engine::Rapier, Engine::Discs];
@@ -29,6 +29,7 @@ pub struct Table {
     pub terminated: Vec<bool>,
     pub truncated: Vec<bool>,
     pub rescues: Vec<Rescue>,
+    pub losses: Vec<Loss>,
 }
 
 impl Table {
@@ -44,6 +45,7 @@ impl Table {
             terminated: vec![false; options.num_envs],
             truncated: vec![false; options.num_envs],
             rescues: vec![],
+            losses: vec![],
             batch,
         };
         table.batch.reset(None, None, &mut table.obs);
@@ -60,6 +62,7 @@ impl Table {
             truncated: &mut self.truncated,
         };
         self.rescues = self.batch.step(commands, buffers)?;
+        self.losses = self.batch.losses().copied().collect();
         Ok(())
     }
 
@@ -100,6 +103,10 @@ impl Table {
             bits.extend([rescue.victim, rescue.task]);
             bits.extend(rescue.helpers.iter().map(|helper| helper.map_or(u32::MAX, u32::from)));
         }
+        for loss in self.losses.iter().filter(|loss| (from..to).contains(&(loss.env as usize))) {
+            bits.extend([loss.env - from as u32, loss.episode as u32, loss.step, loss.slot]);
+            bits.extend([loss.victim, loss.task]);
+        }
         bits
     }
 }
@@ -139,6 +146,17 @@ pub fn mixed_team(count: usize) -> Vec<Robot> {
             ..like[index % like.len()].clone()
         })
         .collect()
+}
+
+/// The same with victims that take time: the first task's keep their service, the others' start anew, and
+/// all are lost after a while.
+pub fn with_times(mut scenario: Scenario) -> Scenario {
+    for (index, task) in scenario.tasks.iter_mut().enumerate() {
+        task.service_s = 2.5 * scenario.dt_s;
+        task.service = if index == 0 { Interrupted::Keep } else { Interrupted::Restart };
+        task.deadline_s = Some(Deadline::Between([4.0 * scenario.dt_s, 12.0 * scenario.dt_s]));
+    }
+    Scenario { rescue_radius_m: 0.4, lost_cost: 0.5, ..scenario }
 }
 
 /// A disc at a random place, a box at a random place, and a box that stays.

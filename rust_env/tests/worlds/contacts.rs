@@ -9,6 +9,7 @@ use innerattn_env::rng::Stream;
 use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Engine, Scenario};
+use innerattn_env::tasks::Events;
 use innerattn_env::world::World;
 
 use crate::common::{ENGINES, chance, mixed_team, some_obstacles};
@@ -212,7 +213,7 @@ fn a_step_of_discs_ends_whatever_the_speed_limits() {
         let count = robots.len();
         let scenario = Scenario { engine: Engine::Discs, robots, obstacles, ..Scenario::default() };
         let rules = Rules::new(scenario).expect("a valid scenario");
-        let (mut workspace, mut rescues) = (Workspace::default(), vec![]);
+        let (mut workspace, mut events) = (Workspace::default(), Events::default());
         for limit in [-1.0, -0.01, -30.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38, -1e38] {
             for stream in 0..100 {
                 let mut world = World::new(&rules, 0, stream);
@@ -232,7 +233,7 @@ fn a_step_of_discs_ends_whatever_the_speed_limits() {
                         &mut workspace,
                         commands,
                         0,
-                        &mut rescues,
+                        &mut events,
                         &mut components,
                         &mut reward,
                     );

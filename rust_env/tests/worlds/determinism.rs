@@ -5,7 +5,7 @@ use innerattn_env::batch::Options;
 use innerattn_env::scenario::{Actions, Scenario, Shaping, Situation};
 
 use crate::common::{
-    ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
+    ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_times,
 };
 
 const STEPS: usize = 150;
@@ -30,8 +30,9 @@ fn scenarios() -> Vec<Scenario> {
             robots: mixed_team(12),
             shaping: Shaping::Potential,
             end_when_rescued: Some(2),
-            ..tight
+            ..tight.clone()
         },
+        with_times(tight),
     ];
     let by = |engine| scenarios.clone().map(|scenario| Scenario { engine, ..scenario });
     ENGINES.into_iter().flat_map(by).collect()

@@ -96,7 +96,7 @@ fn extreme(source: &mut Stream) -> Scenario {
         situation: one_of(source, &[Situation::Single, Situation::Mixed]),
         obstacles: (0..obstacles).map(|_| obstacle(source, half)).collect(),
         robots,
-        tasks: vec![Task { name: "task".into(), needs: vec!["aid".into()] }],
+        tasks: vec![Task::new("task", vec!["aid".into()])],
         arena_half_width_m: half,
         rescue_radius_m: 10.0,
         spawn_clearance_m: 0.0,

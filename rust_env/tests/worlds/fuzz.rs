@@ -13,7 +13,7 @@ use innerattn_env::scenario::{Actions, Engine, Scenario};
 use serde_json::{Value, json};
 
 use crate::common::{
-    ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
+    ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_times,
 };
 
 const ENVS: usize = 2;
@@ -49,6 +49,7 @@ fn scenarios() -> Vec<Scenario> {
                 observe_faults: true,
                 ..tight.clone()
             },
+            with_times(Scenario { engine, ..tight.clone() }),
         ]
     };
     ENGINES.into_iter().flat_map(with).collect()

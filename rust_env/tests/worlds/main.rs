@@ -15,4 +15,5 @@ mod fuzz;
 mod snapshot;
 mod speed;
 mod structure;
+mod tasks;
 mod victims;

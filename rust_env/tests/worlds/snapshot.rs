@@ -5,7 +5,9 @@ use innerattn_env::batch::{Autoreset, Options};
 use innerattn_env::scenario::{Scenario, Situation};
 use proptest::prelude::*;
 
-use crate::common::{Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles};
+use crate::common::{
+    Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_times,
+};
 
 const ENVS: usize = 6;
 
@@ -21,8 +23,9 @@ fn scenarios() -> Vec<Scenario> {
             max_victims: 5,
             end_when_rescued: Some(3),
             contact_cost: 1.0,
-            ..tight
+            ..tight.clone()
         },
+        with_times(tight),
     ]
 }
 

@@ -1,7 +1,7 @@
 use innerattn_env::reward::{Component, Happened};
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{MAX_NEEDS, Scenario};
-use innerattn_env::task::Rescue;
+use innerattn_env::tasks::Rescue;
 
 const TEAMWORK: Component = Component {
     name: "teamwork",
@@ -26,6 +26,7 @@ fn helpers_are_paid_for_each_other() {
     let rescue = Rescue { env: 0, episode: 0, step: 7, slot: 0, victim: 2, task: 0, helpers };
     let happened = Happened {
         rescues: &[rescue],
+        losses: &[],
         distance_before: 2.0,
         distance_after: 1.5,
         touched: 0b0000,

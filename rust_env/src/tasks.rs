@@ -1,4 +1,11 @@
-//! Victims and the rescue rule: who is present, what it needs, and which robots rescue it.
+//! Victims and what becomes of them: who is present, what it needs, which robots rescue it. How long that
+//! takes is in `service.rs`, until when there is time in `deadline.rs`.
+//!
+//! A step settles them in this order: robots have moved; slot by slot, service goes on and victims are
+//! rescued; those whose deadline has come are lost; new ones appear.
+
+pub mod deadline;
+pub mod service;
 
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +25,29 @@ pub struct Victim {
     pub appeared_step: u32,
     /// Where it is, m.
     pub position: Vec2,
+    /// Steps of service that it has had. Images have it apart, where a scenario has services.
+    #[serde(skip)]
+    pub served_steps: u32,
+    /// Steps done in the episode when it is lost; never for `u32::MAX`. It follows from the rest.
+    #[serde(skip, default = "never")]
+    pub deadline_step: u32,
+}
+
+fn never() -> u32 {
+    u32::MAX
+}
+
+impl Victim {
+    /// A victim that appears now: not served yet, and lost never, until its deadline is set.
+    #[must_use]
+    pub fn new(id: u32, task: u32, appeared_step: u32, position: Vec2) -> Self {
+        Self { id, task, appeared_step, position, served_steps: 0, deadline_step: never() }
+    }
+}
+
+/// Control steps until `seconds` have passed: the first whole number of periods that reaches them.
+fn steps_of(seconds: f64, dt_s: f64) -> u32 {
+    (seconds / dt_s * (1.0 - 1e-12)).ceil() as u32 // 0.3 / 0.1 is a little more than 3
 }
 
 /// A task's needs as ability numbers, in the order the scenario names them.
@@ -146,6 +176,40 @@ pub struct Rescue {
     pub task: u32,
     /// Helpers, one for each need.
     pub helpers: [Option<u8>; MAX_NEEDS],
+}
+
+/// A victim that was lost: which, and when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Loss {
+    /// Index of the env in the batch.
+    pub env: u32,
+    /// Episode of that env, from 0.
+    pub episode: u64,
+    /// Step of the episode, from 0.
+    pub step: u32,
+    /// Slot in which the victim was.
+    pub slot: u32,
+    /// The victim's number within the episode.
+    pub victim: u32,
+    /// Index of its task.
+    pub task: u32,
+}
+
+/// What became of victims in a step.
+#[derive(Debug, Clone, Default)]
+pub struct Events {
+    /// Those that were rescued.
+    pub rescues: Vec<Rescue>,
+    /// Those that were lost.
+    pub losses: Vec<Loss>,
+}
+
+impl Events {
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.rescues.clear();
+        self.losses.clear();
+    }
 }
 
 #[cfg(test)]

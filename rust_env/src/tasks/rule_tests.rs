@@ -20,8 +20,7 @@ fn team_and_needs(abilities: &[u32], needs: &[usize]) -> (Vec<Body>, Needs) {
     // So that every ability has a number even if nobody near has it.
     robots.push(Robot { abilities: names(7), ..like });
     let needs = needs.iter().map(|need| ABILITIES[*need].to_string()).collect();
-    let scenario =
-        Scenario { robots, tasks: vec![Task { name: "task".into(), needs }], ..Scenario::default() };
+    let scenario = Scenario { robots, tasks: vec![Task::new("task", needs)], ..Scenario::default() };
     let mut team = bodies(&scenario);
     team.pop();
     (team, Needs::of_tasks(&scenario).remove(0))
