@@ -152,6 +152,12 @@ class Batch:
             innerattn.errors.WorldError: worlds failed in this step; all others have done it.
         """
 
+    def lost(self) -> NDArray[np.void]:
+        """Victims lost in the last step, (n,) structured int64.
+
+        Fields: env, episode, step, slot, victim, task.
+        """
+
     def _panic_in_next_step(self, envs: Sequence[int]) -> None:
         """For tests: let these worlds fail in the next step."""
 

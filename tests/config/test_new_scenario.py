@@ -34,7 +34,15 @@ def test_every_key_stands_in_it_with_its_meaning() -> None:
 
 @pytest.mark.parametrize(
     "key",
-    ["end_when_rescued", "victim_area_m", "victim_places_m", "start_m", "obstacles", "faults"],
+    [
+        "end_when_rescued",
+        "victim_area_m",
+        "victim_places_m",
+        "start_m",
+        "obstacles",
+        "faults",
+        "deadline_s",
+    ],
 )
 def test_each_example_may_be_used(key: str, tmp_path: Path) -> None:
     lines, inside = [], False
@@ -45,5 +53,5 @@ def test_each_example_may_be_used(key: str, tmp_path: Path) -> None:
     file.write_text("\n".join(lines))
     scenario = Scenario.from_toml(file)
     assert scenario != Scenario()
-    changed = scenario.robots[0].start_m if key == "start_m" else getattr(scenario, key)
-    assert changed
+    first = {"start_m": scenario.robots[0], "deadline_s": scenario.tasks[0]}
+    assert getattr(first.get(key, scenario), key)

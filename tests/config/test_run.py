@@ -242,7 +242,7 @@ def test_what_a_run_depends_on(method: str, warm_start: str, unused: set[str]) -
 
 
 ADDED_SINCE = {
-    "scenario": ("victim_area_m", "victim_places_m"),
+    "scenario": ("victim_area_m", "victim_places_m", "lost_cost"),
     "network": ("swapped_robots", "shared_gradients", "joint_critic", "symmetry"),
     "train": (
         *("episode_steps", "engine", "stagger_starts", "schedule"),
@@ -261,6 +261,9 @@ def test_a_digest_is_that_of_the_values_in_use() -> None:
             del values[section][name]  # at its default
     for robot in values["scenario"]["robots"]:
         del robot["start_m"]
+    for task in values["scenario"]["tasks"]:
+        for name in ("service_s", "service", "deadline_s"):
+            del task[name]
     text = json.dumps(values, sort_keys=True, separators=(",", ":"))
     assert config.digest() == hashlib.sha256(text.encode()).hexdigest()
     for unused in ({"ppo": {"epochs": 1}}, {"imitation": {"env_steps": 1}}):

@@ -1,8 +1,8 @@
 """A second, plain reading of the rescue world in float64, to hold the compiled one against.
 
-It covers motion without contacts, the rescue rule, rewards, observations and the faults that need
-no random numbers. It draws nothing: starts, and the places of new victims, are taken from the world
-that is checked.
+It covers motion without contacts, the rescue rule, services and deadlines, rewards, observations
+and the faults that need no random numbers. It draws nothing: starts, and the places and deadlines
+of new victims, are taken from the world that is checked.
 """
 
 from __future__ import annotations
@@ -25,13 +25,14 @@ DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], dtype=np.float
 @dataclass
 class State:
     """E worlds: places and velocities (E, R, 2), obstacles (E, O, 2), victims (E, V) and faults
-    (E, R) structured."""
+    (E, R) structured, steps done (E,)."""
 
     positions: Array
     velocities: Array
     obstacles: Array
     victims: NDArray[np.void]
     faults: NDArray[np.void]
+    steps: NDArray[np.int64]
 
     @property
     def available(self) -> Bools:
@@ -61,8 +62,23 @@ class Stepper:
         self.able = self.able.reshape(len(robots), len(self.abilities))
         self.counts = np.array([[task.needs.count(a) for a in self.abilities] for task in tasks])
         self.helps = (self.able[:, None, :] & (self.counts > 0)).any(-1)  # (R, T)
+        # Least whole numbers of periods that last at least so long, up to rounding.
+        self.service = np.array([self._periods(task.service_s) for task in tasks])
+        self.restarts = np.array([task.service == "restart" for task in tasks])
         everyone = range(len(robots))
         self.others = np.array([[j for j in everyone if j != i] for i in everyone], dtype=int)
+
+    def _periods(self, seconds: float) -> int:
+        periods = round(seconds / self.scenario.dt_s)
+        return periods if periods * self.scenario.dt_s > seconds - 1e-9 else periods + 1
+
+    def deadline_range(self, task: int) -> tuple[int, int] | None:
+        """Fewest and most steps until a victim of the task is lost."""
+        given = self.scenario.tasks[task].deadline_s
+        if given is None:
+            return None
+        low, high = given if isinstance(given, tuple) else (given, given)
+        return self._periods(low), self._periods(high)
 
     def drive(self, actions: NDArray[Any]) -> Array:
         """Directions whose length is the share of full force, (E, R, 2)."""
@@ -121,8 +137,9 @@ class Stepper:
                 total += np.where(mine, nearest, 0.0).sum(-1)
         return total
 
-    def rescues(self, state: State, positions: Array) -> tuple[list[tuple[int, ...]], Bools]:
-        """(env, slot, helpers...) of all rescues; worlds in which rounding might decide, (E,)."""
+    def met(self, state: State, positions: Array) -> tuple[list[tuple[int, ...]], Bools]:
+        """(env, slot, helpers...) of all victims whose needs are met; worlds in which rounding
+        might decide, (E,)."""
         radius = self.scenario.rescue_radius_m
         distances = self.distances(state, positions)
         close = abs(distances - radius) < 1e-5
@@ -143,6 +160,29 @@ class Stepper:
                     found.append((int(env), int(slot), *helpers))
         return found, unsure
 
+    def settle(
+        self, state: State, met: list[tuple[int, ...]]
+    ) -> tuple[list[tuple[int, ...]], Bools, NDArray[np.int64]]:
+        """What becomes of victims in a step: the rescues among those that are met, the lost (E, V),
+        and the steps of service that each victim has had then (E, V)."""
+        shape = state.victims.shape
+        task = np.where(state.present, state.victims["task"], 0)
+        served = np.zeros(shape, dtype=int)
+        if self.service.any():
+            served = np.rint(state.victims["served"] * np.maximum(self.service[task], 1)).astype(
+                int
+            )
+        helped = np.zeros(shape, dtype=bool)
+        for env, slot, *_ in met:
+            helped[env, slot] = True
+        served = np.where(helped, served + 1, np.where(self.restarts[task], 0, served))
+        done = helped & (served >= self.service[task])
+        lost = np.zeros(shape, dtype=bool)
+        if any(one.deadline_s is not None for one in self.scenario.tasks):
+            due = state.victims["deadline_step"]
+            lost = state.present & ~done & (due >= 0) & (state.steps[:, None] + 1 >= due)
+        return [row for row in met if done[row[0], row[1]]], lost, served
+
     def _first_team(self, needs: tuple[str, ...], nearest_first: list[int]) -> tuple[int, ...]:
         """The first of all teams in order of nearness, need by need, that fills every need."""
         # Others take at most len(needs) - 1 robots, so nobody farther is ever needed.
@@ -161,6 +201,7 @@ class Stepper:
         after: State,
         drive: Array,
         rescues: list[tuple[int, ...]],
+        lost: Bools,
         terminated: Bools,
     ) -> dict[str, Array]:
         """Rewards by component but for the contact's, each (E, R)."""
@@ -180,6 +221,7 @@ class Stepper:
             "rescue": rescue,
             "progress": np.broadcast_to((scenario.shaping_weight * dense)[:, None], rescue.shape),
             "action": -scenario.action_cost * (drive**2).sum(-1) * before.available,
+            "lost": np.broadcast_to(-scenario.lost_cost * lost.sum(1)[:, None], rescue.shape),
         }
 
     def observations(self, state: State) -> tuple[Array, Bools]:
@@ -209,7 +251,12 @@ class Stepper:
         there = np.broadcast_to(state.present[:, None], distance.shape)
         needs = self.counts[state.victims["task"]]  # absent ones are blanked below
         needs = np.broadcast_to(needs[:, None], (*distance.shape, needs.shape[-1]))
-        blocks = np.concatenate([there[..., None], needs, place], axis=-1) * there[..., None]
+        times = [
+            np.broadcast_to(values[:, None, :, None], (*distance.shape, 1))
+            for values in self._times_seen(state)
+        ]
+        blocks = np.concatenate([there[..., None], needs, place, *times], axis=-1)
+        blocks = blocks * there[..., None]
         unsure = np.zeros((envs, robots), dtype=bool)
         if self.scenario.victim_order == "relevant":
             helped = self.helps[:, state.victims["task"]].transpose(1, 0, 2)
@@ -221,6 +268,18 @@ class Stepper:
             tied = (np.diff(sort[0], axis=-1) == 0) & (np.diff(sort[1], axis=-1) < 1e-5)
             unsure = (tied & (sort[0][..., 1:] < 2)).any(-1)
         return blocks.reshape(envs, robots, -1), unsure
+
+    def _times_seen(self, state: State) -> list[Array]:
+        """The columns of services and deadlines, those that the scenario has, each (E, V)."""
+        found = []
+        if self.service.any():
+            found.append(state.victims["served"].astype(np.float64))
+        ranges = [self.deadline_range(task) for task in range(len(self.scenario.tasks))]
+        if longest := max((high for _, high in filter(None, ranges)), default=0):
+            due = state.victims["deadline_step"]
+            left = np.clip((due - state.steps[:, None]) / longest, 0.0, 1.0)
+            found.append(np.where(due < 0, 1.0, left))
+        return found
 
 
 def closest(apart: Array, motion: Array) -> Array:

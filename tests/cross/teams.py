@@ -72,3 +72,18 @@ def random_scenario(rng: np.random.Generator) -> Scenario:
             "victim_order": pick("relevant", "slot"),
         }
     )
+
+
+def with_times(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, whose tasks have services and deadlines of some kind."""
+    services = (0.0, 0.1, 0.25, 0.4)
+    deadlines = (None, 0.4, (0.4, 1.0), (0.5, 0.5))
+    tasks = tuple(
+        task.replace(
+            service_s=services[rng.integers(len(services))],
+            service=("keep", "restart")[rng.integers(2)],
+            deadline_s=deadlines[rng.integers(len(deadlines))],
+        )
+        for task in scenario.tasks
+    )
+    return scenario.replace(tasks=tasks, lost_cost=float(rng.integers(2)) / 2)

@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from stepper import State, Stepper
-from teams import random_scenario
+from teams import random_scenario, with_times
 
 from innerattn.config import Scenario, Task
 from innerattn.envs import BatchEnv
@@ -23,6 +23,7 @@ def state_of(env: BatchEnv) -> State:
         env.obstacles().astype(np.float64),
         env.victims(),
         env.fault_state(),
+        env.step_counts(),
     )
 
 
@@ -63,14 +64,16 @@ def random_faults(rng: np.random.Generator, healthy: np.ndarray) -> np.ndarray:
 def check_victims(
     env: BatchEnv, before: State, after: State, gone: np.ndarray, given: np.ndarray
 ) -> int:
-    """Checks who is there after a step in which the victims of `gone` (E, V) were rescued.
+    """Checks who is there after a step in which the victims of `gone` (E, V) were rescued or lost.
 
     Before it, `given` (E,) victims had appeared in the episode. Returns how many are new.
     """
     scenario = env.scenario
     old, new = before.victims, after.victims
     stays = old["present"] & ~gone
-    assert (new[stays] == old[stays]).all()
+    for name in ("id", "task", "appeared_step", "x", "y", "deadline_step"):
+        if name in new.dtype.names:
+            assert (new[name][stays] == old[name][stays]).all()
     empty = ~stays.any(1) if scenario.situation == "mixed" else (~stays).any(1)
     assert (new["present"][~empty] == stays[~empty]).all()
     fresh = new["present"] & ~stays
@@ -88,6 +91,12 @@ def check_victims(
     # Numbers go on from the last one given, in order of slots.
     order = np.cumsum(fresh, axis=1)[fresh] - 1
     assert (new["id"][fresh] == given[envs] + order).all()
+    if scenario.has_deadlines:
+        plain = Stepper(scenario)
+        for victim in new[fresh]:
+            waits = int(victim["deadline_step"] - victim["appeared_step"])
+            low, high = plain.deadline_range(victim["task"]) or (0, 0)
+            assert low <= waits <= high if high else victim["deadline_step"] == -1
     at = after.places[fresh]
     assert (abs(at) <= scenario.arena_half_width_m - scenario.wall_clearance_m + EXACT).all()
     apart = np.linalg.norm(after.positions[envs] - at[:, None], axis=-1)
@@ -125,7 +134,8 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         assert_close(after.positions[free], positions[free], "positions")
         assert_close(after.velocities[free], velocities[free], "velocities", scale=3.0)
 
-        expected, unsure = plain.rescues(before, after.positions)
+        met, unsure = plain.met(before, after.positions)
+        expected, lost, served = plain.settle(before, met)
         found = [
             (int(row["env"]), int(row["slot"]), *(h for h in row.tolist()[6:] if h >= 0))
             for row in result.rescues
@@ -138,12 +148,26 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
             assert row["step"] == steps[row["env"]]
             assert row["episode"] == env.episodes()[row["env"]]
         gone = np.zeros(before.victims.shape, dtype=bool)
+        losses = env.lost()
+        gone[losses["env"], losses["slot"]] = True
+        assert (gone == lost)[~unsure].all()
+        assert (losses["victim"] == before.victims["id"][losses["env"], losses["slot"]]).all()
+        assert (losses["task"] == before.victims["task"][losses["env"], losses["slot"]]).all()
+        assert (losses["step"] == steps[losses["env"]]).all()
+        assert (losses["episode"] == env.episodes()[losses["env"]]).all()
+        lost = gone.copy()  # as the worlds have it, where rounding decides
         for world, slot, *_ in found:
             gone[world, slot] = True
             rescued[world] += 1
         assert (env.step_counts() == steps + 1).all()
         seen["appeared"] += check_victims(env, before, after, gone, given)
         given = np.maximum(given, after.victims["id"].max(1) + 1)
+        if plain.service.any():
+            stays = before.present & ~gone & ~unsure[:, None]
+            needed = np.maximum(plain.service[before.victims["task"]], 1)
+            assert_close(after.victims["served"][stays], (served / needed)[stays], "service")
+            seen["served"] += int(((served > 0) & stays).sum())
+        seen["lost"] += int(lost.sum())
 
         goal = scenario.end_when_rescued
         terminated = rescued >= goal if goal else np.zeros(num_envs, dtype=bool)
@@ -155,7 +179,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         touched = contact != 0
         assert np.isin(contact, [0.0, np.float32(-scenario.contact_cost)]).all()
         assert not touched[free].any()
-        rewards = plain.reward_components(before, after, drive, found, terminated)
+        rewards = plain.reward_components(before, after, drive, found, lost, terminated)
         rewards["contact"] = contact
         wanted = np.stack([rewards[name] for name in env.reward_component_names], axis=-1)
         # Sums of float32 distances are as exact as the sums are large.
@@ -166,7 +190,8 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         ended = result.terminated | result.truncated
         assert (after.faults[~ended] == before.faults[~ended]).all()
         rows, tied = plain.observations(after)
-        block = rows.shape[-1] - before.victims.shape[1] * (3 + len(plain.abilities))
+        times = scenario.has_services + scenario.has_deadlines
+        block = rows.shape[-1] - before.victims.shape[1] * (3 + len(plain.abilities) + times)
         scale = scenario.arena_half_width_m
         assert_close(result.obs[..., :block], rows[..., :block], "observation", scale)
         assert_close(result.obs[~tied], rows[~tied], "observation of victims", scale)
@@ -202,6 +227,20 @@ def test_worlds_are_as_the_plain_stepper_says(chunk: int) -> None:
     assert total["free"] > 0.5 * total["transitions"]
     assert total["unsure"] < 0.02 * total["transitions"]
     for what in ("touched", "rescues", "appeared", "together", "unavailable"):
+        assert total[what] > 50, (what, total)
+
+
+@pytest.mark.parametrize("chunk", range(3))
+def test_worlds_with_services_and_deadlines_are_as_the_plain_stepper_says(chunk: int) -> None:
+    total: Counter[str] = Counter()
+    rng = np.random.default_rng(200 + chunk)
+    while total["transitions"] < 12_000:
+        scenario = with_times(random_scenario(rng), rng)
+        some = min(1000, 20_000 // len(scenario.robots))
+        seed = int(rng.integers(2**32))
+        total += compare(scenario, seed, some, faulty=seed % 3 == 0)
+    assert total["unsure"] < 0.02 * total["transitions"]
+    for what in ("rescues", "appeared", "served", "lost"):
         assert total[what] > 50, (what, total)
 
 

@@ -25,6 +25,7 @@ _EXAMPLES: dict[str, Any] = {
     "victim_area_m": [-0.5, -0.5, 0.5, 0.5],
     "victim_places_m": [[0.5, 0.5], [-0.5, 0.5], [0.0, -0.5]],
 }
+_OF_TABLES = {"robots": ("start_m", [-0.5, 0.0]), "tasks": ("deadline_s", [10.0, 20.0])}
 _TABLES: dict[str, dict[str, Any]] = {
     "obstacles": {"shape": "box", "half_extents_m": [0.3, 0.05], "position_m": [0.0, 0.4]},
     "faults": {"robot": "food_0", "kind": "motor_gain", "value": 0.3, "onset_step": 10},
@@ -45,7 +46,7 @@ def new_scenario(name: str, file: str) -> str:
         value, comment = getattr(default, key), _comment(info.description or "", "# ")
         if isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
             first, *others = (one.model_dump(mode="json", exclude_none=True) for one in value)
-            example = f"#{_line('start_m', [-0.5, 0.0])}" if key == "robots" else ""
+            example = "#" + _line(*_OF_TABLES[key])
             team = [_table(key, first) + example, *(_table(key, one) for one in others)]
             tables.append(comment + _keys(type(value[0])) + "\n".join(team))
         elif key in _TABLES:

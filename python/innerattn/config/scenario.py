@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, PrivateAttr, ValidationError
+from pydantic import Field, PrivateAttr, ValidationError, field_validator
+from pydantic_core import PydanticCustomError
 
 from innerattn import _core
 from innerattn.config.files import preset_names, preset_table, toml_table
@@ -48,6 +49,9 @@ class Robot(Model):
     )
 
 
+_Seconds = Annotated[float, Told(0.001, 1e6)]
+
+
 class Task(Model):
     """One kind of emergency: the abilities a victim needs, each from a robot of its own."""
 
@@ -55,6 +59,34 @@ class Task(Model):
     needs: Annotated[tuple[str, ...], Told(1, 8)] = Field(
         description="needed abilities; the same may stand twice"
     )
+    service_s: Annotated[float, ADDED_LATER, Told(0.0, 1e6)] = Field(
+        0.0,
+        description="how long all needs must be met before a victim is rescued [s]; 0: rescued at "
+        "touch",
+    )
+    service: Annotated[Literal["keep", "restart"], ADDED_LATER] = Field(
+        "keep",
+        description="what happens to a service when the needs are not met any more; keep: it goes "
+        "on later; restart: it starts anew",
+    )
+    deadline_s: Annotated[_Seconds | tuple[_Seconds, _Seconds] | None, ADDED_LATER] = Field(
+        None,
+        description="how long after it appeared a victim is lost, a number or a pair [low, high] "
+        "that each victim's is drawn from [s]; None: never",
+    )
+
+    @field_validator("deadline_s", mode="before")
+    @classmethod
+    def _number_or_pair(cls, value: object) -> object:
+        if isinstance(value, (list, tuple)) and len(value) != 2:
+            raise PydanticCustomError("type", "Input should be a number or a pair [low, high]")
+        return value
+
+    @property
+    def deadlines_s(self) -> tuple[float, float] | None:
+        """The least and the largest deadline [s]."""
+        one = self.deadline_s
+        return (one, one) if isinstance(one, float) else one
 
 
 class Obstacle(Model):
@@ -245,6 +277,9 @@ class Scenario(Model, Shown):
     action_cost: Annotated[float, Told(-1e6, 1e6)] = Field(
         0.0, description="cost of a control step with the drive on"
     )
+    lost_cost: Annotated[float, ADDED_LATER, Told(-1e6, 1e6)] = Field(
+        0.0, description="cost of a lost victim, for every robot"
+    )
     victim_order: Literal["relevant", "slot"] = Field(
         "relevant",
         description="order of victims in an observation; relevant: helpable first, then nearest",
@@ -317,3 +352,13 @@ class Scenario(Model, Shown):
     def num_victims(self) -> int:
         """Number of victim slots V."""
         return self._rules.num_victims
+
+    @property
+    def has_services(self) -> bool:
+        """Whether the rescue of some victims takes time."""
+        return any(task.service_s > 0.0 for task in self.tasks)
+
+    @property
+    def has_deadlines(self) -> bool:
+        """Whether some victims can be lost."""
+        return any(task.deadline_s is not None for task in self.tasks)

@@ -30,6 +30,14 @@ _VICTIM_DTYPE = np.dtype(
 )
 
 
+def victim_dtype(scenario: Scenario) -> np.dtype[np.void]:
+    """The fields of `BatchEnv.victims`."""
+    fields = list(_VICTIM_DTYPE.descr)
+    fields += [("served", "f4")] * scenario.has_services
+    fields += [("deadline_step", "i8")] * scenario.has_deadlines
+    return np.dtype(fields)
+
+
 FAULT_KINDS: tuple[str, ...] = tuple(name for name, *_ in _core.FAULT_KINDS)
 """Kinds of faults; `BatchEnv.fault_state` has a field for each."""
 _FAULT_DTYPE = np.dtype([(kind, "f4") for kind in FAULT_KINDS])
@@ -198,13 +206,28 @@ class BatchEnv(Shown):
         return self._core.obstacles()
 
     def victims(self) -> NDArray[np.void]:
-        """Victims by slot, (E, V) structured: present, task, id, appeared_step, x, y (m)."""
+        """Victims by slot, (E, V) structured: present, task, id, appeared_step, x, y (m).
+
+        Where the scenario has services also ``served``, the share of its service that a victim has
+        had, and where it has deadlines ``deadline_step``, the steps done in the episode when it is
+        lost (-1: never). A slot without a victim has 0 and -1.
+        """
         numbers, places = self._core.victims()
-        table = np.empty(numbers.shape[:2], dtype=_VICTIM_DTYPE)
-        for column, name in enumerate(("present", "task", "id", "appeared_step")):
-            table[name] = numbers[..., column]
-        table["x"], table["y"] = places[..., 0], places[..., 1]
+        table = np.empty(numbers.shape[:2], dtype=victim_dtype(self.scenario))
+        columns = ("present", "task", "id", "appeared_step", "deadline_step")
+        sources = [*zip(columns, np.moveaxis(numbers, -1, 0), strict=True)]
+        sources += zip(("x", "y", "served"), np.moveaxis(places, -1, 0), strict=True)
+        for name, values in sources:
+            if name in (table.dtype.names or ()):
+                table[name] = values
         return table
+
+    def lost(self) -> NDArray[np.void]:
+        """Victims lost in the last step, (n,) structured int64.
+
+        Fields: env, episode, step, slot, victim, task, as those of `Step.rescues`.
+        """
+        return self._core.lost()
 
     def step_counts(self) -> NDArray[np.int64]:
         """Steps done in each world's episode, (E,) int64."""
@@ -228,11 +251,17 @@ class BatchEnv(Shown):
         """The whole of each world, (E, S) float32, world frame, for centralised critics.
 
         Columns are `state_names`: for each robot x, y [m] and x, y velocity [m/s]; for each victim
-        slot one column per task (1 where such a victim is present), x, y [m]; for each obstacle
-        x, y [m]. Empty slots are zeros.
+        slot one column per task (1 where such a victim is present), x, y [m], and where the
+        scenario has them the share of its service that it has had, and the time that it has left as
+        a share of the longest deadline; for each obstacle x, y [m]. Empty slots are zeros.
         """
         return world_states(
-            self.positions(), self.velocities(), self.victims(), self.obstacles(), self.scenario
+            self.positions(),
+            self.velocities(),
+            self.victims(),
+            self.obstacles(),
+            self.step_counts(),
+            self.scenario,
         )
 
     def state_names(self) -> list[str]:
@@ -286,8 +315,9 @@ class BatchEnv(Shown):
     def set_victims(self, victims: NDArray[np.void]) -> None:
         """Move victims, change their tasks, and let new ones appear in empty slots.
 
-        A victim that is present stays until it is rescued; it keeps its id. A new one gets the next
-        id. Obstacles and robots are not looked at.
+        A victim that is present stays until it is rescued or lost; it keeps its id, the step at
+        which it appeared, and its service as long as it keeps its task. A new one gets the next id.
+        Obstacles and robots are not looked at.
 
         Args:
             victims: (E, V) structured with the fields of `victims`: take that array, change what is
@@ -303,7 +333,8 @@ class BatchEnv(Shown):
         wanted = f"must have shape ({self.num_envs}, {slots}) and the fields of victims()"
         if isinstance(victims, np.ma.MaskedArray):
             raise TypeError(f"victims is a masked array, whose mask would be lost: it {wanted}")
-        if not isinstance(victims, np.ndarray) or victims.dtype.names != _VICTIM_DTYPE.names:
+        fields = victim_dtype(self.scenario).names
+        if not isinstance(victims, np.ndarray) or victims.dtype.names != fields:
             given = isinstance(victims, np.ndarray)
             found = f"has dtype {victims.dtype}" if given else "is no array"
             raise TypeError(f"victims {found}: {wanted}")

@@ -46,6 +46,7 @@ def state_bounds(scenario: Scenario) -> Bounds:
         columns += [place, place, _both_ways(speed), _both_ways(speed)]
     for _ in range(scenario.num_victims):
         columns += [_FLAG] * len(scenario.tasks) + [place, place]
+        columns += [_FLAG] * (scenario.has_services + scenario.has_deadlines)
     columns += [place, place] * len(scenario.obstacles)
     return _as_arrays(columns)
 
@@ -69,6 +70,7 @@ def _observation_columns(scenario: Scenario, own: int, speeds: list[float]) -> I
             most = max(task.needs.count(ability) for task in scenario.tasks)
             yield 0.0, float(max(most, 1))
         yield from (_both_ways(2 * half + far), _both_ways(2 * half + far))
+        yield from [_FLAG] * (scenario.has_services + scenario.has_deadlines)
 
 
 def _most_speeds(scenario: Scenario) -> list[float]:

@@ -12,7 +12,7 @@ from innerattn.envs.aligned import aligned_empty
 
 
 def state_names(scenario: Scenario) -> list[str]:
-    """Names of the S columns of `world_states`; units are m and m/s."""
+    """Names of the S columns of `world_states`; units are m and m/s, shares have none."""
     robots = [
         f"{robot.name}.{quantity}.{axis}"
         for robot in scenario.robots
@@ -20,6 +20,7 @@ def state_names(scenario: Scenario) -> list[str]:
         for axis in ("x", "y")
     ]
     columns = [*(f"task.{task.name}" for task in scenario.tasks), "position.x", "position.y"]
+    columns += ["served"] * scenario.has_services + ["time_left"] * scenario.has_deadlines
     victims = [
         f"victim_{slot}.{column}" for slot in range(scenario.num_victims) for column in columns
     ]
@@ -36,6 +37,7 @@ def world_states(
     velocities: NDArray[np.float32],
     victims: NDArray[np.void],
     obstacles: NDArray[np.float32],
+    step_counts: NDArray[np.int64],
     scenario: Scenario,
 ) -> NDArray[np.float32]:
     """The states of E worlds.
@@ -43,8 +45,9 @@ def world_states(
     Args:
         positions: (E, R, 2) robots' centres [m].
         velocities: (E, R, 2) robots' velocities [m/s].
-        victims: (E, V) structured; fields ``present``, ``task``, ``x``, ``y`` [m] are used.
+        victims: (E, V) structured, the fields of `BatchEnv.victims`.
         obstacles: (E, O, 2) obstacles' centres [m].
+        step_counts: (E,) steps done in the episodes.
         scenario: the worlds' description.
 
     Returns:
@@ -53,11 +56,35 @@ def world_states(
     present = victims["present"]
     is_task = victims["task"][..., None] == np.arange(len(scenario.tasks))
     places = np.stack([victims["x"], victims["y"]], axis=-1) * present[..., None]
+    times = []
+    if scenario.has_services:
+        times.append((victims["served"] * present)[..., None])
+    if scenario.has_deadlines:
+        left = shares_left(scenario, victims, step_counts)
+        times.append((left * present)[..., None])
     parts = [
         np.concatenate([positions, velocities], axis=2),
-        np.concatenate([is_task & present[..., None], places], axis=2),
+        np.concatenate([is_task & present[..., None], places, *times], axis=2),
         obstacles,
     ]
     rows = [part.reshape(len(part), math.prod(part.shape[1:])) for part in parts]
     states = aligned_empty((len(positions), sum(row.shape[1] for row in rows)), np.float32)
     return np.concatenate(rows, axis=1, out=states)
+
+
+def shares_left(
+    scenario: Scenario, victims: NDArray[np.void], step_counts: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """Time that victims have left, as shares of the longest deadline, (E, V) float32.
+
+    It is 1 for a victim that is never lost.
+
+    Args:
+        scenario: one that has deadlines.
+        victims: (E, V) structured, the fields of `BatchEnv.victims`.
+        step_counts: (E,) steps done in the episodes.
+    """
+    longest_s = max(task.deadlines_s[1] for task in scenario.tasks if task.deadlines_s)
+    longest = math.ceil(longest_s / scenario.dt_s * (1.0 - 1e-12))
+    left = np.clip((victims["deadline_step"] - step_counts[:, None]) / longest, 0.0, 1.0)
+    return np.where(victims["deadline_step"] < 0, 1.0, left).astype(np.float32)

@@ -12,7 +12,7 @@ from innerattn import _core
 from innerattn.config import Scenario
 from innerattn.config.streams import stream_seed
 from innerattn.envs import BatchEnv
-from innerattn.evaluate.moment import Handoff, Moment, Rescue
+from innerattn.evaluate.moment import Handoff, Loss, Moment, Rescue
 from innerattn.evaluate.play import Attentive
 from innerattn.measures.moments import blocked_between
 from innerattn.policies import Policy, PolicyInput, WorldState
@@ -82,6 +82,7 @@ class InteractiveWorld:
             blocked=self._blocked,
             attention=self._attention,
             rescues=self._rescues,
+            lost=self._lost,
             handoffs=self._handoffs,
             rescued=self._rescued,
             helped=tuple(self._helped),
@@ -106,6 +107,7 @@ class InteractiveWorld:
             env.obstacles(),
         )[0]
         self._note(step.rescues)
+        self._note_lost(env.lost())
         self._choose()
 
     def restart(self) -> None:
@@ -219,6 +221,7 @@ class InteractiveWorld:
     def _nothing_happened(self) -> None:
         self._blocked = np.zeros(self.scenario.num_robots, np.bool_)
         self._rescues: tuple[Rescue, ...] = ()
+        self._lost: tuple[Loss, ...] = ()
         self._handoffs: tuple[Handoff, ...] = ()
 
     def _choose(self) -> None:
@@ -258,6 +261,10 @@ class InteractiveWorld:
                 self._last[robot] = rescue
         self._rescued += len(rescues)
         self._rescues, self._handoffs = tuple(rescues), tuple(found)
+
+    def _note_lost(self, events: NDArray[np.void]) -> None:
+        """Keep who was lost in a step."""
+        self._lost = tuple(Loss(*(int(event[name]) for name in Loss._fields)) for event in events)
 
     def _handed_over(self, robot: int, now: Rescue) -> list[Handoff]:
         """The handoff that a rescue completes for a robot, as `measures.sharing.handoff` has it."""

@@ -18,6 +18,14 @@ class Rescue(NamedTuple):
     helpers: tuple[int, ...]
 
 
+class Loss(NamedTuple):
+    """A victim that was lost: the step in which it was, the victim, and its task."""
+
+    step: int
+    victim: int
+    task: int
+
+
 class Handoff(NamedTuple):
     """A robot's partners in two rescues of different tasks that follow each other, and steps."""
 
@@ -45,6 +53,7 @@ class Moment:
         blocked: (R,) bool, whether something stopped the robot in the last step.
         attention: (H, R, R) float32 for the actions that come next; none: there is none.
         rescues: of the last step.
+        lost: victims that were lost in the last step.
         handoffs: that were completed in the last step.
         rescued: victims rescued in this episode.
         helped: (R,) rescues of this episode in which each robot helped.
@@ -62,6 +71,7 @@ class Moment:
     blocked: NDArray[np.bool_]
     attention: NDArray[np.float32] | None
     rescues: tuple[Rescue, ...]
+    lost: tuple[Loss, ...]
     handoffs: tuple[Handoff, ...]
     rescued: int
     helped: tuple[int, ...]

@@ -18,7 +18,7 @@ from innerattn.config import Scenario
 from innerattn.config.streams import Purpose, stream_seed
 from innerattn.envs import BatchEnv
 from innerattn.policies import Policy, PolicyInput, WorldState
-from innerattn.records.record import FIELDS, Record, rescue_dtype
+from innerattn.records.record import FIELDS, LOST_DTYPE, Record, rescue_dtype
 
 _WORLDS_AT_ONCE = 1024
 
@@ -101,7 +101,7 @@ def _run_batch(
     lengths = np.zeros(env.num_envs, np.int64)
     rewards_total = np.zeros((env.num_envs, env.num_robots, len(env.reward_component_names)))
     steps: dict[str, NDArray[Any]] = {}
-    events = []
+    rescues, lost = [], []
     state_needed = policy.needs_true_state or not set(record).isdisjoint(WorldState._fields)
     for step_index in range(total_steps):
         state = WorldState.of(env) if state_needed else None
@@ -121,7 +121,9 @@ def _run_batch(
         rewards_total[running] += rewards[running]
         lengths[running] += 1
         if len(step.rescues):
-            events.append(step.rescues[running[step.rescues["env"]]].copy())
+            rescues.append(step.rescues[running[step.rescues["env"]]].copy())
+        if env.scenario.has_deadlines and len(gone := env.lost()):
+            lost.append(gone[running[gone["env"]]])
         obs = step.obs
         running &= ~(step.terminated | step.truncated)
         if not running.any():
@@ -133,7 +135,8 @@ def _run_batch(
         seed=seed,
         first_episode=first_episode,
         lengths=lengths,
-        rescues=_events(events, env.scenario, first_episode),
+        rescues=_events(rescues, rescue_dtype(env.scenario), first_episode),
+        lost=_events(lost, LOST_DTYPE, first_episode),
         reward_names=tuple(env.reward_component_names),
         rewards_total=rewards_total,
         steps={name: steps[name] for name in FIELDS if name in steps},
@@ -155,10 +158,9 @@ def _keep(
 
 
 def _events(
-    found: list[NDArray[np.void]], scenario: Scenario, first_episode: int
+    found: list[NDArray[np.void]], dtype: np.dtype[np.void], first_episode: int
 ) -> NDArray[np.void]:
     """The environment's events of all steps, in the order of episodes, then of time."""
-    dtype = rescue_dtype(scenario)
     events = np.zeros(sum(map(len, found)), dtype)
     if found:
         raw = np.concatenate(found)
@@ -175,6 +177,7 @@ def _joined(parts: list[Record]) -> Record:
         parts[0],
         lengths=np.concatenate([part.lengths for part in parts]),
         rescues=np.concatenate([part.rescues for part in parts]),
+        lost=np.concatenate([part.lost for part in parts]),
         rewards_total=np.concatenate([part.rewards_total for part in parts]),
         steps={
             name: np.concatenate([part.steps[name] for part in parts]) for name in parts[0].steps

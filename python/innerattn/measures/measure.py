@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from innerattn.config import Scenario
 from innerattn.records.record import FIELDS, Record
 from innerattn.stats.estimate import Estimate
 
@@ -24,6 +25,7 @@ class Measure:
         needs: those of `innerattn.records.FIELDS` that must have been recorded step by step.
         is_count: it counts the events that other measures are over, so that its mean over runs
             says nothing.
+        applies: whether it can be said of a scenario; of others it is left out.
 
     Raises:
         ValueError: the name is no identifier, or a field that it needs cannot be recorded.
@@ -35,6 +37,7 @@ class Measure:
     of: Callable[[Record], Value]
     needs: tuple[str, ...] = ()
     is_count: bool = False
+    applies: Callable[[Scenario], bool] = lambda _: True
 
     def __post_init__(self) -> None:
         """Refuse what could not be stored or recorded."""

@@ -11,7 +11,7 @@ from itertools import takewhile
 
 import numpy as np
 
-from innerattn.measures import dispatch_quality, rescues, waiting
+from innerattn.measures import deadlines, dispatch_quality, rescues, waiting
 from innerattn.measures.measure import Measure, Value
 from innerattn.measures.sharing import imbalance
 from innerattn.records.record import Record
@@ -24,6 +24,7 @@ _BUILT_IN = (
     imbalance.IMBALANCE,
     *dispatch_quality.MEASURES,
     *waiting.MEASURES,
+    *deadlines.MEASURES,
 )
 
 
@@ -55,15 +56,19 @@ def measures_of(*parts: Record) -> dict[str, Value]:
             order; at least one record.
 
     Returns:
-        By the names of `MEASURES`; None where no part has what a measure needs, or the episodes do
-        not determine it.
+        By the names of those `MEASURES` that apply to the scenario; None where no part has what a
+        measure needs, or the episodes do not determine it.
 
     Raises:
         ValueError: the parts are not consecutive episodes of one policy.
     """
     _refuse_gaps(parts)
     joined = {needs: _with_fields(parts, needs) for needs in {m.needs for m in MEASURES.values()}}
-    return {name: _value(measure, joined[measure.needs]) for name, measure in MEASURES.items()}
+    return {
+        name: _value(measure, joined[measure.needs])
+        for name, measure in MEASURES.items()
+        if measure.applies(parts[0].scenario)
+    }
 
 
 def measure_of(name: str, *parts: Record) -> Value:
@@ -106,6 +111,7 @@ def _with_fields(parts: Sequence[Record], fields: tuple[str, ...]) -> Record | N
         having[0],
         lengths=np.concatenate([part.lengths for part in having]),
         rescues=np.concatenate([part.rescues for part in having]),
+        lost=np.concatenate([part.lost for part in having]),
         rewards_total=np.concatenate([part.rewards_total for part in having]),
         steps={name: np.concatenate([part.steps[name] for part in having]) for name in fields},
     )

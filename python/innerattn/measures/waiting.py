@@ -19,6 +19,7 @@ class Waiting:
     Attributes:
         rescued: how many victims were rescued.
         left: how many still waited when their episode ended; how long they would have is unknown.
+            Those that were lost before do not count.
         time_to_rescue_s: mean over those rescued [s]. It is short of the truth where many are left,
             since those that take long are.
         time_per_rescue_s: time waited by all, those left included, for each rescue [s]; the mean
@@ -55,7 +56,7 @@ def waiting(record: Record) -> Waiting:
     counts = record.rescue_counts()
     return Waiting(
         rescued=len(rescues),
-        left=seen - len(rescues),
+        left=seen - len(rescues) - len(record.lost),
         time_to_rescue_s=ratio_interval(times, counts),
         time_per_rescue_s=ratio_interval(waited, counts),
     )

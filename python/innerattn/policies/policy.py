@@ -17,19 +17,23 @@ class WorldState(NamedTuple):
     Attributes:
         positions: (E, R, 2) float32 [m].
         velocities: (E, R, 2) float32 [m/s].
-        victims: (E, V) structured: present, task, id, appeared_step, x, y [m].
+        victims: (E, V) structured, the fields of `BatchEnv.victims`.
         faults: (E, R) structured, the fields of `BatchEnv.fault_state`.
+        step_counts: (E,) int64 steps done in the episodes; deadlines are counted in them.
     """
 
     positions: NDArray[np.float32]
     velocities: NDArray[np.float32]
     victims: NDArray[np.void]
     faults: NDArray[np.void]
+    step_counts: NDArray[np.int64]
 
     @classmethod
     def of(cls, env: BatchEnv) -> Self:
         """The present state of the worlds of ``env``."""
-        return cls(env.positions(), env.velocities(), env.victims(), env.fault_state())
+        return cls(
+            env.positions(), env.velocities(), env.victims(), env.fault_state(), env.step_counts()
+        )
 
 
 class PolicyInput(NamedTuple):

@@ -14,13 +14,14 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
 from innerattn.config.files import write_whole
 from innerattn.config.untrusted import read_plain
 from innerattn.errors import RunError
-from innerattn.records.record import FIELDS, Length, Record, rescue_dtype
+from innerattn.records.record import FIELDS, LOST_DTYPE, Length, Record, rescue_dtype
 from innerattn.records.run_files import RunFiles
 from innerattn.records.tables import MOST_FILE_BYTES, read_table, table_bytes
 from innerattn.records.validity import refuse_impossible, step_dtype, step_shape
@@ -30,8 +31,10 @@ SCHEMA_VERSION = 1
 
 RECORD_FILES = _EPISODES, _RESCUES = "episodes.parquet", "rescues.parquet"
 
-_SUMS = ("record", "episode", "steps", "rescues", "reward")
-"""Columns of ``episodes.parquet`` that every record needs; the others are labels and steps."""
+_SUMS = ("record", "episode", "steps", "rescues", "reward", "lost")
+"""Columns of ``episodes.parquet`` that records are made of; the others are labels and steps. The
+last one is there only where a scenario has deadlines."""
+_OF_LOST = ("step", "slot", "victim", "task")
 _MOST_RECORDS = 1_000
 
 
@@ -39,8 +42,9 @@ def write_records(records: Sequence[Record], folder: Path) -> None:
     """Write ``episodes.parquet`` and ``rescues.parquet`` into ``folder``, which is made if needed.
 
     A row of the first holds policy, seed, episode, steps, rescues, reward sums by robot and
-    component, and what was recorded step by step, flattened; shapes and the scenario stand in the
-    file's metadata. A row of the second holds one event; helpers are named.
+    component, lost victims where the scenario has deadlines (step, slot, victim and task of each),
+    and what was recorded step by step, flattened; shapes and the scenario stand in the file's
+    metadata. A row of the second holds one event; helpers are named.
 
     Raises:
         OSError: the files cannot be written; each is written whole or not at all.
@@ -128,6 +132,8 @@ def _episode_table(index: int, record: Record) -> pa.Table:
         "rescues": pa.array(record.rescue_counts()),
         "reward": _lists(record.rewards_total),
     }
+    if record.scenario.has_deadlines:
+        columns["lost"] = _lost_lists(record)
     for name, values in record.steps.items():
         columns |= {column: _lists(part) for column, part in _parts(name, values)}
     return pa.table(columns)
@@ -147,6 +153,35 @@ def _lists(values: NDArray[Any]) -> pa.Array:
     flat = values.reshape(len(values), -1)
     offsets = np.arange(len(flat) + 1, dtype=np.int64) * flat.shape[1]
     return pa.LargeListArray.from_arrays(pa.array(offsets), pa.array(flat.ravel()))
+
+
+def _lost_lists(record: Record) -> pa.Array:
+    """The lost victims of each episode end to end: step, slot, victim, task."""
+    ends = np.searchsorted(
+        record.lost["episode"], record.first_episode + np.arange(record.num_episodes + 1)
+    )
+    flat = np.stack([record.lost[name] for name in _OF_LOST], -1).ravel()
+    return pa.LargeListArray.from_arrays(pa.array(ends * len(_OF_LOST)), pa.array(flat))
+
+
+def _lost(rows: pa.Table, scenario: Scenario, first_episode: int) -> NDArray[np.void]:
+    """What `_lost_lists` wrote.
+
+    Raises:
+        ValueError: it is missing, or no whole number of victims.
+    """
+    if not scenario.has_deadlines:
+        return np.empty(0, LOST_DTYPE)
+    column = rows["lost"].combine_chunks()
+    numbers = _arrays(rows["lost"]).reshape(-1, len(_OF_LOST))
+    sizes = np.asarray(pc.list_value_length(column).to_numpy(zero_copy_only=False))
+    if (sizes % len(_OF_LOST)).any():
+        raise ValueError("lost: must have four numbers for each victim")
+    lost = np.empty(len(numbers), LOST_DTYPE)
+    for at, name in enumerate(_OF_LOST):
+        lost[name] = numbers[:, at]
+    lost["episode"] = first_episode + np.repeat(np.arange(len(rows)), sizes // len(_OF_LOST))
+    return lost
 
 
 def _rescue_table(index: int, record: Record) -> pa.Table:
@@ -247,6 +282,7 @@ def _record(
         first_episode=int(_numbers(rows["episode"])[0]),
         lengths=lengths,
         rescues=_events(events, scenario, names),
+        lost=_lost(rows, scenario, int(_numbers(rows["episode"])[0])),
         reward_names=reward_names,
         rewards_total=_arrays(rows["reward"]).reshape(len(rows), len(names), len(reward_names)),
         length=length,

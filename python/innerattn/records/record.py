@@ -22,6 +22,11 @@ Length = Literal["standard", "long"]
 """The scenario's own length of an episode, or the second one that policies are measured at."""
 
 
+_EVENT = [(name, np.int64) for name in ("episode", "step", "slot", "victim", "task")]
+LOST_DTYPE = np.dtype(_EVENT)
+"""The fields of `Record.lost`."""
+
+
 @dataclass(frozen=True, repr=False)
 class Record(Shown):
     """Consecutive episodes of one policy.
@@ -38,6 +43,7 @@ class Record(Shown):
         lengths: (E,) int64 steps of each episode.
         rescues: (N,) structured int64: episode, step, slot, victim, task, helper_0, ...;
             helper_k filled the task's need k, -1 beyond its last need.
+        lost: (M,) structured int64: episode, step, slot, victim, task; victims that were lost.
         reward_names: C names of reward components.
         rewards_total: (E, R, C) float64 sum over the episode.
         length: which of an evaluation's two lengths of episodes this is.
@@ -56,6 +62,7 @@ class Record(Shown):
     reward_names: tuple[str, ...]
     rewards_total: NDArray[np.float64]
     length: Length = "standard"
+    lost: NDArray[np.void] = field(default_factory=lambda: np.empty(0, LOST_DTYPE))
     steps: dict[str, NDArray[Any]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -79,5 +86,4 @@ class Record(Shown):
 def rescue_dtype(scenario: Scenario) -> np.dtype[np.void]:
     """The fields of `Record.rescues`: as many helpers as any task has needs."""
     most = max(len(task.needs) for task in scenario.tasks)
-    names = ["episode", "step", "slot", "victim", "task", *(f"helper_{k}" for k in range(most))]
-    return np.dtype([(name, np.int64) for name in names])
+    return np.dtype([*_EVENT, *((f"helper_{k}", np.int64) for k in range(most))])

@@ -66,13 +66,14 @@ def refuse_impossible(record: Record) -> None:
     if record.robot_names != tuple(robot.name for robot in scenario.robots):
         raise ValueError("robot names: must be those of the scenario")
     _all_within("steps", record.lengths, 1, scenario.episode_steps)
-    events = record.rescues
-    episodes = events["episode"] - record.first_episode
-    _all_within("episode of a rescue", episodes, 0, record.num_episodes - 1)
-    _all_within("slot of a rescue", events["slot"], 0, scenario.num_victims - 1)
-    _all_within("victim of a rescue", events["victim"], 0, 2**32 - 1)
-    if (events["step"] < 0).any() or (events["step"] >= record.lengths[episodes]).any():
-        raise ValueError("step of a rescue: must be one of its episode")
+    for what, events in (("rescue", record.rescues), ("loss", record.lost)):
+        episodes = events["episode"] - record.first_episode
+        _all_within(f"episode of a {what}", episodes, 0, record.num_episodes - 1)
+        _all_within(f"slot of a {what}", events["slot"], 0, scenario.num_victims - 1)
+        _all_within(f"victim of a {what}", events["victim"], 0, 2**32 - 1)
+        if (events["step"] < 0).any() or (events["step"] >= record.lengths[episodes]).any():
+            raise ValueError(f"step of a {what}: must be one of its episode")
+    _all_within("task of a loss", record.lost["task"], 0, len(scenario.tasks) - 1)
     for name, values in {"reward": record.rewards_total, **record.steps}.items():
         for part in [values[field] for field in values.dtype.names or ()] or [values]:
             if not np.isfinite(part).all():
@@ -107,6 +108,10 @@ def _ranges(record: Record) -> Iterator[tuple[str, NDArray[Any], float, float]]:
         yield "appeared_step of a victim", victims["appeared_step"], 0, scenario.episode_steps
         for axis in "xy":
             yield f"{axis} of a victim", victims[axis], -half, half
+        if "served" in (victims.dtype.names or ()):
+            yield "served of a victim", victims["served"], 0, 1
+        if "deadline_step" in (victims.dtype.names or ()):
+            yield "deadline_step of a victim", victims["deadline_step"], -1, 2**32
     for kind in steps["faults"].dtype.names or () if "faults" in steps else ():
         yield f"fault {kind}", steps["faults"][kind], -_MOST_FAULT, _MOST_FAULT
 

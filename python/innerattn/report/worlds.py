@@ -15,6 +15,8 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
         "dt_s": scenario.dt_s,
         "half_width_m": scenario.arena_half_width_m,
         "rescue_radius_m": scenario.rescue_radius_m,
+        "has_services": scenario.has_services,
+        "has_deadlines": scenario.has_deadlines,
         "tasks": [{"name": task.name, "needs": list(task.needs)} for task in scenario.tasks],
         "robots": [
             {

@@ -28,4 +28,5 @@ def afterstates(
     victims = victims[worlds]
     victims["present"] &= ~new[worlds]
     moving = env.positions()[worlds], env.velocities()[worlds]
-    return worlds, world_states(*moving, victims, env.obstacles()[worlds], env.scenario)
+    others = env.obstacles()[worlds], env.step_counts()[worlds]
+    return worlds, world_states(*moving, victims, *others, env.scenario)

@@ -72,7 +72,7 @@ impl Batch {
         Worlds::check(&options).map_err(|error| raised(py, &error))?;
         let (robots, width) = (rules.team.len(), rules.layout.width());
         let outputs = Outputs::new(py, num_envs, robots, width, give)?;
-        let rescue_dtype = rescue_dtype(py, rules.scenario.max_needs())?;
+        let rescue_dtype = event_dtype(py, rules.scenario.max_needs())?;
         let threads = num_threads.unwrap_or(1) * THREAD_BYTES;
         probe(py, num_envs * World::most_bytes(&rules) + SLACK_BYTES + threads)?;
         let worlds = py.detach(|| Worlds::new(rules, options)).map_err(|error| raised(py, &error))?;
@@ -142,6 +142,18 @@ impl Batch {
         self.worlds.panic_in_next_step(envs);
     }
 
+    /// The victims lost in the last step, as a structured array: env, episode, step, slot, victim, task.
+    fn lost(&self, py: Python) -> PyResult<Py<PyAny>> {
+        self.check_process()?;
+        let mut rows = Vec::new();
+        reserve(&mut rows, self.worlds.losses().count() * RESCUE_FIELDS.len())?;
+        for loss in self.worlds.losses() {
+            rows.extend([i64::from(loss.env), loss.episode as i64]);
+            rows.extend([loss.step, loss.slot, loss.victim, loss.task].map(i64::from));
+        }
+        Ok(rows.into_pyarray(py).call_method1("view", (event_dtype(py, 0)?,))?.unbind())
+    }
+
     fn reward_components(&self, py: Python) -> Py<PyArray3<f32>> {
         self.outputs.components(py)
     }
@@ -176,18 +188,23 @@ impl Batch {
     ) -> PyResult<(Bound<'py, PyArray3<i64>>, Bound<'py, PyArray3<f32>>)> {
         let slots = self.worlds.rules().scenario.num_victims();
         let envs = self.worlds.num_envs();
-        let (mut numbers, mut places) = (zeros(envs * slots * 4)?, zeros(envs * slots * 2)?);
-        let rows = numbers.chunks_exact_mut(4).zip(places.chunks_exact_mut(2));
+        let rules = self.worlds.rules();
+        let (mut numbers, mut places) = (zeros(envs * slots * 5)?, zeros(envs * slots * 3)?);
+        let rows = numbers.chunks_exact_mut(5).zip(places.chunks_exact_mut(3));
         let victims = self.worlds.worlds().flat_map(|world| &world.victims);
         for ((number, place), victim) in rows.zip(victims) {
             if let Some(victim) = victim {
-                number.copy_from_slice(&[1, victim.task, victim.id, victim.appeared_step].map(i64::from));
-                place.copy_from_slice(&[victim.position.x, victim.position.y]);
+                let deadline =
+                    if victim.deadline_step == u32::MAX { -1 } else { victim.deadline_step.into() };
+                let [task, id, appeared] = [victim.task, victim.id, victim.appeared_step].map(i64::from);
+                number.copy_from_slice(&[1, task, id, appeared, deadline]);
+                let served = rules.services[victim.task as usize].share(victim);
+                place.copy_from_slice(&[victim.position.x, victim.position.y, served]);
             } else {
-                number.copy_from_slice(&[0, -1, -1, -1]);
+                number.copy_from_slice(&[0, -1, -1, -1, -1]);
             }
         }
-        Ok((shaped(py, numbers, [envs, slots, 4])?, shaped(py, places, [envs, slots, 2])?))
+        Ok((shaped(py, numbers, [envs, slots, 5])?, shaped(py, places, [envs, slots, 3])?))
     }
 
     fn step_counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
@@ -331,8 +348,8 @@ fn autoreset_named(name: &str) -> PyResult<Autoreset> {
     }
 }
 
-/// A structured type of int64 fields.
-fn rescue_dtype(py: Python, helpers: usize) -> PyResult<Bound<PyAny>> {
+/// A structured type of int64 fields: of a rescue, or of a loss, which nobody helped with.
+fn event_dtype(py: Python, helpers: usize) -> PyResult<Bound<PyAny>> {
     let helpers = (0..helpers).map(|need| format!("helper_{need}"));
     let names = RESCUE_FIELDS.map(String::from).into_iter().chain(helpers);
     let fields: Vec<(String, &str)> = names.map(|name| (name, "i8")).collect();

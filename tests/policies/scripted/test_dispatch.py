@@ -25,7 +25,7 @@ def view(positions: list, victims: list) -> PolicyInput:
     """One world at rest; a victim is (task, x, y), or None for an empty slot."""
     table = np.array([(v and (True, *v)) or (False, 0, 0, 0) for v in victims], VICTIM)[None]
     places = np.asarray([positions], np.float32)
-    state = WorldState(places, np.zeros_like(places), table, HEALTHY)
+    state = WorldState(places, np.zeros_like(places), table, HEALTHY, np.zeros(1, int))
     return PolicyInput(np.zeros((1, 4, 1), np.float32), state)
 
 

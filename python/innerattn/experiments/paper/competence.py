@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from innerattn.config import Scenario
 from innerattn.experiments.paper.workload import rescues_by_task
 from innerattn.experiments.run import FinishedRun
 from innerattn.measures.registry import MEASURES, measure_of
@@ -21,10 +22,14 @@ def competence_units() -> dict[str, str]:
     """The values of competence and their units.
 
     These are the score, see `innerattn.measures.summary.Performance`, and all `MEASURES` that are
-    no counts. What needs steps is of the episodes recorded step by step, which with scripted
-    policies are all.
+    no counts and apply to the paper's worlds. What needs steps is of the episodes recorded step by
+    step, which with scripted policies are all.
     """
-    units = {name: measure.unit for name, measure in MEASURES.items() if not measure.is_count}
+    units = {
+        name: measure.unit
+        for name, measure in MEASURES.items()
+        if not measure.is_count and measure.applies(Scenario())
+    }
     score = {"score": "0 random play, 1 scripted dispatch"}
     return {"rescues_per_episode": units.pop("rescues_per_episode"), **score, **units}
 

@@ -19,6 +19,8 @@ from innerattn.policies.exported.contract import Contract
 _KEYS = frozenset({"own", "teammates", "victims", "now", "victims_time"})
 _BODY_KEYS = frozenset({"position", "velocity", "available", "faults", "time"})
 _VICTIM_KEYS = frozenset({"task", "position"})
+_TIMES = ("served", "time_left")
+"""Shares that are read of each victim where an observation has columns for them."""
 _MOST_SPEED_MPS = 1e4
 _FAULT = "own.fault."
 _NUMBERS = (float, int, np.floating, np.integer)
@@ -46,7 +48,10 @@ class RowBuilder:
         self._healthy = [1.0 if one in _SHARES else 0.0 for one in self._faults]
         self._available = 4 + len(abilities)
         self._width = self._available + 1 + len(self._faults)
-        self._victim_width = 3 + len(abilities)
+        self._times = [one for one in _TIMES if f"victim_0.{one}" in self._names]
+        self._victim_keys = _VICTIM_KEYS | set(self._times)
+        self._places_at = 1 + len(abilities)
+        self._victim_width = self._places_at + 2 + len(self._times)
         self._slots = contract.victim_slots
         self._by_relevance = contract.victim_order == "relevant"
         self._most_position_m = 2.0 * contract.arena_half_width_m
@@ -202,18 +207,19 @@ class RowBuilder:
             raise ReadingError(
                 "victims", f"has {len(victims)} entries: must have at most {self._slots}"
             )
-        slots, tasks, places = [], [], []
+        slots, tasks, places, times = [], [], [], []
         for slot, victim in enumerate(victims):
             if victim is None:
                 continue
             place = f"victims.{slot}"
             body = _mapping(victim, place)
-            _refuse_unknown(body, _VICTIM_KEYS, f"{place}.")
+            _refuse_unknown(body, self._victim_keys, f"{place}.")
             task = _given(body, "task", f"{place}.")
             if not isinstance(task, str) or task not in self._needs:
                 known = ", ".join(self._needs)
                 raise ReadingError(f"{place}.task", f"is {_shown(task)}: known are {known}")
             places.append(_pair(body, "position", place, self._most_position_m))
+            times.append([_share(body, one, f"{place}.") for one in self._times])
             slots.append(slot)
             tasks.append(task)
         if not slots:
@@ -228,8 +234,8 @@ class RowBuilder:
             order = list(range(len(tasks)))
         blocks = row[self._victims_from :].reshape(self._slots, self._victim_width)
         for slot, index in zip(slots, order, strict=True):
-            blocks[slot, :-2] = self._needs[tasks[index]]
-            blocks[slot, -2:] = relative[index]
+            blocks[slot, : self._places_at] = self._needs[tasks[index]]
+            blocks[slot, self._places_at :] = [*relative[index], *times[index]]
 
 
 _MOST_SHOWN = 60
@@ -270,6 +276,14 @@ def _pair(body: Mapping[str, Any], key: str, place: str, most: float) -> tuple[f
     if type(x) is float and type(y) is float and abs(x) <= most and abs(y) <= most:
         return x, y
     return _number(x, f"{place}.{key}.x", most), _number(y, f"{place}.{key}.y", most)
+
+
+def _share(body: Mapping[str, Any], key: str, place: str) -> float:
+    """A number from 0 to 1."""
+    value = _number(_given(body, key, place), f"{place}{key}", 1.0)
+    if value < 0.0:
+        raise ReadingError(f"{place}{key}", f"is {value}: must be a share from 0 to 1")
+    return value
 
 
 def _refuse_pair(value: Any, place: str) -> NoReturn:

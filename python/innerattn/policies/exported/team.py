@@ -230,7 +230,9 @@ def _check_columns(contract: Contract) -> None:
     names = [column.name for column in contract.observation]
     faults = [name for name in names if name.startswith("own.fault.")]
     own = 4 + len(abilities) + 1 + len(faults)  # position and velocity, and availability
-    expected = len(contract.robots) * own + contract.victim_slots * (3 + len(abilities))
+    times = sum(f"victim_0.{one}" in names for one in ("served", "time_left"))
+    victim = 3 + len(abilities) + times  # presence and place
+    expected = len(contract.robots) * own + contract.victim_slots * victim
     if len(names) != expected or bool(faults) != contract.observe_faults:
         raise ValueError(f"observation: has {len(names)} columns: must have {expected}")
     if len({robot.name for robot in contract.robots}) != len(contract.robots):

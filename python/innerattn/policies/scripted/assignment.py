@@ -20,6 +20,8 @@ FORBIDDEN = 1e7
 
 _MOST_PLANS = 1000  # beyond, solving each world on its own is the faster way
 _OWN_SHARE = 0.3
+_HOLD_S = 2e4
+"""More than any other plan saves, and little beside `FORBIDDEN`, for 64 robots together."""
 
 
 class Needs:
@@ -55,7 +57,11 @@ class Needs:
         return np.asarray(able.transpose(0, 3, 1, 2))
 
 
-def pair_costs(times: NDArray[np.float64], permitted: NDArray[np.bool_]) -> NDArray[np.float64]:
+def pair_costs(
+    times: NDArray[np.float64],
+    permitted: NDArray[np.bool_],
+    held: NDArray[np.bool_] | None = None,
+) -> NDArray[np.float64]:
     """Cost of sending a robot to fill a need of a victim.
 
     A victim is rescued when the last helper is there, so a robot's cost is its own arrival time or,
@@ -65,6 +71,8 @@ def pair_costs(times: NDArray[np.float64], permitted: NDArray[np.bool_]) -> NDAr
     Args:
         times: (E, R, V) arrival times [s].
         permitted: (E, R, V, N) which robot can fill which need.
+        held: (E, R, V) robots that must go on with the service of a victim, if they can; None:
+            nobody.
 
     Returns:
         (E, R, V * N) float64 [s], `FORBIDDEN` where not permitted.
@@ -74,7 +82,10 @@ def pair_costs(times: NDArray[np.float64], permitted: NDArray[np.bool_]) -> NDAr
     soonest = np.where(np.isfinite(soonest), soonest, 0.0)
     # Leaving a robot's own need in does no harm: nobody fills it sooner than the soonest.
     last = soonest.max(-1)[:, None, :, None]
-    costs = np.where(permitted, np.maximum(own, last) + _OWN_SHARE * own, FORBIDDEN)
+    costs = np.maximum(own, last) + _OWN_SHARE * own
+    if held is not None:
+        costs = costs - _HOLD_S * held[..., None]
+    costs = np.where(permitted, costs, FORBIDDEN)
     return costs.reshape(*times.shape[:2], -1)
 
 

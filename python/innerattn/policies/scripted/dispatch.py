@@ -17,6 +17,7 @@ from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
 from innerattn.errors import ConfigError
 from innerattn.policies.policy import Policy, PolicyInput, WorldState
 from innerattn.policies.scripted.assignment import Needs, assign, can_be_rescued, pair_costs
+from innerattn.policies.scripted.care import Care
 from innerattn.policies.scripted.steering import Steering
 
 
@@ -57,6 +58,7 @@ class _Dispatcher(ABC):
         """Take the team and the tasks from ``scenario``."""
         self.needs = Needs(scenario)
         self.steering = Steering(scenario)
+        self._care = Care(scenario)
 
     def act(self, view: PolicyInput) -> NDArray[Any]:
         """See `Policy.act`; robots without a victim are drawn to the centre."""
@@ -87,9 +89,15 @@ class GreedyPolicy(_Dispatcher):
 
     def choose(self, state: WorldState, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """See `_Dispatcher.choose`."""
-        helpful = self.needs.permitted(state.victims["present"], state.victims["task"]).any(-1)
+        permitted = self.needs.permitted(state.victims["present"], state.victims["task"])
+        helpful = permitted.any(-1)
         way = places[:, None] - state.positions[:, :, None]
         distance = np.where(helpful, (way * way).sum(-1), np.inf)
+        if self._care.is_needed:
+            times = self.steering.arrival_times(state.positions, state.velocities, places)
+            helpful &= self._care.in_time(state, times, permitted)[:, None]
+            distance = np.where(helpful, distance, np.inf)
+            distance = np.where(helpful & self._care.held(state, times), -1.0, distance)
         return np.where(helpful.any(-1), distance.argmin(-1), -1)
 
 
@@ -107,7 +115,11 @@ class HungarianPolicy(_Dispatcher):
             permitted &= (faults["unavailable"] < 1.0)[:, :, None, None]
             permitted &= can_be_rescued(permitted, needed)[:, None, :, None]
         times = self.steering.arrival_times(state.positions, state.velocities, places, faults)
-        need = assign(pair_costs(times, permitted))
+        held = None
+        if self._care.is_needed:
+            permitted &= self._care.in_time(state, times, permitted)[:, None, :, None]
+            held = self._care.held(state, times)
+        need = assign(pair_costs(times, permitted, held))
         return np.where(need >= 0, need // permitted.shape[-1], -1)
 
 

@@ -44,6 +44,7 @@ def state_document(moment: Moment) -> dict[str, Any]:
         "faults": [_wrong(robot) for robot in moment.faults],
         "victims": [
             {"slot": slot, "id": int(one["id"]), "task": int(one["task"])}
+            | _times(one)
             | {axis: round(float(one[axis]), _DECIMALS) for axis in ("x", "y")}
             for slot, one in enumerate(moment.victims)
             if one["present"]
@@ -51,6 +52,7 @@ def state_document(moment: Moment) -> dict[str, Any]:
         "obstacles": _rounded(moment.obstacles),
         "attention": None if attention is None else np.round(attention, 3).tolist(),
         "rescues": [rescue._asdict() for rescue in moment.rescues],
+        "lost": [loss._asdict() for loss in moment.lost],
         "handoffs": [handoff._asdict() for handoff in moment.handoffs],
         "rescued": moment.rescued,
         "helped": list(moment.helped),
@@ -59,6 +61,14 @@ def state_document(moment: Moment) -> dict[str, Any]:
 
 def _rounded(values: NDArray[np.float32]) -> list[list[float]]:
     return np.round(values.astype(np.float64), _DECIMALS).tolist()  # type: ignore[no-any-return]
+
+
+def _times(victim: np.void) -> dict[str, float | int]:
+    """The share of its service that a victim has had, and when it is lost, where there is such."""
+    names = victim.dtype.names or ()
+    served = {"served": round(float(victim["served"]), 3)} if "served" in names else {}
+    due = {"deadline": int(victim["deadline_step"])} if "deadline_step" in names else {}
+    return {**served, **due}
 
 
 def _wrong(robot: np.void) -> dict[str, float]:

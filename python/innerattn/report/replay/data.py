@@ -32,6 +32,7 @@ _STEPS_OF_INT16 = 32000  # positions, from the arena's centre to its wall; rewar
 
 _TABLES = {
     "rescues": ("episode", "step", "victim", "task"),
+    "lost": ("episode", "step", "victim", "task"),
     "handoffs": ("episode", "robot", "before", "after", "first", "second"),
     "faults": ("episode", "robot", "kind", "start", "end"),
 }
@@ -156,10 +157,13 @@ def _run(record: Record, name: str, arrays: _Arrays) -> dict[str, Any]:
         "blocked": arrays.add(blocked(record)[:, :steps].astype(np.uint8)),
         "victims": arrays.add(_victims(record)),
         "rescues": arrays.add(_rescues(record)),
+        "lost": arrays.add(_table(record.lost, "lost", record)),
         "handoffs": arrays.add(_table(handed, "handoffs", record)),
         "faults": arrays.add(_table(spells, "faults", record)),
         "fault_values": arrays.add(spells["value"].astype(np.float32)),
     }
+    if "served" in (kept["victims"].dtype.names or ()):
+        found["served"] = arrays.add(_quantised(kept["victims"]["served"], 1 / 255, "uint8"))
     if "attention" in kept and record.scenario.num_robots > 1:
         found["attention"] = arrays.add(_quantised(kept["attention"], 1 / 255, "uint8"))
     if "rewards" in kept:
@@ -194,7 +198,10 @@ def _rescues(record: Record) -> NDArray[np.int32]:
 
 
 def _victims(record: Record) -> NDArray[np.int32]:
-    """(N, 7): episode, id, task, first step and first step without it, x and y in position units.
+    """A row (9) for each victim.
+
+    Its columns are episode, id, task, first step and first step without it, x and y in position
+    units, slot, and the steps done when it is lost (-1: never).
 
     A victim stays where it is from its appearance on.
     """
@@ -203,18 +210,22 @@ def _victims(record: Record) -> NDArray[np.int32]:
     episode, step, slot = np.nonzero(victims["present"] & happened[..., None])
     seen = victims[episode, step, slot]
     order = np.lexsort((step, seen["id"], episode))
-    episode, step, seen = episode[order], step[order], seen[order]
+    episode, step, slot, seen = episode[order], step[order], slot[order], seen[order]
     key = np.stack([episode, seen["id"]], -1)
     begins = np.flatnonzero(np.r_[True, (key[1:] != key[:-1]).any(1)][: len(key)])
     ends = np.r_[begins[1:], len(key)] - 1 if len(key) else begins
     places = _quantised(np.stack([seen["x"], seen["y"]], -1), _unit(record.scenario), "int32")
     columns = (episode, seen["id"], seen["task"])
+    has_deadlines = "deadline_step" in (seen.dtype.names or ())
+    deadline = seen["deadline_step"] if has_deadlines else np.full(len(seen), -1)
     return np.stack(
         [
             *(column[begins] for column in columns),
             step[begins],
             step[ends] + 1,
             *(places[begins, axis] for axis in (0, 1)),
+            slot[begins],
+            np.minimum(deadline[begins], np.iinfo(np.int32).max),
         ],
         -1,
     ).astype(np.int32)

@@ -42,6 +42,9 @@ function eventMark(type, x, y) {
   if (type === "rescue") return shape(taskCorners(1, x, y, 5.5), "var(--victim)");
   if (type === "fault") return shape(taskCorners(2, x, y + 1, 5.5), "var(--blocked)");
   const common = { fill: "none", "stroke-width": 2 };
+  if (type === "lost") {
+    return svg("polygon", { points: points(taskCorners(1, x, y, 4.5)), stroke: "var(--victim)", ...common });
+  }
   if (type === "recovery") {
     const corners = points(taskCorners(2, x, y + 1, 4.5));
     return svg("polygon", { points: corners, stroke: "var(--blocked)", ...common });

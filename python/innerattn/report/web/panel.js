@@ -112,6 +112,13 @@ function fillLegend(list, worlds) {
   row(line("M-9 0H9", "var(--blocked)", { "stroke-width": 4 }), "line below a chart: how long a fault lasts");
   row(symbol(disc("var(--floor)", kind), cross), "a robot that is out");
   row(symbol(eventMark("rescue", 0, 0)), "a rescue");
+  if (worlds.has_services) {
+    const arc = svg("path", { d: "M0 -8a8 8 0 1 1 -8 8", fill: "none", stroke: "var(--victim)", "stroke-width": 4 });
+    row(symbol(arc), "thick arc around a victim: the share of its service that it has had");
+  }
+  if (worlds.has_deadlines) {
+    row(symbol(eventMark("lost", 0, 0)), "a victim is lost; seconds below a victim: until it is");
+  }
   row(symbol(eventMark("handoff", 0, 0)), "a handoff: a robot rescues with another partner than before");
   row(symbol(svg("rect", { x: -9, y: -9, width: 18, height: 18, fill: "var(--grid)", stroke: "var(--line)" })), "grey band in a chart: from the rescue before a handoff to that after it");
 }

@@ -114,6 +114,23 @@ class Scene {
     context.closePath();
     context.fill();
     this.room.take(x, y, 8, 8);
+    this.drawTimes(victim, x, y);
+  }
+
+  /** How far the service of a victim is, and how long it still waits. */
+  drawTimes(victim, x, y) {
+    const { context, paint, run, worlds } = this, served = run.served(this.episode, this.step, victim);
+    if (served > 0) {
+      context.strokeStyle = paint.victim;
+      context.lineWidth = 4;
+      context.beginPath();
+      context.arc(x, y, 14, -Math.PI / 2, (2 * served - 0.5) * Math.PI);
+      context.stroke();
+    }
+    if (victim.deadline >= 0) {
+      const left = Math.max(victim.deadline - this.step, 0) * worlds.dt_s;
+      this.writeAt(`${left.toFixed(1)} s`, [[x, y + 28], [x, y - 20], [x + 34, y + 4], [x - 34, y + 4]], false);
+    }
   }
 
   /** What a victim needs, in small discs on its circle; a need that is met is filled. */

@@ -47,6 +47,10 @@ function rescueEvent(worlds, { step, task, helpers }) {
   };
 }
 
+function lostEvent(worlds, { step, task }) {
+  return { step, type: "lost", robots: [], text: `a victim of ${worlds.tasks[task].name} is lost` };
+}
+
 function handoffEvent(worlds, { robot, before, after, second }) {
   const name = (one) => worlds.robots[one].name;
   return {
@@ -67,6 +71,7 @@ function faultEvent(worlds, fault) {
 function eventsOf(run, episode) {
   const { worlds } = run, name = (robot) => worlds.robots[robot].name, events = [];
   for (const one of run.rescues[episode]) events.push(rescueEvent(worlds, one));
+  for (const one of run.lost[episode]) events.push(lostEvent(worlds, one));
   for (const one of run.handoffs[episode]) events.push(handoffEvent(worlds, one));
   for (const one of run.faults[episode]) {
     events.push(faultEvent(worlds, one));
@@ -83,7 +88,7 @@ function eventsOf(run, episode) {
       text: `${name(one.robot)} is blocked for ${counted(one.end - one.start, "step")}`,
     });
   }
-  const order = ["fault", "recovery", "rescue", "handoff", "blocked"];
+  const order = ["fault", "recovery", "rescue", "lost", "handoff", "blocked"];
   return events.sort(
     (a, b) => a.step - b.step || order.indexOf(a.type) - order.indexOf(b.type),
   );

@@ -12,7 +12,7 @@ class LiveRun {
   }
 
   clear() {
-    Object.assign(this, { moments: [], first: 0, victims: [[]], rescues: [[]], handoffs: [[]] });
+    Object.assign(this, { moments: [], first: 0, victims: [[]], rescues: [[]], lost: [[]], handoffs: [[]] });
     this.cuts = this.worlds.robots.map(() => 0);
   }
 
@@ -29,8 +29,10 @@ class LiveRun {
     else this.cuts.fill(state.step);
     this.takeVictims(state);
     this.rescues[0].push(...state.rescues);
+    this.lost[0].push(...state.lost);
     this.handoffs[0].push(...state.handoffs);
     this.rescues[0] = this.rescues[0].filter((one) => one.step >= this.first);
+    this.lost[0] = this.lost[0].filter((one) => one.step >= this.first);
     this.handoffs[0] = this.handoffs[0].filter((one) => one.second >= this.first);
     return this.eventsOf(again ? before : null, state);
   }
@@ -74,6 +76,7 @@ class LiveRun {
   eventsOf(before, state) {
     const { worlds } = this, events = [];
     events.push(...state.rescues.map((one) => rescueEvent(worlds, one)));
+    events.push(...state.lost.map((one) => lostEvent(worlds, one)));
     events.push(...state.handoffs.map((one) => handoffEvent(worlds, one)));
     if (!before) return events;
     worlds.robots.forEach(({ index, name }) => {
@@ -110,6 +113,10 @@ class LiveRun {
 
   velocity(episode, step, robot) {
     return this.moment(step).velocities[robot];
+  }
+
+  served(episode, step, { id }) {
+    return this.moment(step).victims.find((one) => one.id === id)?.served ?? 0;
   }
 
   isBlocked(episode, step, robot) {

@@ -44,9 +44,12 @@ class Run {
       { name, unit, values: view(buffer, values) }
     ));
     const lists = (spec, toRow) => byEpisode(buffer, spec, this.episodes, toRow);
-    this.victims = lists(described.victims, ([, id, task, from, to, x, y]) => (
-      { id, task, from, to, x: x * worlds.unit, y: y * worlds.unit }
+    this.shares = described.served ? view(buffer, described.served) : null;
+    this.slots = described.served ? described.served.shape[2] : 0;
+    this.victims = lists(described.victims, ([, id, task, from, to, x, y, slot, deadline]) => (
+      { id, task, from, to, x: x * worlds.unit, y: y * worlds.unit, slot, deadline }
     ));
+    this.lost = lists(described.lost, ([, step, victim, task]) => ({ step, victim, task }));
     this.rescues = lists(described.rescues, ([, step, victim, task, ...helpers]) => (
       { step, victim, task, helpers: helpers.filter((robot) => robot >= 0) }
     ));
@@ -80,6 +83,12 @@ class Run {
   velocity(episode, step, robot) {
     const at = 2 * ((episode * this.steps + Math.floor(step)) * this.size + robot);
     return [this.velocities[at] * this.velocityUnit, this.velocities[at + 1] * this.velocityUnit];
+  }
+
+  /** Share of its service that a victim has had, 0 to 1. */
+  served(episode, step, victim) {
+    if (!this.shares) return 0;
+    return this.shares[(episode * this.steps + Math.floor(step)) * this.slots + victim.slot] / 255;
   }
 
   isBlocked(episode, step, robot) {
