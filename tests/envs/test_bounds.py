@@ -31,7 +31,10 @@ def scenario(half: float, engine: str, faulty: bool, seen: bool, heavy: float) -
         engine=engine,
         faults=tuple(faults) if faulty else (),
         observe_faults=seen,
-        tasks=(Task(name="both", needs=("food", "food")), Task(name="one", needs=("medicine",))),
+        tasks=(
+            Task(name="both", needs=("food", "food"), service_s=0.3 if seen else 0.0),
+            Task(name="one", needs=("medicine",), deadline_s=(0.5, 2.0) if seen else None),
+        ),
         obstacles=(Obstacle(shape="disc", radius_m=0.05),),
     )
 

@@ -23,6 +23,17 @@ def test_tasks_and_who_can_do_them() -> None:
     ]
 
 
+def test_services_and_deadlines_have_words() -> None:
+    first, second = Scenario.preset("mixed").tasks
+    tasks = (
+        first.replace(service_s=0.4, deadline_s=8.0),
+        second.replace(service_s=0.5, service="restart", deadline_s=(4.0, 8.0)),
+    )
+    one, other = scenario_words(Scenario.preset("mixed").replace(tasks=tasks)).splitlines()
+    assert one.endswith("0.15 m, for 0.4 s; if they leave, it goes on later; lost after 8 s")
+    assert other.endswith("0.15 m, for 0.5 s; if they leave, it starts anew; lost after 4 to 8 s")
+
+
 def test_what_is_doubtful() -> None:
     scenario = Scenario.model_validate(
         {

@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+import numpy as np
 from fresh_run import make_run, run_config
 
+from innerattn.envs.state import shares_left
 from innerattn.policies import Exported
 from innerattn.train.export import export_run
 
@@ -30,11 +32,15 @@ def readings_of(team: Exported, robot: str, env: object, world: int) -> dict[str
         for i, name in enumerate(team.robot_names)
     }
     tasks = [task.name for task in team.contract.tasks]
-    victims = [
-        {"task": tasks[one["task"]], "position": (float(one["x"]), float(one["y"]))}
-        if one["present"]
-        else None
-        for one in env.victims()[world]  # type: ignore[attr-defined]
-    ]
+    scenario, table = env.scenario, env.victims()  # type: ignore[attr-defined]
+    left = np.zeros(table.shape)
+    if scenario.has_deadlines:
+        left = shares_left(scenario, table, env.step_counts())  # type: ignore[attr-defined]
+    victims: list[dict[str, object] | None] = []
+    for one, share in zip(table[world], left[world], strict=True):
+        victim = {"task": tasks[one["task"]], "position": (float(one["x"]), float(one["y"]))}
+        victim |= {"served": float(one["served"])} if scenario.has_services else {}
+        victim |= {"time_left": float(share)} if scenario.has_deadlines else {}
+        victims.append(victim if one["present"] else None)
     own = bodies.pop(robot)
     return {"own": own, "teammates": bodies, "victims": victims}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from innerattn.config import Fault, Scenario
+from innerattn.config import Fault, Scenario, Task
 from innerattn.report.reachability import closed_off
 
 _WHAT = {
@@ -35,7 +35,18 @@ def _tasks(scenario: Scenario) -> Iterator[str]:
             some = " or ".join(able) if count == 1 else f"{count} of {', '.join(able)}"
             helpers.append(f"{need} ({some})")
         near = f"together within {scenario.rescue_radius_m:g} m"
-        yield f"{task.name}: {' and '.join(helpers)}, {near}"
+        yield f"{task.name}: {' and '.join(helpers)}, {near}{_times(task)}"
+
+
+def _times(task: Task) -> str:
+    words = ""
+    if task.service_s > 0.0:
+        kept = "it goes on later" if task.service == "keep" else "it starts anew"
+        words += f", for {task.service_s:g} s; if they leave, {kept}"
+    if task.deadlines_s:
+        low, high = task.deadlines_s
+        words += f"; lost after {low:g} s" if low == high else f"; lost after {low:g} to {high:g} s"
+    return words
 
 
 def _doubts(scenario: Scenario) -> Iterator[str]:

@@ -167,3 +167,46 @@ fn given_places_are_inside_and_fit_together() {
     });
     assert!(refused.ends_with("= 2: must be 0 where victim_area_m is given"), "{refused}");
 }
+
+#[test]
+fn services_and_deadlines_have_their_limits() {
+    let task = |service_s: f64, deadline_s: Option<Deadline>| {
+        let mut scenario = Scenario::default();
+        (scenario.tasks[1].service_s, scenario.tasks[1].deadline_s) = (service_s, deadline_s);
+        scenario.validate().err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    let (same, pair) = (|s| Some(Deadline::Same(s)), |low, high| Some(Deadline::Between([low, high])));
+    assert_eq!(task(-0.1, None), "scenario.tasks[1].service_s = -0.1: must be in 0..=1000000 s");
+    assert!(task(f64::NAN, None).starts_with("scenario.tasks[1].service_s = NaN: must be in"));
+    assert_eq!(task(0.0, same(0.0)), "scenario.tasks[1].deadline_s = 0: must be in 0.001..=1000000 s");
+    assert!(
+        task(0.0, pair(1.0, f64::INFINITY)).starts_with("scenario.tasks[1].deadline_s = inf: must be in")
+    );
+    assert_eq!(
+        task(0.0, pair(2.0, 1.0)),
+        "scenario.tasks[1].deadline_s = [2, 1]: must be a pair [low, high] whose low is at most its high"
+    );
+    assert_eq!(
+        task(1.5, pair(1.0, 2.0)),
+        "scenario.tasks[1].deadline_s = 1: must be at least service_s = 1.5, or no victim can be rescued"
+    );
+    assert_eq!(task(1.5, pair(1.5, 1.5)), "");
+    assert!(
+        refusal(|scenario| scenario.lost_cost = 1e7).starts_with("scenario.lost_cost = 10000000: must be")
+    );
+}
+
+#[test]
+fn a_deadline_is_a_number_or_a_pair() {
+    let read = |deadline: &str| {
+        let task = format!(r#"{{"name": "task", "needs": ["food"], "deadline_s": {deadline}}}"#);
+        Scenario::from_json(&format!(r#"{{"tasks": [{task}]}}"#)).map(|scenario| scenario.tasks[0].deadline_s)
+    };
+    assert_eq!(read("3"), Ok(Some(Deadline::Same(3.0))));
+    assert_eq!(read("[1.5, 3]"), Ok(Some(Deadline::Between([1.5, 3.0]))));
+    assert_eq!(read("null"), Ok(None));
+    for wrong in ["[1.5]", "[1, 2, 3]", "true", "\"soon\"", "{}"] {
+        let error = read(wrong).expect_err(wrong).to_string();
+        assert!(error.starts_with("scenario: deadline_s must be a number or a pair [low, high]"), "{error}");
+    }
+}

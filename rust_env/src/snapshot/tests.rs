@@ -1,7 +1,7 @@
 //! Images that were forged, with a right checksum.
 
 use super::*;
-use crate::scenario::{Obstacle, Scenario, Shape};
+use crate::scenario::{Deadline, Obstacle, Scenario, Shape, Situation};
 
 fn rules(scenario: Scenario) -> Rules {
     Rules::new(scenario).expect("a valid scenario")
@@ -104,9 +104,57 @@ fn an_image_from_before_a_key_was_added_is_taken() {
     };
     let older =
         rules.scenario.to_json().replace(r#","victim_places_m":[]"#, "").replace(r#","start_m":null"#, "");
-    assert!(!older.contains("victim_places_m") && !older.contains("start_m"));
+    let times = r#","service_s":0.0,"service":"keep","deadline_s":null"#;
+    let older = older.replace(times, "").replace(r#","lost_cost":0.0"#, "");
+    for key in ["victim_places_m", "start_m", "service_s", "deadline_s", "lost_cost"] {
+        assert!(!older.contains(key));
+    }
     assert_eq!(text(&older), Ok(worlds.to_vec()));
     let other = older.replace(r#""substeps":6"#, r#""substeps":7"#);
     assert_eq!(text(&other), Err(Error::Snapshot("it was made with another scenario".into())));
     assert!(text("{").is_err());
+}
+
+/// A scenario whose first task has a service of three steps, and whose second task has deadlines.
+fn timed() -> Rules {
+    let mut scenario = Scenario { situation: Situation::Double, ..Scenario::default() };
+    scenario.tasks[0].service_s = 0.3;
+    scenario.tasks[1].deadline_s = Some(Deadline::Between([0.5, 2.0]));
+    rules(scenario)
+}
+
+#[test]
+fn services_and_losses_are_kept_and_checked() {
+    let rules = timed();
+    let mut world = World::new(&rules, 5, 7);
+    (world.step, world.fresh) = (4, false);
+    (world.lost, world.appeared) = (2, 4);
+    world.victims[0].as_mut().expect("double has all").served_steps = 2;
+    let bytes = |world: &World| save(&rules, 1, [world].into_iter());
+    let back = load(&rules, 1, &bytes(&world)).expect("a state of these rules");
+    assert_eq!(back, [world.clone()]);
+    assert_ne!(back[0].victims[1].expect("double has all").deadline_step, u32::MAX);
+    type Change = fn(&mut World);
+    let changes: [(&str, Change); 4] = [
+        ("services", |world| world.victims[0].as_mut().expect("double has all").served_steps = 3),
+        ("services", |world| world.victims[1].as_mut().expect("double has all").served_steps = 1),
+        ("lost", |world| world.lost = 9),
+        ("appeared", |world| world.lost = 1),
+    ];
+    for (what, change) in changes {
+        let mut forged = world.clone();
+        change(&mut forged);
+        let error = load(&rules, 1, &bytes(&forged)).expect_err("a forged image").to_string();
+        assert_eq!(error, format!("snapshot: env 0 does not fit the scenario: its {what}"));
+    }
+}
+
+#[test]
+fn images_of_worlds_whose_victims_take_no_time_are_what_they_were() {
+    let rules = rules(Scenario::default());
+    let world = World::new(&rules, 0, 0);
+    let head = Head { version: 2, scenario: rules.scenario.to_json(), num_envs: 1 };
+    let earlier = postcard::to_extend(&head, MAGIC.to_vec()).expect("plain data serialises");
+    let earlier = sealed(postcard::to_extend(&world, earlier).expect("plain data serialises"));
+    assert_eq!(save(&rules, 1, [&world].into_iter()), earlier);
 }

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_export import readings_of
+from made_export import made_export, readings_of
 
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
@@ -52,6 +52,33 @@ def test_rows_are_those_of_the_worlds_to_the_bit(
             row = team.row(robot, readings_of(team, robot, env, world))
             assert row.dtype == np.float32
             np.testing.assert_array_equal(row, obs[world, index])
+
+
+TIMES = {"service_s": 0.9, "deadline_s": (1.0, 3.0)}
+TASKS = [
+    {"name": "task_1", "needs": ("food", "medicine"), **TIMES},
+    {"name": "task_2", "needs": ("food", "information")},
+]
+
+
+def test_rows_of_worlds_with_services_and_deadlines(tmp_path: Path) -> None:
+    changes = {"scenario.tasks": TASKS, "scenario.rescue_radius_m": 1.0}
+    team = Exported(made_export(tmp_path, "td-inner", **changes)[1], backend="numpy")
+    env = worlds(team, 16, 1)
+    obs = played(env, 6, 0)
+    assert env.victims()["served"].any()
+    for world in range(16):
+        for index, robot in enumerate(ROBOTS):
+            row = team.row(robot, readings_of(team, robot, env, world))
+            np.testing.assert_array_equal(row, obs[world, index])
+    readings: dict[str, Any] = readings_of(team, "food_0", env, 0)
+    for wrong in (-0.1, 1.1, "half"):
+        readings["victims"][0]["served"] = wrong
+        with pytest.raises(ReadingError, match=r"victims\.0\.served: is .*: must be"):
+            team.row("food_0", readings)
+    del readings["victims"][0]["served"]
+    with pytest.raises(ReadingError, match=r"victims\.0\.served: is missing"):
+        team.row("food_0", readings)
 
 
 @BOTH

@@ -13,6 +13,9 @@ from watched import watched
 
 from innerattn.config import Scenario
 from innerattn.errors import RunError
+from innerattn.evaluate.play import run_episodes
+from innerattn.policies import scripted_policy
+from innerattn.records.record import FIELDS
 from innerattn.report.replay import replay_page
 from innerattn.report.replay.data import replay_document
 
@@ -55,7 +58,9 @@ def test_victims_and_rescues_are_those_of_the_record() -> None:
         for v in [record.steps["victims"][e, t, s]]
     }
     assert {(e, i) for e, i, *_ in victims.tolist()} == set(seen)
-    for e, i, _, start, end, x, y in victims.tolist():
+    for e, i, _, start, end, x, y, slot, deadline in victims.tolist():
+        assert deadline == -1
+        assert record.steps["victims"][e, start, slot]["id"] == i
         assert np.allclose((x * unit, y * unit), seen[e, i], atol=1e-4)
         there = record.steps["victims"][e]
         steps = np.flatnonzero((there["present"] & (there["id"] == i)).any(-1))
@@ -63,6 +68,25 @@ def test_victims_and_rescues_are_those_of_the_record() -> None:
     rescues = unpacked(document, run["rescues"])
     names = ("episode", "step", "victim", "task", "helper_0", "helper_1")
     assert rescues.tolist() == [[int(row[n]) for n in names] for row in record.rescues]
+
+
+def test_services_and_losses_are_those_of_the_record() -> None:
+    plain = Scenario.preset("double")
+    tasks = tuple(task.replace(service_s=0.4, deadline_s=(1.0, 2.5)) for task in plain.tasks)
+    worlds = plain.replace(tasks=tasks)
+    record = run_episodes(scripted_policy("hungarian", worlds), worlds, 4, 5, record=FIELDS)
+    document = replay_document([record], ["one"])
+    (run,) = document["runs"]
+    served = unpacked(document, run["served"]) / 255
+    assert np.abs(served - record.steps["victims"]["served"]).max() <= 0.5 / 255 + 1e-6
+    assert served.any()
+    names = ("episode", "step", "victim", "task")
+    assert unpacked(document, run["lost"]).tolist() == [
+        [int(row[name]) for name in names] for row in record.lost
+    ]
+    assert len(record.lost)
+    for e, _, _, start, end, _, _, slot, deadline in unpacked(document, run["victims"]).tolist():
+        assert record.steps["victims"][e, start, slot]["deadline_step"] == deadline >= end
 
 
 def test_eighty_episodes_of_four_robots_stay_below_a_megabyte() -> None:
