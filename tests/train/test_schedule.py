@@ -107,7 +107,7 @@ def test_rewards_are_weighed_as_the_schedule_says(credit: str) -> None:
             step = other.step(got.actions.numpy())
             components = other.reward_components()
             expected = components[..., 1] * weight_at(share, "dense_weight")
-            expected = expected + components[..., 2] + components[..., 3]
+            expected = expected + components[..., 2:].sum(-1)
             team = weight_at(share, "team_credit")
             for event in step.rescues:
                 rescues += 1

@@ -125,6 +125,7 @@ fn timed() -> Rules {
 
 #[test]
 fn services_and_losses_are_kept_and_checked() {
+    type Change = fn(&mut World);
     let rules = timed();
     let mut world = World::new(&rules, 5, 7);
     (world.step, world.fresh) = (4, false);
@@ -134,7 +135,6 @@ fn services_and_losses_are_kept_and_checked() {
     let back = load(&rules, 1, &bytes(&world)).expect("a state of these rules");
     assert_eq!(back, [world.clone()]);
     assert_ne!(back[0].victims[1].expect("double has all").deadline_step, u32::MAX);
-    type Change = fn(&mut World);
     let changes: [(&str, Change); 4] = [
         ("services", |world| world.victims[0].as_mut().expect("double has all").served_steps = 3),
         ("services", |world| world.victims[1].as_mut().expect("double has all").served_steps = 1),

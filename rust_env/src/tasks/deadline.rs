@@ -2,7 +2,7 @@
 
 use super::{Victim, steps_of};
 use crate::rng::{Purpose, Stream};
-use crate::scenario::Scenario;
+use crate::scenario::{Deadline, Scenario, Task};
 
 /// The deadlines of a scenario's tasks.
 #[derive(Debug, Clone)]
@@ -18,7 +18,7 @@ impl Deadlines {
     /// The deadlines of a valid scenario; `None` where no task has one.
     #[must_use]
     pub(crate) fn new(scenario: &Scenario) -> Option<Self> {
-        let range = |task: &crate::scenario::Task| task.deadline_s.map(|deadline| deadline.range());
+        let range = |task: &Task| task.deadline_s.map(Deadline::range);
         let of_task: Vec<Option<[f64; 2]>> = scenario.tasks.iter().map(range).collect();
         let longest = of_task.iter().flatten().map(|range| range[1]).reduce(f64::max)?;
         let longest = steps_of(longest, scenario.dt_s) as f32;
@@ -47,7 +47,6 @@ impl Deadlines {
 mod tests {
     use super::*;
     use crate::geometry::Vec2;
-    use crate::scenario::Deadline;
 
     fn deadlines(of: [Option<Deadline>; 2]) -> Option<Deadlines> {
         let mut scenario = Scenario::default();

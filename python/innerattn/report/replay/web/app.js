@@ -15,7 +15,7 @@ class App {
     this.charts = new Charts($("charts"), (step) => this.goTo(step));
     this.robots = new RobotList($("robots"), this.worlds, (robot) => this.choose(robot));
     this.events = new EventList($("events"), $("no-events"), $("marks"), (step, robot) => {
-      this.look.robot = robot;
+      if (robot !== undefined) this.look.robot = robot; // nobody loses a victim
       this.showCharts();
       this.goTo(step);
     });
