@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from innerattn import _core
 from innerattn.config.scenario import Scenario
 from innerattn.envs.state import state_names, world_states
+from innerattn.envs.victims import victim_columns, victim_table
 from innerattn.shown import Shown
 
 Autoreset = Literal["same_step", "next_step", "disabled"]
@@ -18,26 +19,6 @@ Array = TypeVar("Array", bound=NDArray[Any])
 
 NUM_DISCRETE_ACTIONS = 5
 MOST_SEED = 2**64 - 1
-_VICTIM_DTYPE = np.dtype(
-    [
-        ("present", "?"),
-        ("task", "i8"),
-        ("id", "i8"),
-        ("appeared_step", "i8"),
-        ("x", "f4"),
-        ("y", "f4"),
-    ]
-)
-
-
-def victim_dtype(scenario: Scenario) -> np.dtype[np.void]:
-    """The fields of `BatchEnv.victims`."""
-    fields = list(_VICTIM_DTYPE.descr)
-    fields += [("served", "f4")] * scenario.has_services
-    fields += [("deadline_step", "i8")] * scenario.has_deadlines
-    return np.dtype(fields)
-
-
 FAULT_KINDS: tuple[str, ...] = tuple(name for name, *_ in _core.FAULT_KINDS)
 """Kinds of faults; `BatchEnv.fault_state` has a field for each."""
 _FAULT_DTYPE = np.dtype([(kind, "f4") for kind in FAULT_KINDS])
@@ -212,15 +193,7 @@ class BatchEnv(Shown):
         had, and where it has deadlines ``deadline_step``, the steps done in the episode when it is
         lost (-1: never). A slot without a victim has 0 and -1.
         """
-        numbers, places = self._core.victims()
-        table = np.empty(numbers.shape[:2], dtype=victim_dtype(self.scenario))
-        columns = ("present", "task", "id", "appeared_step", "deadline_step")
-        sources = [*zip(columns, np.moveaxis(numbers, -1, 0), strict=True)]
-        sources += zip(("x", "y", "served"), np.moveaxis(places, -1, 0), strict=True)
-        for name, values in sources:
-            if name in (table.dtype.names or ()):
-                table[name] = values
-        return table
+        return victim_table(*self._core.victims(), self.scenario)
 
     def lost(self) -> NDArray[np.void]:
         """Victims lost in the last step, (n,) structured int64.
@@ -329,23 +302,7 @@ class BatchEnv(Shown):
                 or a place outside the arena or nearer to a wall than `wall_clearance_m` (field, env
                 and slot are named). Nothing has changed then.
         """
-        slots = self.scenario.num_victims
-        wanted = f"must have shape ({self.num_envs}, {slots}) and the fields of victims()"
-        if isinstance(victims, np.ma.MaskedArray):
-            raise TypeError(f"victims is a masked array, whose mask would be lost: it {wanted}")
-        fields = victim_dtype(self.scenario).names
-        if not isinstance(victims, np.ndarray) or victims.dtype.names != fields:
-            given = isinstance(victims, np.ndarray)
-            found = f"has dtype {victims.dtype}" if given else "is no array"
-            raise TypeError(f"victims {found}: {wanted}")
-        for name, kinds in (("present", "b"), ("task", "iu"), ("x", "iuf"), ("y", "iuf")):
-            field = victims.dtype[name]
-            if field.kind not in kinds or field.itemsize > 8:
-                raise TypeError(f"victims[{name!r}] has dtype {field}: {wanted}")
-        if victims.shape != (self.num_envs, slots):
-            raise ValueError(f"victims has shape {victims.shape}: {wanted}")
-        places = np.stack([victims["x"], victims["y"]], -1, dtype=np.float64, casting="same_kind")
-        self._core.set_victims(np.asarray(victims["present"]), np.asarray(victims["task"]), places)
+        self._core.set_victims(*victim_columns(victims, self.num_envs, self.scenario))
 
     def snapshot(self) -> bytes:
         """Image of all worlds, with a checksum; `restore` continues from it bit for bit."""

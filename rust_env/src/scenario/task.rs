@@ -1,0 +1,62 @@
+//! Tasks: the kinds of victims, what they need, and how long they take and wait.
+
+use serde::{Deserialize, Serialize};
+
+/// A kind of victim: the abilities that must meet at it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Task {
+    /// Unique name, such as `task_1`.
+    pub name: String,
+    /// Needed abilities, with repeats if several robots of one ability are needed.
+    pub needs: Vec<String>,
+    /// How long all needs of a victim must be met before it is rescued, s.
+    #[serde(default)]
+    pub service_s: f64,
+    /// What happens to its service when they are not met any more.
+    #[serde(default)]
+    pub service: Interrupted,
+    /// How long after it appeared a victim is lost, s; never if absent.
+    #[serde(default)]
+    pub deadline_s: Option<Deadline>,
+}
+
+impl Task {
+    /// A task whose victims are rescued at touch and wait for ever.
+    #[must_use]
+    pub fn new(name: &str, needs: Vec<String>) -> Self {
+        Self { name: name.into(), needs, service_s: 0.0, service: Interrupted::Keep, deadline_s: None }
+    }
+}
+
+/// What happens to the service of a victim when its needs are not met any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Interrupted {
+    /// It goes on later where it stopped.
+    #[default]
+    Keep,
+    /// It starts anew.
+    Restart,
+}
+
+/// How long a victim waits before it is lost, s.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "deadline_s must be a number or a pair [low, high]")]
+pub enum Deadline {
+    /// As long as every other of its task.
+    Same(f64),
+    /// Drawn for each victim between a least and a largest time.
+    Between([f64; 2]),
+}
+
+impl Deadline {
+    /// The least and the largest, s.
+    #[must_use]
+    pub fn range(self) -> [f64; 2] {
+        match self {
+            Self::Same(seconds) => [seconds, seconds],
+            Self::Between(range) => range,
+        }
+    }
+}
