@@ -16,15 +16,14 @@ from innerattn.cli.options import (
     check_target,
     option_values,
 )
+from innerattn.cli.planners import check_planner, limit_ms
 from innerattn.cli.progress import Evaluating, Planning
 from innerattn.cli.runs import named_policy
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
 from innerattn.config.instances import read_instances
-from innerattn.config.near import did_you_mean
 from innerattn.errors import ConfigError
 from innerattn.policies import SCRIPTED
-from innerattn.policies.scripted.planner import PLANNERS
 from innerattn.report.table import print_table
 from innerattn.report.tables.evaluation import print_summary, result_line
 from innerattn.report.tables.instances import results_line, results_table
@@ -43,7 +42,6 @@ _OF_WORLDS = (
     "long_episode_steps",
 )
 """Options that have no meaning for instances."""
-_MOST_MS = 86_400_000
 
 
 @dataclass(kw_only=True)
@@ -122,19 +120,14 @@ class Evaluate(LongCommand):
         """Measure a planner."""
         from innerattn.evaluate.instances import solve_instances
 
-        if self.policy not in PLANNERS:
-            near = did_you_mean(self.policy, PLANNERS)
-            known = ", ".join(PLANNERS)
-            raise UsageError(f"{self.policy}: with --instances must be one of {known}{near}")
+        check_planner(self.policy, "--instances")
         for name in self._given(*_OF_WORLDS):
             raise UsageError(f"--{name.replace('_', '-')}: has no meaning with --instances")
-        limit_ms = 1000 if self.time_limit_ms is None else self.time_limit_ms
-        if not 1 <= limit_ms <= _MOST_MS:
-            raise UsageError(f"--time-limit-ms {limit_ms}: must be 1 to {_MOST_MS}")
+        limit = limit_ms(self.time_limit_ms)
         check_seed(self.seed)
         instances = read_instances(source)
         with Planning(self.progress_console()) as progress:
-            found = solve_instances(self.policy, instances, limit_ms, self.seed or 0, progress)
+            found = solve_instances(self.policy, instances, limit, self.seed or 0, progress)
         if self._wrote(found.to_json()):
             return 0
         print_table(self.console(), results_table(found))

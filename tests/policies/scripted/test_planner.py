@@ -7,39 +7,16 @@ from collections.abc import Sequence
 from random import Random
 
 import pytest
+from drawn_instances import instances
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from played_schedule import can_do, made_greedily, played
-from pydantic import ValidationError
 
 from innerattn.config.instances import Instance, read_instances
 from innerattn.errors import ScheduleError
 from innerattn.policies.scripted.planner import PLANNERS, plan, schedule_by, simulate
 
 RAL = read_instances("ral")
-
-
-@st.composite
-def instances(draw: st.DrawFn, robots: int = 6, tasks: int = 6) -> Instance:
-    """A team that can do all tasks; some robots have several skills."""
-    place = st.tuples(st.floats(-2, 2), st.floats(-2, 2))
-    skill = st.integers(0, 2)
-    robot = st.fixed_dictionaries({"depot": place, "skills": st.lists(skill, max_size=3)})
-    needs = st.lists(skill, min_size=1, max_size=3)
-    task = st.fixed_dictionaries(
-        {"position": place, "skills": needs, "duration": st.floats(0, 3) | st.just(0.0)}
-    )
-    table = {
-        "name": "drawn",
-        "speed": draw(st.floats(0.1, 3)),
-        "robots": draw(st.lists(robot, min_size=1, max_size=robots)),
-        "tasks": draw(st.lists(task, min_size=1, max_size=tasks)),
-    }
-    try:
-        return Instance.model_validate(table)
-    except ValidationError:
-        all_skills = {"depot": (0.0, 0.0), "skills": [0, 1, 2]}
-        return Instance.model_validate(table | {"robots": [all_skills] * 3})
 
 
 def check_played(instance: Instance, tasks: Sequence[Sequence[int]]) -> None:
