@@ -1,4 +1,4 @@
-"""`innerattn evaluate --instances` and `innerattn info --instance`."""
+"""Instances in `innerattn evaluate`, `innerattn info` and `innerattn replay`."""
 
 import json
 from pathlib import Path
@@ -104,3 +104,64 @@ def test_an_instance_is_described(tmp_path: Path, capsys: Captured) -> None:
     }
     assert main(["info", "--instance", "ral:ral_77"]) == 1
     assert "ral: no instance is named 'ral_77', did you mean" in capsys.readouterr().err
+
+
+def packed(path: Path) -> dict[str, Any]:
+    """What the page of a schedule holds."""
+    mark = '<script type="application/json" id="data">'
+    found = json.loads(path.read_text("utf-8").split(mark, 1)[1].split("</script>", 1)[0])
+    assert isinstance(found, dict)
+    return found
+
+
+def test_a_schedule_is_replayed(
+    tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    instances = read_instances("ral")
+    assert main(["replay", "random", "--instance", "ral:ral_04", "--seed", "7"]) == 0
+    page = tmp_path / "replay.html"
+    makespan = schedule_by("random", instances[4], 0.0, 7).makespan
+    assert packed(page)["makespan"] == makespan
+    ratio = makespan / (instances[4].makespan_milp_600s or 0.0)
+    assert capsys.readouterr().out == (
+        f"replay.html: ral_04, random, makespan {makespan:.2f}, "
+        f"published {instances[4].makespan_milp_600s:.2f}, ratio {ratio:.3f}\n"
+    )
+    other = tmp_path / "other.html"
+    words = ["replay", "--instance", "ral", "--time-limit-ms", "3", "-o", str(other)]
+    assert main(words) == 0
+    assert "ral_00, planner, makespan " in capsys.readouterr().out
+    greedy = schedule_by("greedy", instances[0], 0.0, 0)
+    assert packed(other)["makespan"] <= greedy.makespan
+    assert sorted(tmp_path.iterdir()) == [other, page]
+
+
+def test_wrong_words_for_a_replay(tmp_path: Path, capsys: Captured) -> None:
+    most = 86_400_000
+    cases = [
+        (2, "planner", "planner: needs --instance"),
+        (2, "greedy --time-limit-ms 3", "--time-limit-ms: needs --instance"),
+        (2, "gredy --instance ral", "gredy: with --instance must be one of planner, greedy, rand"),
+        (2, "greedy random --instance ral", "2 policies: with --instance must be one"),
+        (2, "--instance ral --episodes 3", "--episodes: has no meaning with --instance"),
+        (2, "--instance ral --scenario x.toml", "--scenario: has no meaning with --instance"),
+        (2, "--instance ral --robot a", "--robot: has no meaning with --instance"),
+        (2, "--instance ral --episode 0", "--episode: has no meaning with --instance"),
+        (2, f"--instance ral --time-limit-ms {most + 1}", "--time-limit-ms 86400001: must be 1 to"),
+        (2, "--instance ral --seed -1", "--seed -1: must be 0 to 2**63 - 1"),
+        (2, "--instance ral -o x.gif", "-o x.gif: with --instance must end in .html"),
+        (2, "--instance ral -o x.mp4", "-o x.mp4: with --instance must end in .html"),
+        (1, "--instance ral:ral_77", "ral: no instance is named 'ral_77', did you mean"),
+        (1, "--instance rall", "rall: missing, or not a plain file, did you mean 'ral'?"),
+        (1, f"--instance ral -o {tmp_path}/no/x.html", f"{tmp_path}/no: no such folder"),
+    ]
+    out = tmp_path / "out.html"
+    for code, line, told in cases:
+        target = [] if " -o " in line else ["-o", str(out)]
+        assert main(["replay", *line.split(), *target]) == code, line
+        printed, err = capsys.readouterr()
+        assert printed == ""
+        assert err.startswith(f"innerattn: error: {told}"), err
+        assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []

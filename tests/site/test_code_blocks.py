@@ -195,7 +195,7 @@ def test_commands_run(place: Path, command: str, capsys: pytest.CaptureFixture[s
     given = [] if set(small) & set(words) else list(small)
     if words[0] == "replay" and "-o" in words:
         given = []  # one episode, of those that were recorded
-    if "--instances" in words:
+    if "--instances" in words or (words[0] == "replay" and "--instance" in words):
         given = ["--time-limit-ms", "2"]
     assert main([*words, *given]) == 0, capsys.readouterr().err
 

@@ -1,4 +1,4 @@
-"""`innerattn replay`: episodes of trained or scripted policies to watch, as a page or a picture."""
+"""`innerattn replay`: episodes of policies, or a schedule, to watch as a page or a picture."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from innerattn.cli.options import Command, UsageError, check_seed, check_target
+from innerattn.cli.planners import check_planner, limit_ms
 from innerattn.cli.runs import named_policy
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 SCRIPTS = (*SCRIPTED, "oracle")
 SUFFIXES = (".html", ".gif", ".mp4")
+_OF_WORLDS = ("episodes", "scenario", "episode", "robot")
+"""Options that have no meaning for an instance."""
 
 
 @dataclass(kw_only=True)
@@ -29,26 +32,33 @@ class Replay(Command):
     """Watch episodes in a browser, with attention drawn as arrows.
 
     Recorded episodes of a run are shown as they are. Scripts play in the worlds of the first run.
-    With --episodes, --seed or --scenario all policies play anew, in the same worlds.
+    With --episodes, --seed or --scenario all policies play anew, in the same worlds. With
+    --instance it shows a planner's schedule.
     """
 
     policies: Annotated[
         tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN|POLICY|FILE ...")
     ]
     """Runs, evaluation/episodes.parquet files, or random, greedy, hungarian, oracle; up to
-    four, shown side by side."""
+    four, shown side by side. With --instance: planner, greedy or random; none: planner."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("replay.html")
     """File to write: .html is a page, .gif or .mp4 a moving picture of one episode."""
     episodes: int | None = None
     """Episodes to play; None: those that were recorded, or 20."""
     seed: int | None = None
-    """Seed of the worlds to play in; None: as the first run says, or 12345."""
+    """Seed of the worlds to play in; None: as the first run says, or 12345. With --instance, of the
+    planner; None: 0."""
     scenario: Path | None = None
     """TOML file with the scenario to play in; None: that of the first run, or mixed."""
     episode: int | None = None
     """Number of the episode in a moving picture; None: that with most handoffs and rescues."""
     robot: str | None = None
     """Robot whose attention a moving picture shows, or all; None: the first that hands over."""
+    instance: str | None = None
+    """Show a schedule for this instance of task allocation instead: a JSON file, or ral, and a
+    name, as in ral:ral_03; without a name the first."""
+    time_limit_ms: int | None = None
+    """How long planner searches for the instance [ms]; None: 1000."""
 
     def run(self) -> int:
         """Read or play, then write the file.
@@ -60,6 +70,8 @@ class Replay(Command):
             InnerattnError: no such run or policy, nothing recorded, or wrong options.
             OSError: the file cannot be written.
         """
+        if self.instance is not None:
+            return self._of_instance(self.instance)
         self._check()
         self.policies = [named_policy(one, SCRIPTS) for one in self.policies]
         names = _names(self.policies)
@@ -79,7 +91,35 @@ class Replay(Command):
         print(f"{self.output}: {records[0].num_episodes} episodes, {size:.1f} MB")
         return 0
 
+    def _of_instance(self, written: str) -> int:
+        """Plan for an instance and write the page of the schedule."""
+        from innerattn.config.instances import named_instance
+        from innerattn.policies.scripted.planner import schedule_by
+        from innerattn.report.schedule import schedule_page
+        from innerattn.report.tables.instances import schedule_line
+
+        if len(self.policies) > 1:
+            raise UsageError(f"{len(self.policies)} policies: with --instance must be one")
+        policy = self.policies[0] if self.policies else "planner"
+        check_planner(policy, "--instance")
+        for name in _OF_WORLDS:
+            if getattr(self, name) is not None:
+                raise UsageError(f"--{name}: has no meaning with --instance")
+        if self.output.suffix != ".html":
+            raise UsageError(f"-o {self.output}: with --instance must end in .html")
+        limit = limit_ms(self.time_limit_ms)
+        check_seed(self.seed)
+        check_target(self.output)
+        instance = named_instance(written)
+        schedule = schedule_by(policy, instance, limit / 1000, self.seed or 0)
+        write_whole(self.output, schedule_page(instance, schedule, policy).encode())
+        print(f"{self.output}: {instance.name}, {policy}, {schedule_line(instance, schedule)}")
+        return 0
+
     def _check(self) -> None:
+        if self.time_limit_ms is not None or "planner" in self.policies:
+            given = "planner" if self.time_limit_ms is None else "--time-limit-ms"
+            raise UsageError(f"{given}: needs --instance")
         if not 1 <= len(self.policies) <= 4:
             raise UsageError(f"{len(self.policies)} policies: must be 1 to 4 of RUN|POLICY|FILE")
         if self.output.suffix not in SUFFIXES:

@@ -43,6 +43,15 @@ def ratio_text(results: InstanceResults) -> str:
     return number(None) if results.ratio is None else f"{results.ratio:.3f}"
 
 
+def schedule_line(instance: Instance, schedule: Schedule) -> str:
+    """The makespan of one schedule, and what was published where something was."""
+    published = instance.makespan_milp_600s
+    line = f"makespan {number(schedule.makespan)}"
+    if published is None:
+        return line
+    return f"{line}, published {number(published)}, ratio {schedule.makespan / published:.3f}"
+
+
 def instance_words(instance: Instance, schedule: Schedule) -> str:
     """A few lines about an instance and a schedule for it."""
     having = Counter(skill for robot in instance.robots for skill in set(robot.skills))
