@@ -8,6 +8,7 @@ from rich.console import Console
 from innerattn.config import Scenario
 from innerattn.evaluate import Estimate, Performance, Summary
 from innerattn.experiments.score_means import seed_scores
+from innerattn.measures.measure import Value
 from innerattn.report.tables.evaluation import print_seeds, print_summary
 
 SCORE = Estimate(0.5, 0.4, 0.61)
@@ -48,10 +49,11 @@ def summary(
     )
 
 
-def printed(found: Summary) -> list[list[str]]:
+def printed(found: Summary, scenario: Scenario | None = None) -> list[list[str]]:
     """Cells by line."""
     out = io.StringIO()
-    print_summary(Console(file=out, width=80, markup=False), found, Scenario())
+    console = Console(file=out, width=80, markup=False)
+    print_summary(console, found, scenario or Scenario())
     return cells(out.getvalue())
 
 
@@ -75,6 +77,24 @@ def test_one_row_per_policy() -> None:
     assert rows["hungarian"] == ["5.00 ± 0.10", "1.00"] * 2
     assert rows["td-inner (trained)"] == ["3.00 ± 0.11", "0.50 ± 0.10"] * 2
     assert rows["episodes"] == ["1,000", "1,000"]
+
+
+def test_victims_rescued_in_time_have_a_table_where_there_are_deadlines() -> None:
+    plain = Scenario()
+    late = plain.tasks[0].model_copy(update={"deadline_s": 1.0})
+    timed = plain.model_copy(update={"tasks": (late, *plain.tasks[1:])})
+    shares: dict[str, Value] = {"in_time": Estimate(0.8, 0.7, 0.92), "lost": 250}
+    none: dict[str, Value] = {"in_time": None, "lost": 0}
+    of_policy = {"random": none, "greedy": shares, "hungarian": shares, "td-inner": shares}
+    lengths = {
+        name: replace(figures(steps), measures=of_policy)
+        for name, steps in (("standard", 25), ("long", 100))
+    }
+    found = replace(summary(), **lengths)
+    rows = {row[0]: row[1:] for row in printed(found, timed) if row}
+    assert rows["td-inner"] == ["0.80 ± 0.11", "0.25"] * 2
+    assert rows["random"] == ["-", "0.00"] * 2
+    assert "td-inner" not in {row[0] for row in printed(found) if row}
 
 
 def test_a_warm_start_is_named() -> None:

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from innerattn.report.table import Row, Table, columns, plain_table, print_table, section
 from innerattn.report.tables.text import number, plus_minus
+from innerattn.stats import Estimate
 
 if TYPE_CHECKING:
     from innerattn.config import Scenario
@@ -40,6 +41,8 @@ def print_summary(console: Console, summary: Summary, scenario: Scenario) -> Non
     """
     console.print()
     print_table(console, _rescues(summary))
+    if scenario.has_deadlines:
+        print_table(console, _in_time(summary))
     if any(summary.cooperation.values()):
         print_table(console, _cooperation(summary, scenario))
     if summary.attention_entropy:
@@ -118,6 +121,34 @@ def _rescues(summary: Summary) -> Table:
         f"Rescues per episode, situation {summary.situation}",
         (*_POLICIES, *warm),
     )
+
+
+def _in_time(summary: Summary) -> Table:
+    """What share of the victims each policy rescued before their deadline, and how many it lost."""
+    lengths = (summary.standard, summary.long)
+    scripts = [name for name in summary.standard.scripted if name != summary.method]
+    rows = [
+        Row(
+            (name, *(cell for one in lengths for cell in _lost_cells(one, name))),
+            strong=name == summary.method,
+        )
+        for name in (*scripts, summary.method)
+    ]
+    heads = [head for one in lengths for head in (f"{one.episode_steps} steps", "lost")]
+    return Table(
+        columns(["policy"], heads),
+        (section(rows),),
+        "Share of victims rescued before their deadline",
+        ("lost: victims per episode whose deadline passed",),
+    )
+
+
+def _lost_cells(measured: Performance, name: str) -> tuple[str, str]:
+    found = measured.measures[name]
+    in_time, lost = found["in_time"], found["lost"]
+    assert isinstance(in_time, Estimate | None)
+    assert isinstance(lost, int)
+    return plus_minus(in_time), number(lost / measured.episodes)
 
 
 def _warm_start(summary: Summary) -> str:
