@@ -24,6 +24,7 @@ def document(capsys: Captured, policy: str, *options: str) -> dict[str, Any]:
 def test_the_document_has_every_instance(policy: str, capsys: Captured) -> None:
     found = document(capsys, policy, "--instances", "ral", "--time-limit-ms", "2", "--seed", "4")
     assert (found["schema_version"], found["policy"], found["seed"]) == (1, policy, 4)
+    assert found["time_limit_ms"] == (2 if policy == "planner" else None)
     instances = read_instances("ral")
     assert [one["name"] for one in found["instances"]] == [one.name for one in instances]
     for one, instance in zip(found["instances"], instances, strict=True):
@@ -52,7 +53,7 @@ def test_instances_without_published_values(tmp_path: Path, capsys: Captured) ->
     assert (found["ratio"], found["published_mean_makespan"]) == (None, None)
     assert found["instances"][0]["published_makespan"] is None
     assert main([*words, "--quiet"]) == 0
-    assert capsys.readouterr().out == "greedy: mean makespan 30.01, 1 instances\n"
+    assert capsys.readouterr().out == "greedy: mean makespan 30.01, 1 instance\n"
 
 
 def test_the_table_fits_a_terminal(capsys: Captured) -> None:

@@ -45,13 +45,13 @@ class InstanceResults:
     Attributes:
         policy: name of the planner.
         seed: of the planner.
-        time_limit_ms: how long it was to search for each instance [ms].
+        time_limit_ms: how long it was to search for each instance [ms]; None: it does not search.
         solved: one for each instance, in order.
     """
 
     policy: str
     seed: int
-    time_limit_ms: int
+    time_limit_ms: int | None
     solved: tuple[Solved, ...]
 
     @property
@@ -114,4 +114,5 @@ def solve_instances(
         solved.append(Solved(instance, schedule.makespan, time.perf_counter() - began))
         if progress is not None:
             progress(len(solved), len(instances))
-    return InstanceResults(policy, seed, time_limit_ms, tuple(solved))
+    limit = time_limit_ms if policy == "planner" else None
+    return InstanceResults(policy, seed, limit, tuple(solved))

@@ -35,7 +35,9 @@ def results_table(results: InstanceResults) -> Table:
 def results_line(results: InstanceResults) -> str:
     """The same in one line."""
     ratio = "" if results.ratio is None else f", {ratio_text(results)} of the published mean"
-    return f"mean makespan {number(results.mean_makespan)}{ratio}, {len(results.solved)} instances"
+    count = len(results.solved)
+    noun = "instance" if count == 1 else "instances"
+    return f"mean makespan {number(results.mean_makespan)}{ratio}, {count} {noun}"
 
 
 def ratio_text(results: InstanceResults) -> str:
