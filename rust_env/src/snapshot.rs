@@ -32,13 +32,13 @@ struct Head {
 /// What follows a world where victims take time, so that the images of other scenarios stay what they were.
 /// When a victim is lost follows from the world.
 #[derive(Serialize, Deserialize)]
-struct Care {
+struct Tail {
     lost: u32,
     /// Steps of service by slot, 0 where it is empty.
     served: Vec<u32>,
 }
 
-impl Care {
+impl Tail {
     fn is_kept(scenario: &Scenario) -> bool {
         scenario.has_services() || scenario.has_deadlines()
     }
@@ -82,11 +82,11 @@ pub fn most_bytes(rules: &Rules, num_envs: usize) -> usize {
 pub fn save<'a>(rules: &Rules, num_envs: usize, worlds: impl Iterator<Item = &'a World>) -> Vec<u8> {
     let head = Head { version: VERSION, scenario: rules.scenario.to_json(), num_envs };
     let bytes = postcard::to_extend(&head, MAGIC.to_vec()).expect("plain data serialises");
-    let cares = Care::is_kept(&rules.scenario);
+    let has_tail = Tail::is_kept(&rules.scenario);
     let add = |mut bytes, world: &World| {
         bytes = postcard::to_extend(world, bytes).expect("plain data serialises");
-        if cares {
-            bytes = postcard::to_extend(&Care::of(world), bytes).expect("plain data serialises");
+        if has_tail {
+            bytes = postcard::to_extend(&Tail::of(world), bytes).expect("plain data serialises");
         }
         bytes
     };
@@ -134,9 +134,9 @@ pub fn load(rules: &Rules, num_envs: usize, bytes: &[u8]) -> Result<Vec<World>> 
     let mut worlds = Vec::with_capacity(num_envs);
     for env in 0..num_envs {
         let (mut world, mut later) = postcard::take_from_bytes::<World>(rest).map_err(|_| unread())?;
-        if Care::is_kept(&rules.scenario) {
-            let (care, rest) = postcard::take_from_bytes::<Care>(later).map_err(|_| unread())?;
-            if !care.restore(&mut world) {
+        if Tail::is_kept(&rules.scenario) {
+            let (tail, rest) = postcard::take_from_bytes::<Tail>(later).map_err(|_| unread())?;
+            if !tail.restore(&mut world) {
                 return refuse(format!("env {env} does not fit the scenario: its services"));
             }
             later = rest;

@@ -82,7 +82,7 @@ class Stepper(Protocol):
         """
 
 
-class Run(NamedTuple):
+class Segment(NamedTuple):
     """Trained parameters that lie side by side in memory.
 
     Attributes:
@@ -97,11 +97,11 @@ class Run(NamedTuple):
 
 
 class AdamStepper(Network):
-    """A network and its Adam (Kingma & Ba 2015), run by run.
+    """A network and its Adam (Kingma & Ba 2015), segment by segment.
 
     Attributes:
         trained: The parameters that are trained, by name.
-        runs: The same, as they lie in memory; a network has few runs.
+        segments: The same, as they lie in memory; a network has few segments.
         mean: (P,) Adam's running mean of the gradient; 0 where nothing is trained.
         square: (P,) that of its square.
         weight_decay: Weight of the L2 penalty.
@@ -117,38 +117,38 @@ class AdamStepper(Network):
             if parameter.requires_grad
         }
         self.mean, self.square = torch.zeros_like(self.flat), torch.zeros_like(self.flat)
-        self.runs = self._found_runs()
-        self._parts = [nn.Parameter(self.flat[run.part]) for run in self.runs]
+        self.segments = self._found_segments()
+        self._parts = [nn.Parameter(self.flat[segment.part]) for segment in self.segments]
         self._adam = torch.optim.Adam(self._parts, weight_decay=weight_decay, fused=True)
-        for run, part in zip(self.runs, self._parts, strict=True):
+        for segment, part in zip(self.segments, self._parts, strict=True):
             self._adam.state[part] = {
-                "step": run.step,
-                "exp_avg": self.mean[run.part],
-                "exp_avg_sq": self.square[run.part],
+                "step": segment.step,
+                "exp_avg": self.mean[segment.part],
+                "exp_avg_sq": self.square[segment.part],
             }
 
-    def _found_runs(self) -> list[Run]:
-        runs: list[Run] = []
+    def _found_segments(self) -> list[Segment]:
+        segments: list[Segment] = []
         first = 0
         for name, value in self.values.items():
             last = first + value.numel()
             if name in self.trained:
-                if runs and runs[-1].part.stop == first:
-                    names, part, step = runs.pop()
-                    runs.append(Run([*names, name], slice(part.start, last), step))
+                if segments and segments[-1].part.stop == first:
+                    names, part, step = segments.pop()
+                    segments.append(Segment([*names, name], slice(part.start, last), step))
                 else:
                     step = torch.zeros((), dtype=torch.float32, device=self.flat.device)
-                    runs.append(Run([name], slice(first, last), step))
+                    segments.append(Segment([name], slice(first, last), step))
             first = last
-        return runs
+        return segments
 
     @property
     def moments(self) -> dict[str, dict[str, Tensor]]:
         """Adam's live tensors by name of the parameter, then by Adam's own names.
 
-        Parameters of a run share their count of steps.
+        Parameters of a segment share their count of steps.
         """
-        steps = {name: run.step for run in self.runs for name in run.names}
+        steps = {name: segment.step for segment in self.segments for name in segment.names}
         means, squares = self.by_name(self.mean), self.by_name(self.square)
         return {
             name: {
@@ -161,7 +161,7 @@ class AdamStepper(Network):
 
     def memory(self) -> list[Tensor]:
         """Everything that updates change, in few tensors."""
-        return [self.flat, self.mean, self.square, *(run.step for run in self.runs)]
+        return [self.flat, self.mean, self.square, *(segment.step for segment in self.segments)]
 
     def gradients(self, loss_of: Callable[[Forward], tuple[Tensor, Aux]]) -> tuple[Gradients, Aux]:
         """Gradients of a loss; see `Stepper.gradients`."""
@@ -174,13 +174,13 @@ class AdamStepper(Network):
         """Do one step of Adam; see `Stepper.step`. Each parameter keeps its gradient as `grad`."""
         for name, parameter in self.trained.items():
             parameter.grad = gradients[name]
-        for run, part in zip(self.runs, self._parts, strict=True):
-            part.grad = joined(gradients, run)
+        for segment, part in zip(self.segments, self._parts, strict=True):
+            part.grad = joined(gradients, segment)
         for group in self._adam.param_groups:
             group["lr"] = float(learning_rate)
         self._adam.step()
 
 
-def joined(gradients: Gradients, run: Run) -> Tensor:
-    """(n,) the gradients of a run in one piece."""
-    return torch.cat([gradients[name].reshape(-1) for name in run.names])
+def joined(gradients: Gradients, segment: Segment) -> Tensor:
+    """(n,) the gradients of a segment in one piece."""
+    return torch.cat([gradients[name].reshape(-1) for name in segment.names])

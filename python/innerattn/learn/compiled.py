@@ -73,13 +73,13 @@ class TracedStepper(TracedNetwork):
     def __init__(self, plain: AdamStepper) -> None:
         """Use numbers and moments of the plain form, as the same memory."""
         super().__init__(plain)
-        self._runs, self._mean, self._square = plain.runs, plain.mean, plain.square
+        self._segments, self._mean, self._square = plain.segments, plain.mean, plain.square
         self._weight_decay = plain.weight_decay
 
     def gradients(self, loss_of: Callable[[Forward], tuple[Tensor, Aux]]) -> tuple[Gradients, Aux]:
         """Gradients of a loss; see `Stepper.gradients`."""
         values = self.by_name(self.flat)
-        trained = {name: values[name] for run in self._runs for name in run.names}
+        trained = {name: values[name] for segment in self._segments for name in segment.names}
 
         def loss_at(trained: dict[str, Tensor]) -> tuple[Tensor, Aux]:
             return loss_of(lambda *inputs: functional_call(self.module, values | trained, inputs))
@@ -89,12 +89,12 @@ class TracedStepper(TracedNetwork):
 
     def step(self, gradients: Gradients, learning_rate: Tensor) -> None:
         """Do one step of Adam; see `Stepper.step`."""
-        for run in self._runs:
-            value = self.flat[run.part]
-            gradient = joined(gradients, run) + self._weight_decay * value
-            step = run.step.add_(1.0)
-            mean = self._mean[run.part].lerp_(gradient, 1.0 - _BETA_1)
-            square = self._square[run.part].lerp_(gradient.square(), 1.0 - _BETA_2)
+        for segment in self._segments:
+            value = self.flat[segment.part]
+            gradient = joined(gradients, segment) + self._weight_decay * value
+            step = segment.step.add_(1.0)
+            mean = self._mean[segment.part].lerp_(gradient, 1.0 - _BETA_1)
+            square = self._square[segment.part].lerp_(gradient.square(), 1.0 - _BETA_2)
             # The corrections for the start: few numbers, so float64 costs nothing.
             mean_share = (1.0 - _BETA_1 ** step.double()).to(value.dtype)
             square_share = (1.0 - _BETA_2 ** step.double()).sqrt().to(value.dtype)

@@ -17,8 +17,8 @@ from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
 from innerattn.errors import ConfigError
 from innerattn.policies.policy import Policy, PolicyInput, WorldState
 from innerattn.policies.scripted.assignment import Needs, assign, can_be_rescued, pair_costs
-from innerattn.policies.scripted.care import Care
 from innerattn.policies.scripted.steering import Steering
+from innerattn.policies.scripted.timing import Timing
 
 
 class RandomPolicy:
@@ -58,7 +58,7 @@ class _Dispatcher(ABC):
         """Take the team and the tasks from ``scenario``."""
         self.needs = Needs(scenario)
         self.steering = Steering(scenario)
-        self._care = Care(scenario)
+        self._timing = Timing(scenario)
 
     def act(self, view: PolicyInput) -> NDArray[Any]:
         """See `Policy.act`; robots without a victim are drawn to the centre."""
@@ -93,11 +93,11 @@ class GreedyPolicy(_Dispatcher):
         helpful = permitted.any(-1)
         way = places[:, None] - state.positions[:, :, None]
         distance = np.where(helpful, (way * way).sum(-1), np.inf)
-        if self._care.is_needed:
+        if self._timing.is_needed:
             times = self.steering.arrival_times(state.positions, state.velocities, places)
-            helpful &= self._care.in_time(state, times, permitted)[:, None]
+            helpful &= self._timing.in_time(state, times, permitted)[:, None]
             distance = np.where(helpful, distance, np.inf)
-            distance = np.where(helpful & self._care.held(state, times), -1.0, distance)
+            distance = np.where(helpful & self._timing.held(state, times), -1.0, distance)
         return np.where(helpful.any(-1), distance.argmin(-1), -1)
 
 
@@ -116,9 +116,9 @@ class HungarianPolicy(_Dispatcher):
             permitted &= can_be_rescued(permitted, needed)[:, None, :, None]
         times = self.steering.arrival_times(state.positions, state.velocities, places, faults)
         held = None
-        if self._care.is_needed:
-            permitted &= self._care.in_time(state, times, permitted)[:, None, :, None]
-            held = self._care.held(state, times)
+        if self._timing.is_needed:
+            permitted &= self._timing.in_time(state, times, permitted)[:, None, :, None]
+            held = self._timing.held(state, times)
         need = assign(pair_costs(times, permitted, held))
         return np.where(need >= 0, need // permitted.shape[-1], -1)
 

@@ -9,7 +9,7 @@ from innerattn.config import Scenario
 from innerattn.policies.policy import WorldState
 
 
-class Care:
+class Timing:
     """The services and deadlines of one scenario.
 
     Attributes:
