@@ -1,0 +1,90 @@
+"""The policy of any team: each pair proposes an action, and attention over victims decides."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from innerattn.nn.teams.frames import turn_back_choices
+from innerattn.nn.teams.pooling import POOLINGS
+from innerattn.nn.teams.relations import (
+    HOME_WIDTH,
+    NEAREST,
+    PAIR_TURNING_WIDTH,
+    PAIR_WIDTH,
+    Relations,
+)
+
+NUM_CHOICES = 5
+_HOME_HIDDEN = 32
+_SHARPNESS = 10.0
+"""Outputs begin small, so that all actions begin alike, and are to grow soon."""
+
+
+def layer(inputs: int, outputs: int, gain: float = 2.0**0.5) -> nn.Linear:
+    """A linear layer with orthogonal weights and no bias at first."""
+    made = nn.Linear(inputs, outputs)
+    nn.init.orthogonal_(made.weight, gain)
+    nn.init.zeros_(made.bias)
+    return made
+
+
+class TeamActor(nn.Module):
+    """Log-probabilities of the actions of every robot in every world.
+
+    Each pair (robot, victim) is encoded, sees the robot's other pairs (by their maximum), then the
+    pairs of rivals and of partners at its victim (by a pooling), and gives a weight w_v and a
+    distribution p_v over actions in its own frame; so does the robot's way home. The policy is the
+    mixture pi(a) = sum_v softmax(w)_v p_v(a).
+    """
+
+    def __init__(self, width: int, pooling: str, key_width: int) -> None:
+        """Draw initial weights from torch's global generator.
+
+        Args:
+            width: H, hidden units.
+            pooling: one of `POOLINGS`.
+            key_width: width of queries and keys, where the pooling has any.
+        """
+        super().__init__()
+        self.width = width
+        self.first, self.second = layer(PAIR_WIDTH, width), layer(2 * width, width)
+        self.rivals = POOLINGS[pooling](width, key_width)
+        self.partners = POOLINGS[pooling](width, key_width)
+        self.third = layer(PAIR_WIDTH + PAIR_TURNING_WIDTH + 4 * width, width)
+        self.fourth, self.out = layer(width, width), layer(width, 1 + NUM_CHOICES, 0.01)
+        self.home = layer(HOME_WIDTH + width, _HOME_HIDDEN)
+        self.home_out = layer(_HOME_HIDDEN, 1 + NUM_CHOICES, 0.01)
+
+    def forward(self, seen: Relations) -> Tensor:
+        """Log-probabilities (N, 5) of stay, +x, -x, +y, -y for all robots of all worlds."""
+        robots = len(seen.homes)
+
+        def of_robot(rows: Tensor) -> Tensor:
+            table = rows.new_zeros(robots * NEAREST, self.width).index_copy(0, seen.slots, rows)
+            return table.view(robots, NEAREST, self.width).amax(1)
+
+        rows = functional.relu(self.first(seen.pairs))
+        others = of_robot(rows).index_select(0, seen.robots)
+        rows = functional.relu(self.second(torch.cat([rows, others], 1)))
+        own = of_robot(rows)
+        pooled = [
+            pool(rows, seen.cells, masks, seen.times)
+            for pool, masks in ((self.rivals, seen.rivals), (self.partners, seen.partners))
+        ]
+        parts = [seen.pairs, seen.turning, rows, *pooled, own.index_select(0, seen.robots)]
+        rows = functional.relu(self.third(torch.cat(parts, 1)))
+        out = self.out(functional.relu(self.fourth(rows))) * _SHARPNESS
+        home = self.home(torch.cat([seen.homes, own], 1))
+        home = self.home_out(functional.relu(home)) * _SHARPNESS
+
+        weights = out.new_full((robots * NEAREST,), -torch.inf)
+        weights = weights.index_copy(0, seen.slots, out[:, 0]).view(robots, NEAREST)
+        weights = torch.cat([weights, home[:, :1]], 1).log_softmax(1)
+        choices = turn_back_choices(out[:, 1:].log_softmax(1), seen.frames)
+        table = choices.new_zeros(robots * NEAREST, NUM_CHOICES)
+        table = table.index_copy(0, seen.slots, choices).view(robots, NEAREST, NUM_CHOICES)
+        at_home = turn_back_choices(home[:, 1:].log_softmax(1), seen.home_frames)
+        mixed = torch.cat([table, at_home[:, None]], 1) + weights[..., None]
+        return mixed.logsumexp(1)

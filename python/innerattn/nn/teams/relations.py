@@ -1,0 +1,312 @@
+"""Who can help whom, when, and what it means to the others: from tables to rows of pairs.
+
+A row is a pair of a robot and a victim that it can help; a robot has rows for its `NEAREST` victims
+at most. Times are those of `innerattn.policies.scripted.steering.Steering.arrival_times`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from innerattn.nn.teams.frames import frame_of, turn
+from innerattn.nn.teams.tables import TeamTables
+
+NEAREST = 3
+"""Victims that a robot looks at, by its own arrival time."""
+NEVER_S = 1e3
+"""Arrival time of nobody [s]."""
+_LONGEST_S = 8.0
+"""Beyond this, arrival times tell no more."""
+PAIR_WIDTH, PAIR_TURNING_WIDTH, HOME_WIDTH, VICTIM_WIDTH, ROBOT_WIDTH, WORLD_WIDTH = (
+    *(23, 10, 16, 8, 12),
+    9,
+)
+
+
+class Relations(NamedTuple):
+    """What networks see of B worlds: P pairs, M victims, N robots (of all worlds).
+
+    Attributes:
+        pairs: (P, PAIR_WIDTH) columns that do not turn with the world.
+        turning: (P, PAIR_TURNING_WIDTH) vectors (x, y) in each pair's frame.
+        frames: (P,) int64 frame of each pair, which brings its victim to x >= y >= 0.
+        cells: (P,) int64 where each pair stands in a table of (M, R).
+        robots: (P,) int64 each pair's robot, of N.
+        slots: (P,) int64 where each pair stands in a table of (N, NEAREST).
+        rivals: (M, R, R) bool, who could take whose part at a victim.
+        partners: (M, R, R) bool, who completes whom at a victim.
+        times: (M, R) arrival times [s].
+        homes: (N, HOME_WIDTH) the robots themselves, in the frames of their ways to the centre.
+        home_frames: (N,) int64.
+        victims: (M, VICTIM_WIDTH) what stands to happen at each victim.
+        victim_worlds: (M,) int64 world of each victim.
+        team: (N, ROBOT_WIDTH) the robots, for a critic.
+        robot_cells: (N,) int64 where each robot stands in a table of (B, R).
+        worlds: (B, WORLD_WIDTH).
+    """
+
+    pairs: Tensor
+    turning: Tensor
+    frames: Tensor
+    cells: Tensor
+    robots: Tensor
+    slots: Tensor
+    rivals: Tensor
+    partners: Tensor
+    times: Tensor
+    homes: Tensor
+    home_frames: Tensor
+    victims: Tensor
+    victim_worlds: Tensor
+    team: Tensor
+    robot_cells: Tensor
+    worlds: Tensor
+
+
+class _Needs(NamedTuple):
+    """The M victims' needs, and what each of R robots means to them."""
+
+    times: Tensor  # (M, R)
+    useful: Tensor  # (M, R) bool
+    fills: Tensor  # (M, R, K) which need a robot can fill
+    spare: Tensor  # (M, K) able robots minus needed ones; large where none is needed
+    due: Tensor  # (M, K) when the last of the nearest robots could be there for each need
+    rival: Tensor  # (M, R) when my need would be filled without me
+    last: Tensor  # (M, R) when the last of the others could be there
+
+
+@torch.no_grad()
+def relate(tables: TeamTables) -> Relations:
+    """The relations in B worlds; what comes of them does not depend on any order or name."""
+    world, slot = tables.is_victim.nonzero(as_tuple=True)
+    envs, size = tables.is_robot.shape
+    slots = tables.is_victim.shape[1]
+    way = tables.places[world, slot].unsqueeze(1) - tables.positions[world]
+    distance = way.norm(dim=-1)
+    speed, lag = tables.bodies[world, :, 0].clamp(min=1e-6), tables.bodies[world, :, 1]
+    towards = (way * tables.velocities[world]).sum(-1) / distance.clamp(min=1e-6)
+    radius, half = tables.worlds[world, 1:2], tables.worlds[world, 0:1]
+    gap = (distance - radius).clamp(min=0.0)
+    times = gap / speed + (lag * (1.0 - towards / speed)).clamp(min=0.0) * (gap > 0.0)
+    times = times.clamp(max=_LONGEST_S)
+    needed = tables.needs[world, slot]
+    needs = _look_at_needs(times, needed, tables.abilities[world] * tables.is_robot[world, :, None])
+    rivals, partners = _rivals_and_partners(needs.fills, needs.useful, needed)
+
+    # Each robot's victims, by its own arrival time.
+    place = (world[:, None] * size + torch.arange(size)) * slots + slot[:, None]  # (M, R)
+    own = torch.full((envs * size * slots,), NEVER_S)
+    own[place] = torch.where(needs.useful, times, NEVER_S)
+    own = own.view(envs * size, slots)
+    order = own.argsort(stable=True, dim=1)
+    rank = torch.empty_like(order).scatter_(1, order, torch.arange(slots).expand_as(order))
+    ranks = rank.view(-1)[place]
+    soonest = own.amin(1).view(envs, size)
+    choices = (own < NEVER_S).sum(1).view(envs, size)
+
+    inside = (distance <= radius) & needs.useful
+    met = (needs.fills * inside[..., None]).sum(1).minimum(needed).sum(-1, keepdim=True)
+    count, waiting = needed.sum(-1, keepdim=True), tables.is_victim.sum(1)[world].unsqueeze(1)
+    nearer = ((times[:, None] < times[:, :, None]) & rivals).sum(-1)
+    spare_mine = torch.where(needs.fills > 0.0, needs.spare[:, None], 5.0).amin(-1)
+    columns = [
+        distance,
+        times / 2.0,
+        towards,
+        inside,
+        count / 3.0,
+        met / 3.0,
+        needs.fills.sum(-1) / 2.0,
+        needs.spare.amin(-1, keepdim=True).clamp(-1.0, 4.0) / 3.0,
+        spare_mine.clamp(-1.0, 4.0) / 3.0,
+        speed,
+        tables.bodies[world, :, 2].clamp(max=3.0),
+        half,
+        waiting / 4.0,
+        tables.worlds[world, 2:3] / 4.0,
+        ranks / 2.0,
+        (times - soonest[world]).clamp(0.0, 4.0),
+        choices[world] / 3.0,
+        (needs.rival - times).clamp(-3.0, 3.0),
+        needs.last.clamp(max=4.0),
+        (needs.last - times).clamp(-3.0, 3.0),
+        nearer / 3.0,
+        rivals.sum(-1) / 3.0,
+        partners.sum(-1) / 3.0,
+    ]
+    rows = torch.stack([column.expand_as(times).float() for column in columns], -1)
+    cells = (needs.useful & (ranks < NEAREST)).view(-1).nonzero().squeeze(1)
+    victim, robot = cells // size, cells % size
+    of_all = world[victim] * size + robot
+
+    # Vectors, in a frame that brings the victim to x >= y >= 0.
+    mate = _nearest_teammate(tables).view(-1, 2)
+    position, velocity = tables.positions.flatten(0, 1), tables.velocities.flatten(0, 1)
+    target = way.view(-1, 2)[cells]
+    next_way = _next_victim(tables, order, own, of_all, slot[victim])
+    vectors = (target, velocity[of_all], mate[of_all], position[of_all], next_way)
+    frames = frame_of(target)
+    turning = torch.cat([turn(vector, frames) for vector in vectors], -1)
+
+    robot_cells = tables.is_robot.flatten(0, 1).nonzero().squeeze(1)
+    number = torch.full((envs * size,), -1)
+    number[robot_cells] = torch.arange(len(robot_cells))
+    scarcity = _scarcity(tables).view(-1, 2)
+    homes, home_frames, team = _robots(tables, robot_cells, soonest, choices, mate, scarcity)
+    victims = [
+        needs.due.amax(-1).clamp(max=5.0),
+        (needs.due.amax(-1) >= NEVER_S).float(),
+        needs.due.masked_fill(needed <= 0.0, NEVER_S).amin(-1).clamp(max=5.0),
+        *(column.squeeze(1) / 3.0 for column in (count, met)),
+        needs.spare.amin(-1).clamp(-1.0, 4.0) / 3.0,
+        waiting.squeeze(1) / 4.0,
+        half.squeeze(1),
+    ]
+    return Relations(
+        pairs=rows.view(-1, PAIR_WIDTH)[cells],
+        turning=turning,
+        frames=frames,
+        cells=cells,
+        robots=number[of_all],
+        slots=number[of_all] * NEAREST + ranks.view(-1)[cells],
+        rivals=rivals,
+        partners=partners,
+        times=times,
+        homes=homes,
+        home_frames=home_frames,
+        victims=torch.stack(victims, -1),
+        victim_worlds=world,
+        team=team,
+        robot_cells=robot_cells,
+        worlds=_worlds(tables),
+    )
+
+
+def _look_at_needs(times: Tensor, needed: Tensor, able: Tensor) -> _Needs:
+    """What robots (M, R) with abilities (M, R, K) mean to victims with needs (M, K)."""
+    wanted = needed > 0.0
+    fills = able * wanted[:, None]
+    can = fills > 0.0
+    spare = torch.where(wanted, fills.sum(1) - needed, 5.0)
+    by_need = torch.where(can, times[..., None], NEVER_S).transpose(1, 2).sort(-1).values
+    # The c-th nearest stands at c: nobody is needed at 0, and beyond the last there is nobody.
+    nth = functional.pad(functional.pad(by_need, (1, 0)), (0, 2), value=NEVER_S)
+    count = needed.long().clamp(max=times.shape[1] + 1)
+    due, after = (nth.gather(2, c[..., None]).squeeze(-1) for c in (count, count + 1))
+    before = nth.gather(2, (count - 1).clamp(min=0)[..., None]).squeeze(-1)
+    mine = times[..., None]
+    among = can & (mine <= due[:, None])
+    without_me = torch.where(among, after[:, None], due[:, None])
+    others = torch.where(can & (mine < due[:, None]), due[:, None], before[:, None])
+    others = torch.where(can, others, due[:, None])
+    return _Needs(
+        times=times,
+        useful=can.any(-1),
+        fills=fills,
+        spare=spare,
+        due=due,
+        rival=torch.where(can, without_me, NEVER_S).amin(-1),
+        last=others.amax(-1),
+    )
+
+
+def _rivals_and_partners(fills: Tensor, useful: Tensor, needed: Tensor) -> tuple[Tensor, Tensor]:
+    """(M, R, R) bool: who could take whose part; who completes whom."""
+    others = ~torch.eye(fills.shape[1], dtype=torch.bool)
+    alike = (fills @ fills.transpose(1, 2)) > 0.0
+    twice = ((fills * (needed > 1.0)[:, None]) @ fills.transpose(1, 2)) > 0.0
+    both = useful[:, :, None] & useful[:, None] & others
+    return alike & others, both & (~alike | twice)
+
+
+def _nearest_teammate(tables: TeamTables) -> Tensor:
+    """(B, R, 2) way to the nearest teammate, at most 2 m in x and y; zero for a robot alone."""
+    ways = tables.positions[:, None] - tables.positions[:, :, None]
+    squares = ways.pow(2).sum(-1)
+    nobody = torch.eye(ways.shape[1], dtype=torch.bool) | ~tables.is_robot[:, None]
+    nearest = squares.masked_fill(nobody, torch.inf).argmin(-1)
+    found = ways.gather(2, nearest[..., None, None].expand(-1, -1, 1, 2)).squeeze(2)
+    return found.clamp(-2.0, 2.0) * (~nobody).any(-1, keepdim=True)
+
+
+def _next_victim(
+    tables: TeamTables, order: Tensor, own: Tensor, robot: Tensor, slot: Tensor
+) -> Tensor:
+    """(P, 2) way from a pair's robot to its soonest other victim; zero where there is none."""
+    if order.shape[1] < 2:
+        return torch.zeros(len(robot), 2)
+    first, second = order[robot, 0], order[robot, 1]
+    other = torch.where(first == slot, second, first)
+    way = tables.places[robot // tables.is_robot.shape[1], other]
+    way = way - tables.positions.flatten(0, 1)[robot]
+    return way * (own[robot, other] < NEVER_S)[:, None]
+
+
+def _scarcity(tables: TeamTables) -> Tensor:
+    """(B, R, 2) how much a robot's abilities are asked for: of the scarcest one, and of all."""
+    have = tables.abilities * tables.is_robot[..., None]
+    share = have * (tables.demand / have.sum(1).clamp(min=1.0))[:, None]
+    return torch.stack([share.amax(-1), share.sum(-1)], -1)
+
+
+def _robots(
+    tables: TeamTables,
+    cells: Tensor,
+    soonest: Tensor,
+    choices: Tensor,
+    mate: Tensor,
+    scarcity: Tensor,
+) -> tuple[Tensor, Tensor, Tensor]:
+    """The N robots for their actors, with their frames, and for a critic."""
+    home = -tables.positions.flatten(0, 1)[cells]
+    velocity, body = tables.velocities.flatten(0, 1)[cells], tables.bodies.flatten(0, 1)[cells]
+    half = tables.worlds[cells // tables.is_robot.shape[1], 0]
+    frames = frame_of(home)
+    chosen = choices.view(-1)[cells]
+    own = torch.stack(
+        [
+            body[:, 0],
+            body[:, 1],
+            body[:, 2].clamp(max=3.0),
+            (chosen > 0).float(),
+            chosen / 3.0,
+            tables.abilities.flatten(0, 1)[cells].amax(-1),
+            soonest.view(-1)[cells].clamp(max=4.0),
+            half,
+            *scarcity[cells].unbind(-1),
+        ],
+        -1,
+    )
+    vectors = [turn(vector, frames) for vector in (home, velocity, mate[cells])]
+    way = home.norm(dim=-1)
+    towards = (velocity * home).sum(-1) / way.clamp(min=1e-6)
+    team = torch.cat([own, torch.stack([way / half, towards], -1)], -1)
+    return torch.cat([own, *vectors], -1), frames, team
+
+
+def _worlds(tables: TeamTables) -> Tensor:
+    """(B, WORLD_WIDTH) what tells teams and their tasks apart, for a critic."""
+    robots = tables.is_robot.float()
+    number = robots.sum(1)
+    speeds = tables.bodies[..., 0]
+    slowest = speeds.masked_fill(~tables.is_robot, torch.inf).amin(1)
+    have = (tables.abilities * robots[..., None]).sum(1)
+    spare = torch.where(tables.demand > 0.0, have / tables.demand.clamp(min=1e-6), 9.0).amin(1)
+    return torch.stack(
+        [
+            number / 10.0,
+            tables.worlds[:, 0],
+            tables.worlds[:, 1] * 5.0,
+            tables.worlds[:, 2] / 4.0,
+            tables.demand.sum(1) / 2.0,
+            spare.clamp(max=6.0) / 3.0,
+            (speeds * robots).sum(1) / number,
+            slowest,
+            tables.is_victim.sum(1) / 4.0,
+        ],
+        -1,
+    )

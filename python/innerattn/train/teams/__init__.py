@@ -1,0 +1,1 @@
+"""Training of one policy for a family of teams."""

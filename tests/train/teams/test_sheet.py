@@ -1,0 +1,80 @@
+"""Tables read from observations, against the true state of the worlds."""
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+import torch
+
+from innerattn.config import Scenario
+from innerattn.config.family import Family
+from innerattn.config.scenario import Fault
+from innerattn.envs import BatchEnv
+from innerattn.errors import ConfigError
+from innerattn.nn.teams import TeamActor, relate
+from innerattn.train.teams.sheet import TeamSheet, as_tensor
+
+NOISE = Fault(robot="robot_0", kind="position_noise", value=0.0)
+
+
+@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("each", [False, True])
+def test_tables_are_the_true_state(number: int, each: bool) -> None:
+    scenario = Family(unavailable=0.5).draw(8, number)
+    if each:  # senses may fail, though they do not
+        scenario = scenario.replace(faults=(*scenario.faults, NOISE))
+    with closing(BatchEnv(scenario, 7, seed=number)) as env:
+        env.reset()
+        rng = np.random.default_rng(number)
+        for _ in range(5):
+            obs = env.step(rng.integers(0, 5, (7, env.num_robots))).obs
+        sheet = TeamSheet(scenario, env.observation_names())
+        assert sheet.each_sees == each
+        tables = sheet.tables(as_tensor(obs))
+        copies = env.num_robots if each else 1
+        positions, velocities = env.positions(), env.velocities()
+        for found, true in ((tables.positions, positions), (tables.velocities, velocities)):
+            np.testing.assert_allclose(found, np.repeat(true, copies, 0), atol=1e-5)
+        abilities = sorted({one for robot in scenario.robots for one in robot.abilities})
+        able = np.array([[a in robot.abilities for a in abilities] for robot in scenario.robots])
+        available = env.fault_state()["unavailable"] < 0.5
+        expected = np.repeat(able & available[..., None], copies, 0)
+        np.testing.assert_array_equal(tables.abilities, expected)
+        _same_victims(tables.is_victim, tables.places, tables.needs, env, abilities, copies)
+
+
+def _same_victims(
+    is_victim: torch.Tensor,
+    places: torch.Tensor,
+    needs: torch.Tensor,
+    env: BatchEnv,
+    abilities: list[str],
+    copies: int,
+) -> None:
+    """Victims are those that are present, in any order."""
+    tasks = [[task.needs.count(one) for one in abilities] for task in env.scenario.tasks]
+    for row, victims in enumerate(np.repeat(env.victims(), copies, 0)):
+        true = sorted(
+            (*(float(v[axis]) for axis in "xy"), *tasks[v["task"]]) for v in victims if v["present"]
+        )
+        there = is_victim[row]
+        found = sorted(torch.cat([places[row], needs[row]], -1)[there].tolist())
+        np.testing.assert_allclose(found, true, atol=1e-5)
+
+
+def test_who_sees_for_himself_acts_as_all_do_while_senses_are_well() -> None:
+    scenario = Family(unavailable=0.0).draw(2, 1)
+    torch.manual_seed(0)
+    actor = TeamActor(16, "inner", 8)
+    with closing(BatchEnv(scenario, 9, seed=3)) as env:
+        obs, names = as_tensor(env.reset()), env.observation_names()
+    together = TeamSheet(scenario, names)
+    each = TeamSheet(scenario.replace(faults=[NOISE.model_dump()]), names)
+    found = [sheet.own_rows(actor(relate(sheet.tables(obs)))) for sheet in (together, each)]
+    torch.testing.assert_close(found[0], found[1], atol=1e-4, rtol=1e-4)
+
+
+def test_continuous_actions_are_refused() -> None:
+    scenario = Scenario(actions="continuous")
+    with pytest.raises(ConfigError, match="actions = 'continuous': must be 'discrete'"):
+        TeamSheet(scenario, BatchEnv(scenario, 1).observation_names())

@@ -1,0 +1,86 @@
+"""Worlds of several teams as one batch."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import torch
+
+from innerattn.config import Scenario
+from innerattn.config.family import Family
+from innerattn.envs import BatchEnv
+from innerattn.policies import PolicyInput, WorldState, scripted_policy
+from innerattn.train.teams.worlds import TeamWorlds
+
+BASE = Scenario(episode_steps=12, engine="discs")
+FAMILY = Family(robots=(2, 5))
+
+
+@contextmanager
+def team_worlds(seed: int = 1) -> Iterator[TeamWorlds]:
+    worlds = TeamWorlds(FAMILY, BASE, seed=seed, groups=3, worlds_per_group=4, script="hungarian")
+    yield worlds
+    worlds.close()
+
+
+def played(worlds: TeamWorlds, steps: int) -> list[torch.Tensor]:
+    found = []
+    for _ in range(steps):
+        outcome = worlds.step(worlds.wanted(), 0.3)
+        found += [*outcome, *worlds.relations()]
+    return found
+
+
+def world_seed(number: int) -> int:
+    return int(np.random.SeedSequence([1, 2, number]).generate_state(1)[0])
+
+
+def test_each_team_is_as_if_it_were_alone() -> None:
+    with team_worlds() as worlds:
+        envs = [one.env for one in worlds._worlds]
+        alone = [
+            BatchEnv(env.scenario, 4, seed=world_seed(number), num_threads=1)
+            for number, env in enumerate(envs)
+        ]
+        scripts = [scripted_policy("hungarian", env.scenario) for env in envs]
+        for env in alone:
+            env.reset()
+        for _ in range(15):  # past the end of an episode
+            outcome = worlds.step(worlds.wanted(), 0.5)
+            rewards, rescues, ended = [], [], []
+            for env, script in zip(alone, scripts, strict=True):
+                step = env.step(script.act(PolicyInput(env.observe(), WorldState.of(env))))
+                names = env.reward_component_names
+                parts = torch.from_numpy(env.reward_components()[:, 0].copy())
+                rescue = parts[:, names.index("rescue")]
+                rewards.append(rescue + 0.5 * parts[:, names.index("progress")])
+                rescues.append(rescue)
+                ended.append(torch.from_numpy(step.truncated | step.terminated))
+            assert torch.equal(outcome.rewards, torch.cat(rewards))
+            assert torch.equal(outcome.rescues, torch.cat(rescues))
+            assert torch.equal(outcome.ended, torch.cat(ended))
+        assert float(outcome.ended.float().mean()) < 1.0
+
+
+def test_equal_seeds_give_equal_teams_and_worlds() -> None:
+    runs = []
+    for seed in (1, 1, 2):
+        with team_worlds(seed) as worlds:
+            first = played(worlds, 3)
+            worlds.redraw(2)
+            runs.append((first, [one.env.scenario for one in worlds._worlds], played(worlds, 3)))
+    assert runs[0][1] == runs[1][1]
+    assert all(
+        torch.equal(a, b)
+        for one, other in ((runs[0][0], runs[1][0]), (runs[0][2], runs[1][2]))
+        for a, b in zip(one, other, strict=True)
+    )
+    assert runs[0][1] != runs[2][1]
+
+
+def test_redrawing_replaces_so_many_teams() -> None:
+    with team_worlds() as worlds:
+        before = [one.env.scenario for one in worlds._worlds]
+        worlds.redraw(2)
+        after = [one.env.scenario for one in worlds._worlds]
+    assert sum(one != other for one, other in zip(before, after, strict=True)) == 2
