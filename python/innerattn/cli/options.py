@@ -19,6 +19,7 @@ from rich.console import Console
 
 from innerattn.cli.plain import PlainConsole
 from innerattn.config import RunConfig
+from innerattn.config.family import Family
 from innerattn.config.model import OneOf
 from innerattn.errors import ConfigError, InnerattnError, RunError
 
@@ -131,7 +132,7 @@ def _in_train(name: str) -> str:
 def run_options(defaults: RunConfig) -> list[OptionField]:
     """Options for every key of a run, with ``defaults``, as fields of a dataclass for tyro."""
     options = [short_option(name, getattr(defaults.train, name)) for name in _SHORT]
-    for section, values in defaults:
+    for section, values in _sections(defaults):
         kind: Any = _section_type(section, values)
         options.append((section, kind, field(default_factory=kind)))
     return options
@@ -140,7 +141,7 @@ def run_options(defaults: RunConfig) -> list[OptionField]:
 def changed(command: object, defaults: RunConfig) -> dict[str, object]:
     """The values of a parsed command that differ from ``defaults``, by dotted key."""
     values = {f"train.{name}": getattr(command, name) for name in _SHORT}
-    for section, _ in defaults:
+    for section, _ in _sections(defaults):
         given = vars(getattr(command, section))
         values |= {f"{section}.{name}": value for name, value in given.items()}
     before = defaults.model_dump()
@@ -149,6 +150,11 @@ def changed(command: object, defaults: RunConfig) -> dict[str, object]:
         for key, value in values.items()
         if value != before[key.split(".")[0]][key.split(".")[1]]
     }
+
+
+def _sections(defaults: RunConfig) -> list[tuple[str, BaseModel]]:
+    """All sections but that of a family, which has an option of its own and a file."""
+    return [(name, values) for name, values in defaults if name != Family.place]
 
 
 def _type_of(info: FieldInfo) -> Any:

@@ -61,6 +61,9 @@ class _Sources(LongCommand):
     """Built-in scenario."""
     scenario_file: Annotated[Path | None, tyro.conf.arg(name="scenario")] = None
     """TOML file with a scenario of your own, instead of --preset."""
+    family_file: Annotated[str | None, tyro.conf.arg(name="family", metavar="any|FILE")] = None
+    """Train one policy for many teams: any, the built-in family, or a TOML file with ranges. The
+    scenario says the rest, and where the policy is measured."""
     budget: Budget = "quick"
     """Built-in budget: how long to train, and with which numbers."""
     config: Path | None = None
@@ -87,6 +90,7 @@ class _Sources(LongCommand):
             config_file=self.config,
             overrides=overrides,
             scenario_file=self.scenario_file,
+            family=self.family_file,
         )
 
 
@@ -102,7 +106,10 @@ class _Choice(_Sources):
     def defaults(self) -> RunConfig:
         if self.seed is not None and self.seeds is not None:
             raise UsageError(f"--seed {self.seed}, --seeds {self.seeds}: must be one of the two")
-        chosen = {"train.method": self.method, "train.warm_start": self.warm_start}
+        method = self.method
+        if method is None and self.family_file is not None:
+            method = "team-inner"
+        chosen = {"train.method": method, "train.warm_start": self.warm_start}
         found = self.load({key: value for key, value in chosen.items() if value is not None})
         return found if self.seeds is not None else _with_workers(found)
 
@@ -227,7 +234,8 @@ class _Train(_Sources):
         from innerattn.evaluate import evaluate_run
         from innerattn.evaluate.training_score import scripted_rescues
 
-        scripts = partial(scripted_rescues, config)
+        # Scripts play one team; what a family's teams rescue has no one score.
+        scripts = partial(scripted_rescues, config) if config.family is None else None
         with RunLoggers(self.log, Opened(run_dir, config), failed=say_not_logged) as loggers:
             try:
                 with Training(self.progress_console(), scripts=scripts, config=config) as progress:
@@ -296,6 +304,7 @@ class _Train(_Sources):
         train = config.train
         warm = "" if train.warm_start == "none" else f"-from-{train.warm_start}"
         worlds = self.scenario_file.stem if self.scenario_file else config.scenario.situation
+        worlds = Path(self.family_file).stem if self.family_file else worlds
         name = f"{worlds}-{train.method}{warm}-{self.budget}"
         return Path("runs") / f"{name}-s{train.seed}-{stamp}"
 
@@ -316,8 +325,11 @@ def _what(config: RunConfig) -> str:
     workers = "" if train.workers == 1 else f", {train.workers} workers"
     if train.warm_start != "none":
         first = f"Imitating {train.warm_start} first: {config.imitation.env_steps:,} env-steps\n"
+    where = config.scenario.situation if config.family is None else "a family of teams"
+    if train.env_steps == 0:
+        return f"{first}Training {train.method} on {where}: imitation alone"
     return (
-        f"{first}Training {train.method} on {config.scenario.situation}: "
+        f"{first}Training {train.method} on {where}: "
         f"{train.env_steps:,} env-steps in {train.num_envs} worlds{workers}"
     )
 

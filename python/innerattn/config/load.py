@@ -13,6 +13,7 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
+from innerattn.config.family import Family
 from innerattn.config.files import (
     budget_table,
     preset_table,
@@ -26,6 +27,8 @@ from innerattn.config.run import RunConfig
 from innerattn.config.scenario import Scenario, scenario_table
 from innerattn.errors import ConfigError
 
+ANY = "any"
+"""Name of the family that comes with the package."""
 _CHOOSING = ("method", "warm_start")
 """Keys of the section `train` on which the values of a budget depend."""
 
@@ -37,6 +40,7 @@ def load_run_config(
     config_file: str | Path | None = None,
     overrides: Mapping[str, object] | None = None,
     scenario_file: str | Path | None = None,
+    family: str | Path | None = None,
 ) -> RunConfig:
     """The configuration of a run.
 
@@ -48,6 +52,8 @@ def load_run_config(
         overrides: values by dotted key, e.g. ``{"td.gamma": 0.99}``, or
             ``{"train.schedule.gamma": {"first": 0.9, "last": 0.99}}`` in a section's own section.
         scenario_file: TOML file as of `Scenario.from_toml`.
+        family: "any" for the family of the package, or a TOML file with the keys of a
+            `innerattn.config.family.Family`, at the top or in a section ``family``.
 
     Raises:
         ConfigError: unknown preset or key, value out of range, or values that contradict each
@@ -77,6 +83,8 @@ def load_run_config(
         if chosen["warm_start"] not in (None, "none"):
             _merge(table, budget_table(known.algorithm.warm_budgets, budget))
     _merge(table, given)
+    if family is not None:
+        table["family"] = family_table(family)
     for key, value in single.items():
         _put(table, key, value)
     if config_file is None:
@@ -85,8 +93,32 @@ def load_run_config(
         return _validated(table, "" if overrides else str(config_file))
     except ConfigError:
         if overrides:  # where the file is wrong by itself, the message names it
-            load_run_config(preset, method, budget, config_file, scenario_file=scenario_file)
+            load_run_config(
+                preset, method, budget, config_file, scenario_file=scenario_file, family=family
+            )
         raise
+
+
+def family_table(family: str | Path) -> dict[str, Any]:
+    """The keys of a family: none for "any", or those of a TOML file.
+
+    Raises:
+        ConfigError: the file cannot be read, or is wrong.
+    """
+    if str(family) == ANY:
+        return {}
+    table = toml_table(family)
+    section = table.get(Family.place)
+    if isinstance(section, dict):
+        if others := [key for key in table if key != Family.place]:
+            where = f"must stand in [{Family.place}], as the others do"
+            raise ConfigError(f"{family}: {others[0]}: {where}")
+        table = section
+    try:
+        Family.model_validate(table)
+    except ValidationError as error:
+        raise config_error(error, Family.place, str(family), Family) from error
+    return table
 
 
 def write_toml(config: RunConfig, path: str | Path) -> None:

@@ -16,13 +16,14 @@ from importlib.metadata import entry_points
 from innerattn.config.algorithm import Algorithm, Method
 from innerattn.config.ppo import PPO
 from innerattn.config.td import TD
+from innerattn.config.team import TEAM
 
 EXTENSIONS = "innerattn.extensions"
 """Entry point group; every entry point names a module, which registers things when imported."""
 
 _log = logging.getLogger(__name__)
 
-_algorithms = {algorithm.name: algorithm for algorithm in (TD, PPO)}
+_algorithms = {algorithm.name: algorithm for algorithm in (TD, PPO, TEAM)}
 _attentions = {
     "inner": "innerattn.nn:InnerAttention",
     "uniform": "innerattn.nn:UniformAttention",

@@ -8,19 +8,27 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from innerattn.config.algorithm import AlgorithmConfig, Needs
+from innerattn.config.family import Family
 from innerattn.config.files import preset_names
-from innerattn.config.model import Model, config_error, places_of_keys, values_for_digest
+from innerattn.config.model import (
+    ADDED_LATER,
+    Model,
+    config_error,
+    places_of_keys,
+    values_for_digest,
+)
 from innerattn.config.near import did_you_mean
 from innerattn.config.ppo import PPOConfig
 from innerattn.config.registry import algorithms, methods
 from innerattn.config.scenario import Scenario
 from innerattn.config.sections import EvaluateConfig, ImitationConfig, NetworkConfig, TrainConfig
 from innerattn.config.td import TDConfig
+from innerattn.config.team import TeamConfig
 from innerattn.errors import ConfigError
 
 BUDGETS = preset_names("budgets")
@@ -63,6 +71,11 @@ class RunConfig(Model):
     )
     train: TrainConfig = Field(default_factory=TrainConfig, description="the run")
     evaluate: EvaluateConfig = Field(default_factory=EvaluateConfig, description="measuring")
+    family: Annotated[Family | None, ADDED_LATER] = Field(
+        None,
+        description="teams that one policy is trained for, with a method team-...; None: the "
+        "scenario's own team",
+    )
 
     @property
     def algorithm(self) -> AlgorithmConfig:
@@ -154,6 +167,7 @@ class RunConfig(Model):
         self._check_swap()
         self._check_potential()
         self._check_workers()
+        self._check_any_team()
         gamma, world = self.algorithm.gamma, self.scenario
         if world.shaping == "potential" and self.train.schedule.gamma is not None:
             raise ValueError(
@@ -212,6 +226,22 @@ class RunConfig(Model):
         for key, whole in self.shared_by_workers().items():
             if whole % count:
                 raise ValueError(f"train.workers = {count}: must divide {key} = {whole}")
+
+    def _check_any_team(self) -> None:
+        """Refuse a family, and imitation alone, for methods that learn for one team."""
+        train = self.train
+        if isinstance(self.algorithm, TeamConfig):
+            if train.env_steps == 0 and train.warm_start == "none":
+                raise ValueError("train.env_steps = 0: must be at least 1 without a warm start")
+            return
+        able = ", ".join(name for name in methods() if name.startswith(f"{TeamConfig.place}-"))
+        if self.family is not None:
+            raise ValueError(
+                f"family: train.method = {train.method!r} learns for one team; methods for a "
+                f"family are {able}"
+            )
+        if train.env_steps == 0:
+            raise ValueError("train.env_steps = 0: must be at least 1")
 
     def _check_potential(self) -> None:
         """Refuse keys of a potential that do not go together."""

@@ -169,9 +169,10 @@ class TrainConfig(Model):
     num_envs: int = Field(64, ge=1, le=1_000_000, description="worlds stepped side by side")
     env_steps: int = Field(
         150_000,
-        ge=1,
+        ge=0,
         le=MOST_STEPS,
-        description="length of learning from rewards, summed over worlds [env-steps]",
+        description="length of learning from rewards, summed over worlds [env-steps]; 0: none, "
+        "after a warm start of a policy for any team",
     )
     log_every_env_steps: int = Field(
         5_000,

@@ -11,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from innerattn.config import RunConfig, Scenario
+from innerattn.config.team import TeamConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.learn.types import Learner
@@ -59,8 +60,9 @@ def load_trained(
             they saw in training.
         ConfigError: its configuration is not valid.
     """
-    config, learner = load_policy(run)
-    if scenario is not None and _seen(scenario) != _seen(config.scenario):
+    config, learner = load_policy(run, scenario=scenario)
+    for_one_team = not isinstance(config.algorithm, TeamConfig)
+    if for_one_team and scenario is not None and _seen(scenario) != _seen(config.scenario):
         raise RunError(
             f"{run}: was trained for other observations than these worlds give "
             f"(another team, other tasks or another number of victims; "

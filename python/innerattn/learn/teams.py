@@ -12,6 +12,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from innerattn.learn.advantage import generalised_advantage
+from innerattn.learn.resume import State, inside, take, take_generator, take_whole, under, whole
 from innerattn.nn.teams import Relations, TeamActor, TeamCritic
 
 _ADVANTAGE_FLOOR = 0.02
@@ -87,12 +88,76 @@ class TeamLearner:
         self._mean, self._std = torch.zeros(()), torch.ones(())
         self.updates = self.rollouts = 0
 
+    def seed_draws(self, seed: int) -> None:
+        """Let the actions that are drawn from now on follow from ``seed`` alone."""
+        self._generator.manual_seed(seed)
+
+    def state(self) -> dict[str, Tensor]:
+        """Copies of everything learnt, by name."""
+        scale = {"returns.mean": self._mean.clone(), "returns.std": self._std.clone()}
+        return {name: one.detach().clone() for name, one in self._named()} | scale
+
+    def load(self, state: State) -> None:
+        """Restore what `state` returned.
+
+        Raises:
+            ValueError: a name, shape or dtype is wrong; the learner is left unchanged.
+        """
+        known = [*(name for name, _ in self._named()), "returns.mean", "returns.std"]
+        if unknown := sorted(state.keys() - set(known)):
+            raise ValueError(f"has {unknown[0]!r}, which these networks have not")
+        found = {name: take(state, name, torch.float32, *one.shape) for name, one in self._named()}
+        mean, std = (take(state, f"returns.{one}", torch.float32) for one in ("mean", "std"))
+        if float(std) <= 0.0:
+            raise ValueError(f"'returns.std' = {float(std)}: must be positive")
+        with torch.no_grad():
+            for name, one in self._named():
+                one.copy_(found[name])
+        self._mean, self._std = mean.clone(), std.clone()
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """All that `state` does not have; see `Resumable`."""
+        counts = {"updates": whole(self.updates), "rollouts": whole(self.rollouts)}
+        state = counts | {"generator": self._generator.get_state()}
+        for name, one in self._named():
+            moments = self._adam.state[one]
+            state |= under(f"adam.{name}", {key: moments[key] for key in moments})
+        return state
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `Resumable`."""
+        self.updates, self.rollouts = take_whole(state, "updates"), take_whole(state, "rollouts")
+        take_generator(state, "generator", self._generator)
+        moments = inside("adam", state)
+        for name, one in self._named():
+            if not self.updates:
+                continue
+            squares = take(moments, f"{name}.exp_avg_sq", torch.float32, *one.shape)
+            if bool((squares < 0.0).any()):
+                raise ValueError(f"'adam.{name}.exp_avg_sq': must not be negative")
+            self._adam.state[one] = {
+                "step": take(moments, f"{name}.step", torch.float32).clone(),
+                "exp_avg": take(moments, f"{name}.exp_avg", torch.float32, *one.shape).clone(),
+                "exp_avg_sq": squares.clone(),
+            }
+
+    def _named(self) -> list[tuple[str, torch.nn.Parameter]]:
+        """All parameters by name."""
+        networks = {"actor": self.actor, "critic": self.critic}
+        return [
+            (f"{network}.{name}", one)
+            for network, module in networks.items()
+            for name, one in module.named_parameters()
+        ]
+
     @torch.no_grad()
-    def act(self, seen: Relations) -> tuple[Tensor, Tensor]:
-        """Draw actions (N,) int64; and their log-probabilities (N,)."""
+    def act(self, seen: Relations, *, greedy: bool = False) -> tuple[Tensor, Tensor]:
+        """Draw actions (N,) int64, or take the likeliest; and their log-probabilities (N,)."""
         log_probs = self.actor(seen)
-        noise = torch.empty_like(log_probs).exponential_(generator=self._generator)
-        actions = (log_probs.exp() / noise).argmax(1)
+        chances = log_probs.exp()
+        if not greedy:
+            chances /= torch.empty_like(chances).exponential_(generator=self._generator)
+        actions = chances.argmax(1)
         return actions, log_probs.gather(1, actions[:, None]).squeeze(1)
 
     @torch.no_grad()
@@ -115,7 +180,7 @@ class TeamLearner:
 
         Returns:
             Means by name: `agreement` with the script, `entropy` [nats], `kl` [nats],
-            `value_error`.
+            `critic_loss`.
         """
         advantage, target = self._targets(rollout, after, groups)
         for options in self._adam.param_groups:
@@ -183,9 +248,9 @@ class TeamLearner:
         seen = rollout.seen[step]
         log_probs = self.actor(seen)
         entropy = -(log_probs.exp() * log_probs).sum(1).mean()
-        value_error = functional.mse_loss(self.critic(seen), target)
-        loss = 0.5 * value_error
-        found = {"entropy": entropy, "value_error": value_error}
+        critic_loss = functional.mse_loss(self.critic(seen), target)
+        loss = 0.5 * critic_loss
+        found = {"entropy": entropy, "critic_loss": critic_loss}
         if weights.imitation:
             wanted = rollout.wanted[step]
             loss = loss + weights.imitation * functional.nll_loss(log_probs, wanted)

@@ -53,7 +53,8 @@ def _varied(
     section: dict[str, Any], parts: dict[str, Any], of_key: Callable[[dict[str, Any]], Any]
 ) -> dict[str, Any]:
     """A section of a run, with something made of the schema of each of its keys."""
-    of = parts[section["$ref"].rpartition("/")[2]]
+    one = section if "$ref" in section else section["anyOf"][0]  # or none at all
+    of = parts[one["$ref"].rpartition("/")[2]]
     properties = {}
     for key, value in of["properties"].items():
         if "$ref" in value:  # a section of a section

@@ -14,6 +14,7 @@ from torch import Tensor
 
 from innerattn.config import RunConfig, Scenario
 from innerattn.config.registry import methods
+from innerattn.config.team import TeamConfig
 from innerattn.cores import usable_cores
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError, RunError
@@ -27,6 +28,8 @@ from innerattn.train.columns import (
     state_columns,
     vector_columns,
 )
+from innerattn.train.teams.learner import team_networks
+from innerattn.train.teams.policy import TeamPolicy
 
 
 def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -> Learner:
@@ -41,6 +44,8 @@ def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -
         ConfigError: the device does not exist here, or the scenario does not allow
             `network.symmetry`.
     """
+    if isinstance(config.algorithm, TeamConfig):
+        return TeamPolicy(config, env)
     names, team = env.observation_names(), team_of(config, env)
     make: LearnerClass = resolve_name(methods()[config.train.method].algorithm.learner)
     device = _device(config.train.device)
@@ -70,9 +75,12 @@ def refuse_larger_networks(
     Raises:
         RunError: the configuration asks for larger networks.
     """
-    with torch.device("meta"):
-        team = team_of(config, env)  # tensors on "meta" have a shape and no memory
-        networks = draw_networks(team, config.network, torch.Generator("cpu"), critic_outputs=1)
+    with torch.device("meta"):  # tensors have a shape and no memory there
+        if isinstance(config.algorithm, TeamConfig):
+            networks = team_networks(config.algorithm)
+        else:
+            team, generator = team_of(config, env), torch.Generator("cpu")
+            networks = draw_networks(team, config.network, generator, critic_outputs=1)
     least = sum(one.numel() for network in networks for one in network.parameters())
     found = sum(tensor.numel() for tensor in weights.values())
     if least > found:

@@ -68,7 +68,7 @@ class Collector:
         self._device = device
         self._schedule = schedule
         self._afterstates = afterstates
-        self._obs = self._tensor(_staggered(env) if stagger_starts else env.reset())
+        self._obs = self._tensor(staggered(env) if stagger_starts else env.reset())
         self._open_rescues: NDArray[np.int64] = np.zeros(env.num_envs, np.int64)
         self._episodes = self._rescues = self._total = self._all_rescues = 0
 
@@ -143,7 +143,7 @@ class Collector:
         return torch.tensor(array, device=self._device)
 
 
-def _staggered(env: BatchEnv) -> NDArray[np.float32]:
+def staggered(env: BatchEnv) -> NDArray[np.float32]:
     """Begin episodes so that worlds are at different steps of them; observations (E, R, D).
 
     Until then the robots stand still.

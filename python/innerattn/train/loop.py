@@ -117,14 +117,14 @@ def _go_on(path: Path, saved: Saved, progress: Callable[[Progress], None] | None
         prepared(saved.config, info.threads, stage, compilable=info.compiled) as ready,
     ):
         parts = ready.parts
-        if parts.resumable is None:
+        if not parts.can_resume:
             method = saved.config.train.method
             raise NothingToResumeError(f"{path}: method {method!r} cannot go on from a file")
         saved.load_into(parts)
         _warn_of_changes(saved, ready.compiled, ready.matmul_backend)
         folder = RunFolder(path, replace(info, resumed=info.resumed + 1))
         counters = saved.info.counters
-        folder.mark("running", saved.number, parts.learner.updates, counters.seconds)
+        folder.mark("running", saved.number, parts.updates, counters.seconds)
         keep = saved.config.train.keep_checkpoints
         Checkpoints(path, saved.config.digest(), keep).sweep(saved.number)
         RecordedStages(parts, folder, ready.interruptions, progress, saved.info).run()

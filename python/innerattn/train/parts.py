@@ -1,6 +1,8 @@
-"""What a training is made of, built from its configuration, and its state as a whole."""
+"""What the training of one team is made of, and its state as a whole."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 import torch
@@ -10,32 +12,32 @@ from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
 from innerattn.learn.framed import unframed
+from innerattn.learn.interruptions import Interruptions
 from innerattn.learn.resume import Resumable, State, inside, take, under
 from innerattn.learn.ring import Ring
 from innerattn.learn.types import Learner, ResumableLearner, SkippingLearner
 from innerattn.train.attention_log import AttentionLog
 from innerattn.train.build import build_learner, team_of
 from innerattn.train.checkpoint_info import Stage
-from innerattn.train.collect import Collector
+from innerattn.train.collect import Collector, Tally
 from innerattn.train.imitate import Imitation
 from innerattn.train.memory import refuse_what_does_not_fit
 from innerattn.train.metrics import Interval
-from innerattn.train.potential import unfitted_potential
+from innerattn.train.potential import fitted_potential, unfitted_potential
 from innerattn.train.schedule import Schedule
+from innerattn.train.training import Training
 
 
-class Parts:
-    """The parts of one training.
+class Parts(Training):
+    """The parts of one training of one team.
 
     Attributes:
-        config: the run.
         env: its worlds.
         learner: what is trained.
         schedule: what changes over the run.
         collector: steps the learner in the worlds.
         imitation: the warm start, if there is one.
         attention: what the critic attended to of late.
-        interval: counts since the last line of metrics.
     """
 
     def __init__(self, config: RunConfig, env: BatchEnv, stage: Stage) -> None:
@@ -46,6 +48,7 @@ class Parts:
             MemoryError: a memory is too large.
         """
         self.config, self.env = config, env
+        self.env_steps_at_once, self.robot_names = config.train.num_envs, env.robot_names
         self.learner: Learner = build_learner(config, env, training=True)
         self.schedule = Schedule(config, env, self.learner)
         device = torch.device(config.train.device)
@@ -54,6 +57,7 @@ class Parts:
         self.collector = Collector(env, self.learner, device, self.schedule, stagger, afterstates)
         warm = stage == "imitating" and config.train.warm_start != "none"
         self.imitation = Imitation(config, env, self.learner, self.collector) if warm else None
+        self.imitation_env_steps = None if self.imitation is None else self.imitation.env_steps
         refuse_what_does_not_fit(self.rings(stage), config)
         actions = team_of(config, env).actions
         self.attention = AttentionLog(
@@ -75,15 +79,79 @@ class Parts:
         able = isinstance(unframed(self.learner), ResumableLearner)
         return self.learner if able and isinstance(self.learner, ResumableLearner) else None
 
+    @property
+    def can_resume(self) -> bool:
+        """See `Training.can_resume`."""
+        return self.resumable is not None
+
+    @property
+    def updates(self) -> int:
+        """See `Training.updates`."""
+        return self.learner.updates
+
+    def begin(self, interruptions: Interruptions) -> None:
+        """Let the learner hear of interruptions, and a script's value shape rewards if asked for.
+
+        The first line of metrics says how well the value fits.
+        """
+        if self.resumable is not None:
+            self.resumable.interruptions = interruptions
+        if self.config.train.potential != "none" and self.schedule.potential is None:
+            potential, correlation = fitted_potential(self.config, self.env, interruptions.check)
+            self.schedule.shape(potential)
+            self.interval.add_losses({"potential_correlation": correlation})
+
+    def imitate(self, share: float) -> Mapping[str, float]:
+        """See `Training.imitate`; one control step."""
+        assert self.imitation is not None  # parts were built for this stage
+        newest, metrics = self.imitation.collect(share)
+        self.attention.add(newest.obs, newest.actions)
+        return metrics
+
+    def learn_imitating(self, share: float) -> Mapping[str, float]:
+        """See `Training.learn_imitating`."""
+        assert self.imitation is not None
+        return self.imitation.learn(share)
+
+    def collect(self, share: float) -> Mapping[str, float]:
+        """See `Training.collect`; one control step."""
+        self.schedule.set_progress(share)
+        transitions, truncated = self.collector.step()
+        self.learner.observe(transitions, truncated)
+        self.attention.add(transitions.obs, transitions.actions)
+        return {}
+
+    def learn(self, share: float) -> Mapping[str, float]:
+        """See `Training.learn`."""
+        self.schedule.set_progress(share)
+        self.learner.set_progress(share)
+        return self.learner.learn() or {}
+
+    def take_tally(self) -> Tally:
+        """See `Training.take_tally`."""
+        return self.collector.take_tally()
+
+    def attention_entropy(self) -> dict[str, list[float]]:
+        """See `Training.attention_entropy`."""
+        return self.attention.entropy(self.learner)
+
+    def weights(self) -> dict[str, Tensor]:
+        """See `Training.weights`."""
+        return self.learner.state()
+
+    def compile(self) -> None:
+        """See `Training.compile`."""
+        self.learner.compile()
+
     def rings(self, stage: Stage) -> dict[str, Ring]:
-        """The large memories that are needed from ``stage`` on, by name."""
+        """See `Training.rings`."""
         rings = {} if self.resumable is None else under_rings("learner", self.resumable.rings())
         if stage == "imitating" and self.imitation is not None:
             rings |= under_rings("imitation", self.imitation.rings())
         return rings
 
     def resume_state(self, stage: Stage) -> dict[str, Tensor]:
-        """All else that is needed to go on in ``stage``, by name; see `Resumable`."""
+        """See `Training.resume_state`."""
         worlds = np.frombuffer(self.env.snapshot(), np.uint8).copy()
         state = {"worlds": torch.from_numpy(worlds)}
         for name, part in self._parts(stage).items():
@@ -93,11 +161,7 @@ class Parts:
         return state
 
     def load(self, weights: State, state: State, stage: Stage) -> None:
-        """Go on from a state, once the rings are filled.
-
-        Raises:
-            ValueError: it is none of an equal run in this stage.
-        """
+        """See `Training.load`."""
         self.learner.load(dict(weights))
         self.env.restore(take(state, "worlds", torch.uint8, None).numpy().tobytes())
         for name, part in self._parts(stage).items():

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from torch import Tensor
 
-from innerattn.config import RunConfig
+from innerattn.config import RunConfig, Scenario
+from innerattn.config.team import TeamConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.learn.actor_critic import MOMENTS
@@ -40,23 +41,29 @@ class NewestPolicy:
     env_steps: int
 
 
-def load_policy(run: str | Path, device: str = "cpu") -> tuple[RunConfig, Learner]:
+def load_policy(
+    run: str | Path, device: str = "cpu", scenario: Scenario | None = None
+) -> tuple[RunConfig, Learner]:
     """The configuration of a run and a learner with its newest weights.
 
     Args:
         run: the run folder, or ``zoo:NAME``.
         device: where the networks are put; the device of training need not exist here.
+        scenario: the worlds that a policy for any team is to act in; None: those of the run. Other
+            policies act in their own.
 
     Raises:
         RunError: no run folder, none of ours, no checkpoint yet, or weights that are truncated,
             altered or of other networks.
         ConfigError: its ``config.toml`` is not valid.
     """
-    newest = load_newest(run, device)
+    newest = load_newest(run, device, scenario)
     return newest.config, newest.learner
 
 
-def load_newest(run: str | Path, device: str = "cpu") -> NewestPolicy:
+def load_newest(
+    run: str | Path, device: str = "cpu", scenario: Scenario | None = None
+) -> NewestPolicy:
     """As `load_policy`, with the time of the weights; also while training saves newer ones.
 
     Raises:
@@ -69,13 +76,13 @@ def load_newest(run: str | Path, device: str = "cpu") -> NewestPolicy:
             break
         name = weights_name(files)
         try:
-            return _load(files, name, device)
+            return _load(files, name, device, scenario)
         except RunError:
             # A training drops old checkpoints; this one may be gone since its name was read.
             if weights_name(files) == name:
                 raise
     files = RunFiles(path)
-    return _load(files, weights_name(files), device)
+    return _load(files, weights_name(files), device, scenario)
 
 
 def moments_in(state: dict[str, Tensor]) -> dict[str, Tensor]:
@@ -83,13 +90,16 @@ def moments_in(state: dict[str, Tensor]) -> dict[str, Tensor]:
     return {name: tensor for name, tensor in state.items() if name.split(".")[0] in MOMENTS}
 
 
-def _load(files: RunFiles, name: str, device: str) -> NewestPolicy:
+def _load(files: RunFiles, name: str, device: str, scenario: Scenario | None) -> NewestPolicy:
     config = config_of(files)
     train = config.train.model_copy(update={"device": device})
     weights = files.path / name
     known = files.info.weights_sha256 if files.info.state != "running" else None
     tensors = weights_in(files.read(name, MOST_BYTES), weights, known)
-    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
+    worlds = config.scenario
+    if scenario is not None and isinstance(config.algorithm, TeamConfig):
+        worlds = scenario
+    with closing(BatchEnv(worlds, 1, num_threads=1)) as env:
         refuse_larger_networks(config, env, tensors, weights)
         learner = build_learner(config.model_copy(update={"train": train}), env)
     try:

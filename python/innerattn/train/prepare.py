@@ -10,6 +10,7 @@ import torch
 
 from innerattn.config import RunConfig
 from innerattn.config.streams import stream_seed
+from innerattn.config.team import TeamConfig
 from innerattn.envs import BatchEnv
 from innerattn.learn import workers
 from innerattn.train.build import keep_heap_small, torch_threads
@@ -18,6 +19,8 @@ from innerattn.train.compilation import compiles
 from innerattn.train.interruption import Interruptions, remembered_interruptions
 from innerattn.train.matmul_backend import chosen_matmul_backend
 from innerattn.train.parts import Parts
+from innerattn.train.teams.training import TeamTraining
+from innerattn.train.training import Training
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class Prepared:
         interruptions: requests to stop.
     """
 
-    parts: Parts
+    parts: Training
     compiled: bool
     matmul_backend: str
     interruptions: Interruptions
@@ -58,6 +61,10 @@ def prepared(
         chosen_matmul_backend(config.train.matmul_backend) as matmul_backend,
         remembered_interruptions() as interruptions,
     ):
+        if isinstance(config.algorithm, TeamConfig):
+            with closing(TeamTraining(config, stage)) as training:
+                yield Prepared(training, False, matmul_backend, interruptions)
+            return
         worlds = workers.share_of(config.train.num_envs)
         env = BatchEnv(
             config.training_scenario,
@@ -75,5 +82,5 @@ def prepared(
                 # The compiler counts the graphs of a process, and gives up after eight. Those of
                 # earlier runs are of no use to this one, which shall be compiled, too.
                 torch.compiler.reset()
-                parts.learner.compile()
+                parts.compile()
             yield Prepared(parts, compiled, matmul_backend, interruptions)

@@ -18,11 +18,11 @@ from innerattn.train.checkpoint_info import Best, CheckpointInfo
 from innerattn.train.compilation import say_uncompiled
 from innerattn.train.interruption import Interruptions
 from innerattn.train.metrics import Metrics, MetricsFile
-from innerattn.train.parts import Parts
 from innerattn.train.progress import Progress
 from innerattn.train.row_files import RowsOnDisk
 from innerattn.train.saved import Checkpoints, Content
 from innerattn.train.stages import Stages
+from innerattn.train.training import Training
 from innerattn.train.workers.states import own_part, rows_of_others, state_of_all
 
 _log = logging.getLogger(__name__)
@@ -33,7 +33,7 @@ class RecordedStages(Stages):
 
     def __init__(
         self,
-        parts: Parts,
+        parts: Training,
         folder: RunFolder,
         interruptions: Interruptions,
         progress: Callable[[Progress], None] | None,
@@ -70,7 +70,7 @@ class RecordedStages(Stages):
         now = Progress(
             env_steps=at.stage_env_steps,
             total_env_steps=total,
-            updates=self._parts.learner.updates - at.stage_updates_before,
+            updates=self._parts.updates - at.stage_updates_before,
             seconds=self._parts.interval.seconds - at.stage_seconds_before,
             metrics=self._metrics,
             stage=at.stage,
@@ -82,12 +82,12 @@ class RecordedStages(Stages):
 
     def _log(self) -> None:
         parts = self._parts
-        before, tally = parts.interval.env_steps, parts.collector.take_tally()
+        before, tally = parts.interval.env_steps, parts.take_tally()
         self._metrics = parts.interval.close(
             self._at.env_steps,
-            parts.learner.updates,
+            parts.updates,
             tally,
-            parts.attention.entropy(parts.learner),
+            parts.attention_entropy(),
         )
         self._note_best(tally.all_rescues, self._at.env_steps - before)
         line = self._metrics
@@ -104,13 +104,13 @@ class RecordedStages(Stages):
             return
         at = self._at
         rescues, env_steps = rescues + at.counted_rescues, env_steps + at.counted_env_steps
-        if env_steps < self._config.num_envs * self._parts.env.scenario.episode_steps:
+        if env_steps < self._config.num_envs * self._parts.config.training_scenario.episode_steps:
             self._at = replace(at, counted_rescues=rescues, counted_env_steps=env_steps)
             return
         best, rate = at.best, rescues / env_steps
         if best is None or rate >= best.rescues_per_env_step:
             best = Best(rate, at.env_steps)
-            self._best_weights = self._parts.learner.state()
+            self._best_weights = self._parts.weights()
         self._at = replace(at, best=best, counted_rescues=0, counted_env_steps=0)
 
     def _save_if_possible(self) -> None:
@@ -121,8 +121,8 @@ class RecordedStages(Stages):
 
     def _save(self) -> None:
         """Save everything that the run needs to go on, or the weights if it cannot go on."""
-        weights = self._parts.learner.state()
-        if self._parts.resumable is None:
+        weights = self._parts.weights()
+        if not self._parts.can_resume:
             self._folder.save_weights(weights, self._at.env_steps)
             return
         self._at = replace(self._at, seconds=self._parts.interval.seconds)
@@ -149,7 +149,7 @@ class RecordedStages(Stages):
         """Save what the run came to, and remove what it needed on the way."""
         now, best = self._at.env_steps, self._at.best
         self._file.sync()
-        self._folder.save_weights(self._parts.learner.state(), now)
+        self._folder.save_weights(self._parts.weights(), now)
         self._checkpoints.save_best(best, self._best_weights)
         self._mark("done")
         self._checkpoints.keep_last_weights_only(now, best)
@@ -176,4 +176,4 @@ class RecordedStages(Stages):
 
     def _mark(self, state: State) -> None:
         parts = self._parts
-        self._folder.mark(state, self._at.env_steps, parts.learner.updates, parts.interval.seconds)
+        self._folder.mark(state, self._at.env_steps, parts.updates, parts.interval.seconds)

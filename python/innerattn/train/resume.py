@@ -17,10 +17,10 @@ from innerattn.train.build import refuse_larger_networks
 from innerattn.train.checkpoint_info import MOST_BYTES as MOST_INFO_BYTES
 from innerattn.train.checkpoint_info import CheckpointInfo, checkpoint_info
 from innerattn.train.metrics import MetricsFile
-from innerattn.train.parts import Parts
 from innerattn.train.row_files import FORMAT as ROWS_FORMAT
 from innerattn.train.row_files import file_name, read_rows
 from innerattn.train.saved import INFO, STATE_FORMAT, nothing_was_saved, whole_checkpoints
+from innerattn.train.training import Training
 from innerattn.train.weights import FORMAT, MOST_BYTES, tensors_in
 from innerattn.train.workers.states import own_name, own_part
 
@@ -59,7 +59,7 @@ class Saved:
     weights: State
     state: State
 
-    def load_into(self, parts: Parts) -> None:
+    def load_into(self, parts: Training) -> None:
         """Let a training that was built anew go on from here.
 
         Raises:

@@ -17,12 +17,10 @@ from innerattn.errors import RunError
 from innerattn.learn import workers
 from innerattn.learn.compiled import CompilerError
 from innerattn.learn.divergence import DivergenceError
-from innerattn.learn.types import Transitions
 from innerattn.train.checkpoint_info import Counters, Stage
 from innerattn.train.interruption import Interruptions
 from innerattn.train.metrics import refuse_divergence
-from innerattn.train.parts import Parts
-from innerattn.train.potential import fitted_potential
+from innerattn.train.training import Training
 
 _CLOCK_EVERY = 8
 """Control steps after which several workers look at the clock of the first one."""
@@ -32,12 +30,12 @@ class Stages(ABC):
     """One training, from where it is to its end; of several workers, the part that one does."""
 
     def __init__(
-        self, parts: Parts, interruptions: Interruptions, counters: Counters | None
+        self, parts: Training, interruptions: Interruptions, counters: Counters | None
     ) -> None:
         """Begin, or go on from the counters of a checkpoint that ``parts`` were loaded from."""
         self._parts, self._config = parts, parts.config.train
         self._interruptions = interruptions
-        first: Stage = "training" if parts.imitation is None else "imitating"
+        first: Stage = "training" if parts.imitation_env_steps is None else "imitating"
         self._at = Counters(stage=first) if counters is None else counters
         self._saved_at = time.monotonic()
         self._in_step = False
@@ -91,10 +89,7 @@ class Stages(ABC):
         """
         try:
             workers.total(torch.zeros(1))  # the folder is there before anybody writes to it
-            if self._parts.resumable is not None:
-                self._parts.resumable.interruptions = self._interruptions
-            if self._config.potential != "none" and self._parts.schedule.potential is None:
-                self._fit_potential()
+            self._parts.begin(self._interruptions)
             with self._interruptions.deferred():
                 self._run_stages()
                 self._finish()
@@ -105,7 +100,7 @@ class Stages(ABC):
             raise
         except DivergenceError as error:
             self._give_up()
-            text = error.text(self._parts.env.robot_names)
+            text = error.text(self._parts.robot_names)
             raise RunError(
                 f"training diverged at env_steps = {self._at.env_steps}: {text}"
             ) from error
@@ -115,41 +110,32 @@ class Stages(ABC):
 
     def _run_stages(self) -> None:
         if self._at.stage == "imitating":
-            imitation = self._parts.imitation
-            assert imitation is not None  # parts were built for this stage
-            self._do(imitation.env_steps, imitation.collect, imitation.learn)
+            total = self._parts.imitation_env_steps
+            assert total is not None  # parts were built for this stage
+            self._do(total, self._parts.imitate, self._parts.learn_imitating)
             self._at = replace(
                 self._at,
                 stage="training",
                 stage_env_steps=0,
-                stage_updates_before=self._parts.learner.updates,
+                stage_updates_before=self._parts.updates,
                 stage_seconds_before=self._parts.interval.seconds,
             )
-        self._do(self._config.env_steps, self._collect, self._learn)
-
-    def _fit_potential(self) -> None:
-        """Let a script's value shape rewards; the first line of metrics says how well it fits."""
-        parts = self._parts
-        potential, correlation = fitted_potential(
-            parts.config, parts.env, self._interruptions.check
-        )
-        parts.schedule.shape(potential)
-        parts.interval.add_losses({"potential_correlation": correlation})
+        self._do(self._config.env_steps, self._parts.collect, self._parts.learn)
 
     def _do(
         self,
         total: int,
-        collect: Callable[[float], tuple[Transitions, Mapping[str, float]]],
+        collect: Callable[[float], Mapping[str, float]],
         learn: Callable[[float], Mapping[str, float]],
     ) -> None:
         """Repeat control steps and updates until ``total`` env-steps are done."""
-        worlds = self._config.num_envs
+        at_once = self._parts.env_steps_at_once
         self._open_rows()
         while self._at.learning or self._at.stage_env_steps < total:
             self._interruptions.check()
             if not self._at.learning:
                 self._collect_step(collect, self._at.stage_env_steps / total)
-            share = (self._at.stage_env_steps - worlds) / total
+            share = (self._at.stage_env_steps - at_once) / total
             try:
                 metrics = learn(share)
             except CompilerError as error:
@@ -163,16 +149,16 @@ class Stages(ABC):
 
     def _collect_step(
         self,
-        collect: Callable[[float], tuple[Transitions, Mapping[str, float]]],
+        collect: Callable[[float], Mapping[str, float]],
         share: float,
     ) -> None:
         self._in_step = True
-        newest, metrics = collect(share)
-        self._parts.attention.add(newest.obs, newest.actions)
+        metrics = collect(share)
+        at_once = self._parts.env_steps_at_once
         self._at = replace(
             self._at,
-            env_steps=self._at.env_steps + self._config.num_envs,
-            stage_env_steps=self._at.stage_env_steps + self._config.num_envs,
+            env_steps=self._at.env_steps + at_once,
+            stage_env_steps=self._at.stage_env_steps + at_once,
             step_metrics=dict(metrics),
             learning=True,
         )
@@ -183,28 +169,18 @@ class Stages(ABC):
         refuse_divergence({"losses": metrics}, now)
         self._parts.interval.add_losses(metrics)
         self._at = replace(self._at, learning=False, step_metrics={})
-        crossed = (now - self._config.num_envs) // every < now // every
+        crossed = (now - self._parts.env_steps_at_once) // every < now // every
         if crossed or self._at.stage_env_steps >= total:
             self._log()
         self._write_whole_row_files()
 
-    def _collect(self, share: float) -> tuple[Transitions, Mapping[str, float]]:
-        self._parts.schedule.set_progress(share)
-        transitions, truncated = self._parts.collector.step()
-        self._parts.learner.observe(transitions, truncated)
-        return transitions, {}
-
-    def _learn(self, share: float) -> Mapping[str, float]:
-        self._parts.schedule.set_progress(share)
-        self._parts.learner.set_progress(share)
-        return self._parts.learner.learn() or {}
-
     def _is_checkpoint_due(self) -> bool:
         every, now = self._config.checkpoint_every_env_steps, self._at.env_steps
-        if every and (now - self._config.num_envs) // every < now // every:
+        at_once = self._parts.env_steps_at_once
+        if every and (now - at_once) // every < now // every:
             return True
         minutes = self._config.checkpoint_every_minutes
-        if not minutes or (workers.count() > 1 and now // self._config.num_envs % _CLOCK_EVERY):
+        if not minutes or (workers.count() > 1 and now // at_once % _CLOCK_EVERY):
             return False
         due = time.monotonic() - self._saved_at >= 60.0 * minutes
         return bool(workers.of_first(torch.tensor(due)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -9,25 +10,26 @@ import torch
 from torch import Tensor
 
 from innerattn.config import Scenario
-from innerattn.config.family import Family
 from innerattn.envs import BatchEnv
+from innerattn.learn.resume import State, take, take_within
 from innerattn.nn.teams import Relations, joined_tables, relate
 from innerattn.policies import Policy, PolicyInput, WorldState, scripted_policy
+from innerattn.train.collect import Tally, staggered
 from innerattn.train.teams.sheet import TeamSheet, as_tensor
+
+_MOST = 2**62
 
 
 class Outcome(NamedTuple):
     """What one control step of all worlds led to.
 
     Attributes:
-        rewards: (B,) float32 the team's reward: rescues, and the shaping reward with its weight.
-        rescues: (B,) float32 reward of rescues alone.
+        rewards: (B,) float32 the team's reward, with a weight of the part for coming nearer.
         terminated: (B,) bool.
         ended: (B,) bool, terminated or truncated.
     """
 
     rewards: Tensor
-    rescues: Tensor
     terminated: Tensor
     ended: Tensor
 
@@ -35,11 +37,21 @@ class Outcome(NamedTuple):
 class _Group:
     """Worlds of one team."""
 
-    def __init__(self, scenario: Scenario, count: int, seed: int, script: str | None) -> None:
+    def __init__(
+        self,
+        number: int,
+        scenario: Scenario,
+        count: int,
+        seed: int,
+        script: str | None,
+        stagger: bool,
+    ) -> None:
+        self.number = number
         self.env = BatchEnv(scenario, count, seed=seed, num_threads=1, copy=False)
+        self.open_rescues = np.zeros(count, np.int64)
         self.sheet = TeamSheet(scenario, self.env.observation_names())
         self.script: Policy | None = None if script is None else scripted_policy(script, scenario)
-        self.obs = self.env.reset()
+        self.obs = self.env.reset() if not stagger else staggered(self.env)
 
 
 class TeamWorlds:
@@ -51,42 +63,37 @@ class TeamWorlds:
 
     def __init__(
         self,
-        family: Family,
-        base: Scenario,
+        draw: Callable[[int], Scenario],
         *,
         seed: int,
         groups: int,
         worlds_per_group: int,
         script: str | None,
+        stagger_starts: bool = False,
     ) -> None:
         """Draw the first teams.
 
         Args:
-            family: of the teams.
-            base: what the family does not draw.
-            seed: of teams and worlds.
+            draw: gives team 0, 1, 2 and so on.
+            seed: of the worlds, and of which teams are replaced.
             groups: G.
             worlds_per_group: worlds of each team.
             script: whose actions `wanted` gives; None: nobody's.
+            stagger_starts: let worlds of a team be at different steps of their episodes.
         """
         self.groups = groups
-        self._family, self._seed, self._script = family, seed, script
-        self._base = base.replace(rescue_credit="team")
-        self._count = worlds_per_group
-        self._drawn = 0
-        self._choice = np.random.default_rng([seed, 1])
-        names = BatchEnv.reward_component_names
-        self._rescue, self._progress = names.index("rescue"), names.index("progress")
+        self._scenario, self._seed, self._script = draw, seed, script
+        self._count, self._stagger = worlds_per_group, stagger_starts
+        self._drawn = self._redrawn = 0
+        self._counts = np.zeros(4, np.int64)  # as `Tally`
+        self._progress = BatchEnv.reward_component_names.index("progress")
         self._worlds = [self._draw() for _ in range(groups)]
-
-    @property
-    def env_steps_per_step(self) -> int:
-        """B."""
-        return self.groups * self._count
 
     def redraw(self, count: int) -> None:
         """Replace ``count`` teams, chosen at random, by new ones."""
-        for index in self._choice.choice(self.groups, count, replace=False):
+        choice = np.random.default_rng([self._seed, 1, self._redrawn])
+        self._redrawn += 1
+        for index in choice.choice(self.groups, count, replace=False):
             self._worlds[index].env.close()
             self._worlds[index] = self._draw()
 
@@ -116,11 +123,56 @@ class TeamWorlds:
             at += size
             step = one.env.step(taken)
             one.obs = step.obs
-            reward = one.env.reward_components()[:, 0]
-            rescue = reward[:, self._rescue]
-            whole = rescue + progress_weight * reward[:, self._progress]
-            parts.append((whole, rescue.copy(), step.terminated, step.terminated | step.truncated))
+            reward = one.env.reward_components().mean(1)
+            whole_reward = reward.sum(1) + (progress_weight - 1.0) * reward[:, self._progress]
+            ended = step.terminated | step.truncated
+            np.add.at(one.open_rescues, step.rescues["env"], 1)
+            over, rescues = int(ended.sum()), int(one.open_rescues[ended].sum())
+            self._counts += (over, rescues, over, len(step.rescues))
+            one.open_rescues[ended] = 0
+            parts.append((whole_reward, step.terminated, ended))
         return Outcome(*(torch.from_numpy(np.concatenate(one)) for one in zip(*parts, strict=True)))
+
+    def take_tally(self) -> Tally:
+        """Counts since the last call."""
+        found = Tally(*self._counts.tolist())
+        self._counts[[0, 1, 3]] = 0
+        return found
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """Which teams there are, and their worlds; see `Resumable`."""
+        images = [np.frombuffer(one.env.snapshot(), np.uint8) for one in self._worlds]
+        return {
+            "drawn": torch.tensor([self._drawn, self._redrawn]),
+            "teams": torch.tensor([one.number for one in self._worlds]),
+            "open_rescues": torch.from_numpy(np.stack([one.open_rescues for one in self._worlds])),
+            "tally": torch.from_numpy(self._counts.copy()),
+            "lengths": torch.tensor([len(image) for image in images]),
+            "worlds": torch.from_numpy(np.concatenate(images)),
+        }
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `Resumable`."""
+        count = self.groups
+        drawn = take_within(state, "drawn", torch.int64, 0, _MOST, 2).tolist()
+        teams = take_within(state, "teams", torch.int64, 0, max(0, drawn[0] - 1), count).tolist()
+        open_rescues = take_within(
+            state, "open_rescues", torch.int64, 0, _MOST, count, self._count
+        ).numpy()
+        self._counts = take_within(state, "tally", torch.int64, 0, _MOST, 4).numpy().copy()
+        lengths = take_within(state, "lengths", torch.int64, 0, _MOST, count).tolist()
+        images = take(state, "worlds", torch.uint8, None).numpy()
+        if sum(lengths) != len(images):
+            raise ValueError(f"'worlds' has {len(images)} bytes: must have {sum(lengths)}")
+        self.close()
+        ends = np.cumsum(lengths)
+        self._worlds = []
+        for number, length, end, rescues in zip(teams, lengths, ends, open_rescues, strict=True):
+            self._worlds.append(self._group(number))
+            self._worlds[-1].env.restore(images[end - length : end].tobytes())
+            self._worlds[-1].obs = self._worlds[-1].env.observe()
+            self._worlds[-1].open_rescues = rescues.copy()
+        self._drawn, self._redrawn = drawn
 
     def close(self) -> None:
         """Free all worlds."""
@@ -128,8 +180,10 @@ class TeamWorlds:
             one.env.close()
 
     def _draw(self) -> _Group:
-        number = self._drawn
         self._drawn += 1
-        scenario = self._family.draw(self._seed, number, self._base)
+        return self._group(self._drawn - 1)
+
+    def _group(self, number: int) -> _Group:
         seed = int(np.random.SeedSequence([self._seed, 2, number]).generate_state(1)[0])
-        return _Group(scenario, self._count, seed, self._script)
+        scenario = self._scenario(number)
+        return _Group(number, scenario, self._count, seed, self._script, self._stagger)

@@ -22,11 +22,11 @@ from innerattn.learn import workers
 from innerattn.train.build import thread_count
 from innerattn.train.checkpoint_info import Counters, RowsInfo
 from innerattn.train.interruption import Interruptions
-from innerattn.train.parts import Parts
 from innerattn.train.prepare import prepared
 from innerattn.train.resume import read_saved
 from innerattn.train.row_files import RowsOnDisk
 from innerattn.train.stages import Stages
+from innerattn.train.training import Training
 from innerattn.train.workers.exchange import Exchange, WorkerEndedError
 from innerattn.train.workers.states import own_name, own_part, rows_of_others, state_of_all
 
@@ -36,7 +36,7 @@ class SharedStages(Stages):
 
     def __init__(
         self,
-        parts: Parts,
+        parts: Training,
         run: Path,
         interruptions: Interruptions,
         counters: Counters | None,
@@ -58,11 +58,11 @@ class SharedStages(Stages):
                 self._disk_is_full = True
 
     def _log(self) -> None:
-        self._parts.collector.take_tally()
+        self._parts.take_tally()
 
     def _save_if_possible(self) -> None:
         self._disk_is_full = False
-        if self._parts.resumable is None:
+        if not self._parts.can_resume:
             return
         stage = self._at.stage
         with suppress(OSError):  # which worker 0 raises, too

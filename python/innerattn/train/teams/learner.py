@@ -1,0 +1,36 @@
+"""Builds the learner of any team that a configuration names."""
+
+from __future__ import annotations
+
+import numpy as np
+from torch import nn
+
+from innerattn.config import RunConfig
+from innerattn.config.team import TeamConfig
+from innerattn.learn.teams import TeamLearner
+from innerattn.nn.teams import TeamActor, TeamCritic
+
+
+def team_section(config: RunConfig) -> TeamConfig:
+    """The section of a run whose method is of any team."""
+    assert isinstance(config.algorithm, TeamConfig)
+    return config.algorithm
+
+
+def build_team_learner(config: RunConfig) -> TeamLearner:
+    """A learner with initial weights, seeded by `train.seed`."""
+    team = team_section(config)
+    return TeamLearner(
+        width=team.hidden_width,
+        pooling=team.pooling,
+        key_width=team.key_width,
+        gamma=team.gamma,
+        gae_lambda=team.gae_lambda,
+        clip=team.clip,
+        seed=int(np.random.SeedSequence([config.train.seed, 3]).generate_state(1)[0]),
+    )
+
+
+def team_networks(team: TeamConfig) -> tuple[nn.Module, ...]:
+    """Its networks, with weights drawn from torch's global generator."""
+    return TeamActor(team.hidden_width, team.pooling, team.key_width), TeamCritic()
