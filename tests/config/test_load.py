@@ -98,7 +98,7 @@ def test_a_warm_start_has_numbers_of_its_own_for_ppo_alone(budget: str) -> None:
         return {
             f"{section}.{key}"
             for section, table in before.items()
-            for key in table
+            for key in table or ()
             if table[key] != after[section][key]
         }
 

@@ -70,10 +70,12 @@ def walk(budgets: Path) -> Algorithm:
 def test_the_built_in_methods_are_these() -> None:
     kinds = ("inner", "uniform", "frozen", "oracle")
     known = [f"{algorithm}-{kind}" for algorithm in ("td", "ppo") for kind in kinds]
-    assert list(registry.methods()) == [*known, "mappo"]
+    any_team = [f"team-{pooling}" for pooling in ("inner", "uniform", "max", "nearest")]
+    known += ["mappo", *any_team]
+    assert list(registry.methods()) == known
     with pytest.raises(ConfigError) as error:
         load_run_config(method="ppo")
-    allowed = f"{', '.join(map(repr, known))} or 'mappo'"
+    allowed = f"{', '.join(map(repr, known[:-1]))} or {known[-1]!r}"
     assert str(error.value) == f"train.method = 'ppo': must be {allowed}, did you mean 'ppo-inner'?"
 
 

@@ -84,6 +84,8 @@ class _Sources(LongCommand):
             raise UsageError(str(error)) from error
 
     def _load(self, overrides: dict[str, object]) -> RunConfig:
+        if self.family_file is not None:
+            overrides = {"train.method": "team-inner"} | overrides
         return load_run_config(
             self.preset,
             budget=self.budget,
@@ -106,10 +108,7 @@ class _Choice(_Sources):
     def defaults(self) -> RunConfig:
         if self.seed is not None and self.seeds is not None:
             raise UsageError(f"--seed {self.seed}, --seeds {self.seeds}: must be one of the two")
-        method = self.method
-        if method is None and self.family_file is not None:
-            method = "team-inner"
-        chosen = {"train.method": method, "train.warm_start": self.warm_start}
+        chosen = {"train.method": self.method, "train.warm_start": self.warm_start}
         found = self.load({key: value for key, value in chosen.items() if value is not None})
         return found if self.seeds is not None else _with_workers(found)
 

@@ -130,6 +130,7 @@ class RunConfig(Model):
     def _unused(self) -> set[str]:
         """Sections that the run does not depend on."""
         unused = algorithms().keys() - {self.algorithm.place}
+        unused |= {Family.place} if self.family is None else set()
         return unused if self.train.warm_start != "none" else unused | {"imitation"}
 
     @model_validator(mode="before")

@@ -153,8 +153,8 @@ def _lost_cells(measured: Performance, name: str) -> tuple[str, str]:
 
 def _warm_start(summary: Summary) -> str:
     return (
-        f"{summary.method} was warm-started from {summary.warm_start}: it imitated that script, "
-        "then learnt from rewards"
+        f"{summary.method} was warm-started from {summary.warm_start}: its training began by "
+        "imitating that script"
     )
 
 

@@ -48,7 +48,8 @@ def inner_actor(learner: Learner, run: Path) -> Actor:
     Raises:
         ExportError: the learner has others than those of this package.
     """
-    actor = getattr(unframed(learner), "actor", None)
+    within = unframed(learner)
+    actor = getattr(within, "actor", within)
     if type(actor) is not Actor:
         raise ExportError(
             f"{run}: its policy is a {type(actor).__name__}: must be an innerattn.nn.Actor, as of "
