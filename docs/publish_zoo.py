@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from innerattn.config import load_run_config
+from innerattn.config.load import ANY
 from innerattn.config.files import write_whole
 from innerattn.errors import InnerattnError, RunError
 from innerattn.experiments.plan import Case
@@ -58,7 +59,8 @@ def pack(run: Path, name: str, budget: str, zoo: Path = FOLDER) -> Path:
 
     Args:
         run: folder of a finished and measured run.
-        name: of the built-in scenario that it was trained in, and of the team from now on.
+        name: of the built-in scenario that it was trained in, or "any" for a policy for any team;
+            and of the team from now on.
         budget: that it was trained with.
         zoo: where teams are.
 
@@ -70,19 +72,26 @@ def pack(run: Path, name: str, budget: str, zoo: Path = FOLDER) -> Path:
     if info.state != "done" or not info.sealed or info.weights_sha256 is None:
         raise RunError(f"{run}: must be finished, measured and sealed")
     method, seed = config.train.method, config.train.seed
+    warm = config.train.warm_start
     options = {
         "train.seed": seed,
         "train.threads": info.threads,
+        "train.warm_start": warm,
         "evaluate.seed": config.evaluate.seed,
     }
-    expected = load_run_config(name, method, budget, overrides=options)
+    what = f"--preset {name}"
+    if name == ANY:
+        what = f"--family {ANY}" + ("" if warm == "none" else f" --warm-start {warm}")
+        expected = load_run_config(method=method, budget=budget, overrides=options, family=ANY)
+    else:
+        expected = load_run_config(name, method, budget, overrides=options)
     if expected.digest() != config.digest():
-        raise RunError(f"{run}: was trained otherwise than --preset {name} --budget {budget} says")
+        raise RunError(f"{run}: was trained otherwise than {what} --budget {budget} says")
     found = read_run(Case(config.scenario.situation, method, seed), run, steps=False)
     card: dict[str, Any] = {
         "schema_version": 1,
         "name": name,
-        "command": f"innerattn train --preset {name} --method {method} --budget {budget} "
+        "command": f"innerattn train {what} --method {method} --budget {budget} "
         f"--seed {seed} --train.threads {info.threads}",
         "seed": seed,
         "versions": info.versions,

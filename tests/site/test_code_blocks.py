@@ -126,6 +126,8 @@ def test_toml_blocks(tmp_path: Path) -> None:
             keys = set(tomllib.loads(code))
             if keys <= set(Scenario.model_fields):
                 Scenario.from_toml(file)
+            elif keys == {"family"}:
+                load_run_config(method="team-inner", family=file)
             elif "grid" in keys:
                 study = study_in(code.encode(), file)
                 if page.name != "measure.md":  # of its own: tests/test_extending_measure.py
