@@ -29,6 +29,10 @@ class Rules:
         """The scenario with every key written out."""
 
     @property
+    def max_helpers(self) -> int:
+        """Most robots that can help one victim."""
+
+    @property
     def num_victims(self) -> int:
         """Victim slots V."""
 

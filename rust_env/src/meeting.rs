@@ -4,17 +4,24 @@
 //! overlap, and obstacles do not count.
 
 use crate::geometry::Vec2;
-use crate::matching::fillable;
+use crate::matching::{bits, fillable};
 use crate::robot::Body;
 use crate::tasks::Needs;
 
 /// Deepest overlap of two robots in contact, as a share of a radius.
 const MOST_OVERLAP: f32 = 0.15;
 
-/// The least rescue radius with which distinct able robots can be near a victim at the same time, m: if bodies
+/// The least rescue radius with which enough able robots can be near a victim at the same time, m: if bodies
 /// may not overlap, and what is left of it if they overlap as deep as contacts let them.
 #[must_use]
 pub fn least_rescue_radius(needs: &Needs, team: &[Body]) -> (f32, f32) {
+    if let Some(sums) = needs.sums() {
+        let mut radii: Vec<f32> = bits(sums.able()).map(|robot| team[robot].radius).collect();
+        radii.sort_by(f32::total_cmp);
+        radii.truncate(sums.fewest()); // no others need less room
+        let least = radius_of(&radii);
+        return (least, least * (1.0 - MOST_OVERLAP));
+    }
     let most = needs.abilities().len();
     let candidates: Vec<Vec<usize>> = needs
         .abilities()
@@ -30,7 +37,7 @@ pub fn least_rescue_radius(needs: &Needs, team: &[Body]) -> (f32, f32) {
     (least, least * (1.0 - MOST_OVERLAP))
 }
 
-/// Whether distinct able robots can be within `radius` of a place that far from the walls of an arena of half
+/// Whether enough able robots can be within `radius` of a place that far from the walls of an arena of half
 /// width `arena`.
 #[must_use]
 pub fn can_reach(needs: &Needs, team: &[Body], at: Vec2, radius: f32, arena: f32) -> bool {
@@ -38,6 +45,10 @@ pub fn can_reach(needs: &Needs, team: &[Body], at: Vec2, radius: f32, arena: f32
         let beyond = at.map(|value| (value.abs() - (arena - body.radius)).max(0.0));
         beyond.norm() <= radius
     };
+    if let Some(sums) = needs.sums() {
+        let near = bits(sums.able()).filter(|robot| near(&team[*robot]));
+        return sums.short_of(near.fold(0, |mask, robot| mask | 1 << robot)).is_none();
+    }
     let able = |need: &u32| {
         let fits = |(_, body): &(usize, &Body)| can(body, *need) && near(body);
         team.iter().enumerate().filter(fits).fold(0_u64, |mask, (robot, _)| mask | 1 << robot)

@@ -2,7 +2,7 @@
 
 use crate::fault::{HEALTHY, KINDS, Kind, Levels};
 use crate::geometry::Vec2;
-use crate::robot::{Body, bodies};
+use crate::robot::Body;
 use crate::scenario::{MAX_VICTIMS, Scenario, VictimOrder};
 use crate::tasks::deadline::Deadlines;
 use crate::tasks::service::Service;
@@ -63,11 +63,9 @@ impl Layout {
     #[must_use]
     pub(crate) fn new(scenario: &Scenario, tasks: &[Needs]) -> Self {
         let abilities: Vec<String> = scenario.abilities().iter().map(ToString::to_string).collect();
-        let count = |needs: &Needs| {
-            let number = |ability| needs.abilities().iter().filter(|need| **need == ability).count() as f32;
-            (0..abilities.len() as u32).map(number).collect()
-        };
-        let needs = tasks.iter().map(count).collect();
+        let amounts =
+            |needs: &Needs| (0..abilities.len() as u32).map(|ability| needs.amount(ability)).collect();
+        let needs = tasks.iter().map(amounts).collect();
         let mut layout = Self {
             robots: scenario.robots.len(),
             victims: scenario.num_victims(),
@@ -79,20 +77,20 @@ impl Layout {
             needs,
             fixed: vec![],
         };
-        layout.fixed = layout.fixed_columns(&bodies(scenario));
+        layout.fixed = layout.fixed_columns(scenario);
         layout
     }
 
     /// Abilities and availability, own first and then the teammates' in team order.
-    fn fixed_columns(&self, team: &[Body]) -> Vec<f32> {
+    fn fixed_columns(&self, scenario: &Scenario) -> Vec<f32> {
         let mut fixed = vec![0.0; self.robots * self.width()];
         for (own, row) in fixed.chunks_exact_mut(self.width()).enumerate() {
             let others = (0..self.robots).filter(|other| *other != own);
             for (block, robot) in
                 row.chunks_exact_mut(self.robot_width()).zip(std::iter::once(own).chain(others))
             {
-                for ability in 0..self.abilities.len() {
-                    block[4 + ability] = (team[robot].abilities >> ability & 1) as f32;
+                for (column, ability) in block[4..].iter_mut().zip(&self.abilities) {
+                    *column = scenario.robots[robot].abilities.amount(ability) as f32;
                 }
                 block[self.availability()] = 1.0;
                 self.write_levels(&HEALTHY, block);
@@ -132,8 +130,8 @@ impl Layout {
         self.robots * self.robot_width() + self.victims * self.victim_width()
     }
 
-    /// The name of every column; units are m and m/s, flags and abilities are 0 or 1, needs are counts,
-    /// `served` and `time_left` are shares.
+    /// The name of every column; units are m and m/s, flags are 0 or 1, abilities are 0 or 1 or
+    /// amounts, needs are counts or amounts, `served` and `time_left` are shares.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let mut names = Vec::with_capacity(self.width());
@@ -272,12 +270,13 @@ fn rank(victim: Option<&Victim>, body: &Body, tasks: &[Needs], own: Vec2) -> (u8
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::bodies;
 
     /// Two robots (food, medicine) and two slots; what robot 1 sees in each order of victims.
     fn seen_by_medical(order: VictimOrder) -> (Vec<String>, Vec<f32>) {
         let mut scenario = Scenario { victim_order: order, ..Scenario::default() };
         scenario.robots = vec![scenario.robots[0].clone(), scenario.robots[3].clone()];
-        scenario.tasks[1].needs = vec!["food".into()];
+        scenario.tasks[1].needs = vec!["food".into()].into();
         let (team, tasks) = (bodies(&scenario), Needs::of_tasks(&scenario));
         let layout = Layout::new(&scenario, &tasks);
         let victim = |task, x| Some(Victim::new(0, task, 0, Vec2::new(x, 0.0)));

@@ -141,7 +141,7 @@ pub fn total_distance<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::MAX_NEEDS;
+    use crate::scenario::MAX_HELPERS;
 
     /// One component of all robots, in thousandths.
     fn column(rows: [[f32; NUM_COMPONENTS]; 4], component: usize) -> [i32; 4] {
@@ -161,7 +161,7 @@ mod tests {
             ..Scenario::default()
         };
         change(&mut scenario);
-        let mut helpers = [None; MAX_NEEDS];
+        let mut helpers = [None; MAX_HELPERS];
         (helpers[0], helpers[1]) = (Some(1), Some(3));
         let rescue = Rescue { env: 0, episode: 0, step: 0, slot: 0, victim: 0, task: 0, helpers };
         let happened = Happened {

@@ -29,7 +29,7 @@ pub struct Body {
 #[must_use]
 pub(crate) fn bodies(scenario: &Scenario) -> Vec<Body> {
     let abilities = scenario.abilities();
-    let bit = |name: &String| abilities.iter().position(|ability| ability == name).map_or(0, |bit| 1 << bit);
+    let bit = |name: &str| abilities.iter().position(|ability| *ability == name).map_or(0, |bit| 1 << bit);
     scenario
         .robots
         .iter()
@@ -38,7 +38,7 @@ pub(crate) fn bodies(scenario: &Scenario) -> Vec<Body> {
             mass: robot.mass_kg as f32,
             max_speed: robot.max_speed_mps as f32,
             gain: (robot.drive_force_n / robot.mass_kg * scenario.dt_s) as f32,
-            abilities: robot.abilities.iter().map(bit).fold(0, |mask, bit| mask | bit),
+            abilities: robot.abilities.names().map(bit).fold(0, |mask, bit| mask | bit),
         })
         .collect()
 }

@@ -1,6 +1,7 @@
 //! `Scenario`: what a rescue world is made of, as plain data. Nothing here moves or draws anything, and
 //! nothing plays by a scenario before [`crate::rules::Rules::new`] has found it valid.
 
+mod abilities;
 mod check;
 mod task;
 mod validity;
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::fault::Fault;
 
+pub use abilities::{Abilities, reaches};
 pub use task::{Deadline, Interrupted, Task};
 
 /// Most robots in a team.
@@ -24,8 +26,12 @@ pub const MAX_PLACES: usize = 256;
 pub const MAX_ABILITIES: usize = 32;
 /// Most faults in a scenario.
 pub const MAX_FAULTS: usize = 256;
-/// Most helpers that one victim may need.
+/// Most needs that one victim may have.
 pub const MAX_NEEDS: usize = 8;
+/// Most robots that may help one victim: more than its needs, where these are sums.
+pub const MAX_HELPERS: usize = MAX_ROBOTS;
+/// Least and largest amount of an ability or a need.
+pub const AMOUNTS: (f64, f64) = (1e-6, 1e6);
 /// Longest service or deadline of a victim, s; no episode takes longer.
 pub const MAX_TIME_S: f64 = 1e6;
 /// Gap between robots, and between robots and solids, when an episode starts, m.
@@ -123,7 +129,7 @@ pub struct Robot {
     /// Kind, such as `food`.
     pub kind: String,
     /// What it can bring to a victim.
-    pub abilities: Vec<String>,
+    pub abilities: Abilities,
     /// Speed that no period begins with more than, m/s.
     pub max_speed_mps: f64,
     /// Mass, kg.
@@ -236,7 +242,7 @@ impl Default for Scenario {
         let robot = |name: &str, kind: &str, ability: &str, max_speed_mps, mass_kg| Robot {
             name: name.into(),
             kind: kind.into(),
-            abilities: vec![ability.into()],
+            abilities: vec![ability.into()].into(),
             max_speed_mps,
             mass_kg,
             radius_m: default_radius_m(),
@@ -330,17 +336,23 @@ impl Scenario {
     /// All abilities named by robots, sorted; the order of ability columns.
     #[must_use]
     pub fn abilities(&self) -> Vec<&str> {
-        let mut abilities: Vec<&str> =
-            self.robots.iter().flat_map(|robot| &robot.abilities).map(String::as_str).collect();
+        let mut abilities: Vec<&str> = self.robots.iter().flat_map(|robot| robot.abilities.names()).collect();
         abilities.sort_unstable();
         abilities.dedup();
         abilities
     }
 
-    /// Most helpers that any task needs.
+    /// Most helpers that a victim of any task can have: one for each need of a list, and where needs are
+    /// sums as many robots as have any of the abilities.
     #[must_use]
-    pub fn max_needs(&self) -> usize {
-        self.tasks.iter().map(|task| task.needs.len()).max().unwrap_or(0)
+    pub fn max_helpers(&self) -> usize {
+        let helps =
+            |task: &Task, robot: &Robot| task.needs.names().any(|need| robot.abilities.amount(need) > 0.0);
+        let most = |task: &Task| match task.needs.amounts() {
+            None => task.needs.names().count(),
+            Some(_) => self.robots.iter().filter(|robot| helps(task, robot)).count(),
+        };
+        self.tasks.iter().map(most).max().unwrap_or(0)
     }
 
     /// The heaviest and the lightest robot; the first of several. None in an empty team.

@@ -1,18 +1,23 @@
 //! Victims and what becomes of them: who is present, what it needs, which robots rescue it. How long that
-//! takes is in `service.rs`, until when there is time in `deadline.rs`.
+//! takes is in `service.rs`, until when there is time in `deadline.rs`, needs as sums in `sums.rs`.
 //!
 //! A step settles them in this order: robots have moved; slot by slot, service goes on and victims are
 //! rescued; those whose deadline has come are lost; new ones appear.
 
 pub mod deadline;
 pub mod service;
+pub mod sums;
 
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Vec2;
 use crate::matching::{bits, fillable};
 use crate::robot::Body;
-use crate::scenario::{MAX_NEEDS, Scenario};
+use crate::scenario::{MAX_HELPERS, MAX_NEEDS, Scenario, Task};
+use sums::Sums;
+
+/// Robots that help one victim, in the order of its needs, or nearest first where these are sums.
+pub type Helpers = [Option<u8>; MAX_HELPERS];
 
 /// A victim that waits for help.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -51,8 +56,12 @@ fn steps_of(seconds: f64, dt_s: f64) -> u32 {
 }
 
 /// A task's needs as ability numbers, in the order the scenario names them.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Needs(Vec<u32>);
+#[derive(Debug, Clone, PartialEq)]
+pub struct Needs {
+    abilities: Vec<u32>,
+    /// Their amounts, where they are sums.
+    sums: Option<Sums>,
+}
 
 impl Needs {
     /// The needs of every task of a valid scenario.
@@ -60,30 +69,55 @@ impl Needs {
     pub(crate) fn of_tasks(scenario: &Scenario) -> Vec<Self> {
         let abilities = scenario.abilities();
         let number =
-            |need: &String| abilities.iter().position(|ability| ability == need).unwrap_or_default() as u32;
-        scenario.tasks.iter().map(|task| Self(task.needs.iter().map(number).collect())).collect()
+            |need: &str| abilities.iter().position(|ability| *ability == need).unwrap_or_default() as u32;
+        let of = |task: &Task| Self {
+            abilities: task.needs.names().map(number).collect(),
+            sums: Sums::new(&task.needs, scenario),
+        };
+        scenario.tasks.iter().map(of).collect()
     }
 
     /// Ability numbers, one for each need.
     #[must_use]
     pub fn abilities(&self) -> &[u32] {
-        &self.0
+        &self.abilities
+    }
+
+    /// The amounts that helpers must reach together, where the needs are sums.
+    #[must_use]
+    pub fn sums(&self) -> Option<&Sums> {
+        self.sums.as_ref()
+    }
+
+    /// How much of an ability is needed: the amount of a sum, or how many robots.
+    #[must_use]
+    pub fn amount(&self, ability: u32) -> f32 {
+        let mut needs = self.abilities.iter();
+        match &self.sums {
+            Some(sums) => {
+                needs.position(|need| *need == ability).map_or(0.0, |need| sums.needed()[need] as f32)
+            }
+            None => needs.filter(|need| **need == ability).count() as f32,
+        }
     }
 
     /// Whether a robot with these abilities can fill any need.
     #[must_use]
     pub fn helped_by(&self, abilities: u32) -> bool {
-        self.0.iter().any(|need| abilities >> need & 1 == 1)
+        self.abilities.iter().any(|need| abilities >> need & 1 == 1)
     }
 
     /// Sum over needs of the distance of the nearest able robot, m; a need repeated k times counts
     /// the k nearest. Robots of the mask `away` do not count, and a need that is left without a robot
-    /// adds nothing.
+    /// adds nothing. Of a sum count the nearest robots that reach it, see [`Sums::distance`].
     #[must_use]
     pub fn distance(&self, victim: Vec2, team: &[Body], positions: &[Vec2], away: u64) -> f32 {
+        if let Some(sums) = &self.sums {
+            return sums.distance(victim, positions, away);
+        }
         let mut total = 0.0;
-        for (index, need) in self.0.iter().enumerate() {
-            let rank = self.0[..index].iter().filter(|earlier| *earlier == need).count();
+        for (index, need) in self.abilities.iter().enumerate() {
+            let rank = self.abilities[..index].iter().filter(|earlier| *earlier == need).count();
             total += kth_nearest(rank, *need, victim, team, positions, away);
         }
         total
@@ -91,7 +125,8 @@ impl Needs {
 
     /// The helpers that rescue a victim now: one distinct robot for each need, in the order of needs.
     /// Each need takes the nearest able robot in `radius` (ties by index) that is not `busy` and
-    /// leaves every later need a robot of its own. `None` if no such team is near.
+    /// leaves every later need a robot of its own. `None` if no such team is near. For sums see
+    /// [`Sums::helpers`].
     #[must_use]
     pub fn helpers(
         &self,
@@ -100,24 +135,27 @@ impl Needs {
         positions: &[Vec2],
         radius: f32,
         busy: u64,
-    ) -> Option<[Option<u8>; MAX_NEEDS]> {
+    ) -> Option<Helpers> {
+        if let Some(sums) = &self.sums {
+            return sums.helpers(victim, positions, radius, busy);
+        }
         let able = |need: u32| {
             let near = |robot: &usize| (positions[*robot] - victim).norm_squared() <= radius * radius;
             let can = |robot: &usize| (busy >> robot | u64::from(!team[*robot].abilities >> need)) & 1 == 0;
             (0..team.len()).filter(can).filter(near).fold(0_u64, |mask, robot| mask | 1 << robot)
         };
         let mut candidates = [0_u64; MAX_NEEDS];
-        for (mask, need) in candidates.iter_mut().zip(&self.0) {
+        for (mask, need) in candidates.iter_mut().zip(&self.abilities) {
             *mask = able(*need);
             if *mask == 0 {
                 return None;
             }
         }
-        let candidates = &mut candidates[..self.0.len()];
+        let candidates = &mut candidates[..self.abilities.len()];
         if !fillable(candidates) {
             return None;
         }
-        let mut helpers = [None; MAX_NEEDS];
+        let mut helpers = [None; MAX_HELPERS];
         for need in 0..candidates.len() {
             let mut open = candidates[need];
             while open != 0 {
@@ -174,8 +212,8 @@ pub struct Rescue {
     pub victim: u32,
     /// Index of its task.
     pub task: u32,
-    /// Helpers, one for each need.
-    pub helpers: [Option<u8>; MAX_NEEDS],
+    /// Who helped.
+    pub helpers: Helpers,
 }
 
 /// A victim that was lost: which, and when.
@@ -228,7 +266,7 @@ mod tests {
         (bodies(&scenario), Needs::of_tasks(&scenario), at)
     }
 
-    fn named(helpers: Option<[Option<u8>; MAX_NEEDS]>) -> Option<Vec<u8>> {
+    fn named(helpers: Option<Helpers>) -> Option<Vec<u8>> {
         helpers.map(|helpers| helpers.iter().flatten().copied().collect())
     }
 
@@ -261,7 +299,7 @@ mod tests {
         assert!((tasks[0].distance(Vec2::zeros(), &team, &at, 0b0001) - 0.26).abs() < 1e-6, "food_0 is away");
         assert!((tasks[0].distance(Vec2::zeros(), &team, &at, 0b0011) - 0.14).abs() < 1e-6, "no food");
         let mut twice = Scenario::default();
-        twice.tasks[0].needs = vec!["food".into(), "medicine".into(), "food".into()];
+        twice.tasks[0].needs = vec!["food".into(), "medicine".into(), "food".into()].into();
         let twice = Needs::of_tasks(&twice).remove(0);
         assert!((twice.distance(Vec2::zeros(), &team, &at, 0) - 0.36).abs() < 1e-6);
         assert!((twice.distance(Vec2::zeros(), &team, &at, 0b0001) - 0.26).abs() < 1e-6);

@@ -1,12 +1,13 @@
 """A second, plain reading of the rescue world in float64, to hold the compiled one against.
 
-It covers motion without contacts, the rescue rule, services and deadlines, rewards, observations
-and the faults that need no random numbers. It draws nothing: starts, and the places and deadlines
-of new victims, are taken from the world that is checked.
+It covers motion without contacts, the rescue rule, sums, services and deadlines, rewards,
+observations and the faults that need no random numbers. It draws nothing: starts, and the places
+and deadlines of new victims, are taken from the world that is checked.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -60,7 +61,9 @@ class Stepper:
         self.abilities = sorted({ability for robot in robots for ability in robot.abilities})
         self.able = np.array([[a in robot.abilities for a in self.abilities] for robot in robots])
         self.able = self.able.reshape(len(robots), len(self.abilities))
-        self.counts = np.array([[task.needs.count(a) for a in self.abilities] for task in tasks])
+        self.given = np.array([[robot.amount(a) for a in self.abilities] for robot in robots])
+        self.given = self.given.reshape(self.able.shape)
+        self.counts = np.array([[task.amount(a) for a in self.abilities] for task in tasks])
         self.helps = (self.able[:, None, :] & (self.counts > 0)).any(-1)  # (R, T)
         # Least whole numbers of periods that last at least so long, up to rounding.
         self.service = np.array([self._periods(task.service_s) for task in tasks])
@@ -131,8 +134,16 @@ class Stepper:
         for task, counts in enumerate(self.counts):
             mine = state.present & (state.victims["task"] == task)
             for ability, count in enumerate(counts):
+                if self.scenario.tasks[task].sums:
+                    order = np.argsort(distances, axis=-1, kind="stable")
+                    given = self.given[order, ability]
+                    short = given.cumsum(-1) - given < count - 1e-9 * count
+                    nearest = np.take_along_axis(distances, order, axis=-1)
+                    counted = short & (given > 0) & np.isfinite(nearest)
+                    total += np.where(mine, np.where(counted, nearest, 0.0).sum(-1), 0.0).sum(-1)
+                    continue
                 able = distances[..., self.able[:, ability]]
-                nearest = np.sort(able, axis=-1)[..., :count]
+                nearest = np.sort(able, axis=-1)[..., : int(count)]
                 nearest = np.where(np.isfinite(nearest), nearest, 0.0).sum(-1)
                 total += np.where(mine, nearest, 0.0).sum(-1)
         return total
@@ -153,8 +164,11 @@ class Stepper:
             for slot in np.flatnonzero(state.present[env]):
                 free = [int(r) for r in np.flatnonzero(near[env, slot]) if r not in busy]
                 free.sort(key=lambda robot: (distances[env, slot, robot], robot))
-                needs = self.scenario.tasks[state.victims["task"][env, slot]].needs
-                helpers = self._first_team(needs, free)
+                task = int(state.victims["task"][env, slot])
+                if self.scenario.tasks[task].sums:
+                    helpers = self._coalition(task, free)
+                else:
+                    helpers = self._first_team(self.scenario.tasks[task].roles, free)
                 if helpers:
                     busy |= set(helpers)
                     found.append((int(env), int(slot), *helpers))
@@ -195,6 +209,19 @@ class Stepper:
                 return team
         return ()
 
+    def _coalition(self, task: int, nearest_first: list[int]) -> tuple[int, ...]:
+        """The shortest row of the nearest that reaches the sums, without those not needed."""
+        sizes = range(1, len(nearest_first) + 1)
+        team = next((row for n in sizes if self._reach(task, row := nearest_first[:n])), [])
+        for robot in reversed(list(team)):
+            rest = [other for other in team if other != robot]
+            team = rest if self._reach(task, rest) else team
+        return tuple(team)
+
+    def _reach(self, task: int, robots: list[int]) -> bool:
+        sums = [math.fsum(self.given[robots, ability]) for ability in range(len(self.abilities))]
+        return all(self.counts[task] <= np.array(sums) + 1e-9 * self.counts[task])
+
     def reward_components(
         self,
         before: State,
@@ -227,8 +254,8 @@ class Stepper:
     def observations(self, state: State) -> tuple[Array, Bools]:
         """Rows of all robots, (E, R, D); where rounding might order victims otherwise, (E, R)."""
         envs, robots = state.positions.shape[:2]
-        able = np.broadcast_to(self.able, (envs, *self.able.shape)).astype(np.float64)
-        flags = [able, state.available[..., None]]
+        given = np.broadcast_to(self.given, (envs, *self.given.shape)).astype(np.float64)
+        flags = [given, state.available[..., None]]
         if self.scenario.observe_faults:
             shown = [kind for kind in state.faults.dtype.names or () if kind != "unavailable"]
             flags += [state.faults[kind][..., None] for kind in shown]

@@ -87,3 +87,23 @@ def with_times(scenario: Scenario, rng: np.random.Generator) -> Scenario:
         for task in scenario.tasks
     )
     return scenario.replace(tasks=tasks, lost_cost=float(rng.integers(2)) / 2)
+
+
+def with_amounts(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, where some robots have amounts, and some tasks need sums that the team has."""
+    amounts = (0.1, 0.3, 0.7, 1.0, 1.2, 2.5)
+    robots = tuple(
+        robot.replace(abilities={one: amounts[rng.integers(6)] for one in robot.abilities})
+        if rng.random() < 0.6
+        else robot
+        for robot in scenario.robots
+    )
+    tasks = []
+    for task in scenario.tasks:
+        needs = {}
+        for one in sorted(set(task.needs)):
+            most = sum(robot.amount(one) for robot in robots)
+            needs[one] = max(0.1, round(most * rng.choice((0.1, 0.25, 0.5, 1.0)), 1))
+            needs[one] = min(needs[one], most)  # rounding may go beyond
+        tasks.append(task.replace(needs=needs) if rng.random() < 0.7 else task)
+    return scenario.replace(robots=robots, tasks=tuple(tasks))

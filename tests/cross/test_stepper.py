@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from stepper import State, Stepper
-from teams import random_scenario, with_times
+from teams import random_scenario, with_amounts, with_times
 
 from innerattn.config import Scenario, Task
 from innerattn.envs import BatchEnv
@@ -241,6 +241,22 @@ def test_worlds_with_services_and_deadlines_are_as_the_plain_stepper_says(chunk:
         total += compare(scenario, seed, some, faulty=seed % 3 == 0)
     assert total["unsure"] < 0.02 * total["transitions"]
     for what in ("rescues", "appeared", "served", "lost"):
+        assert total[what] > 50, (what, total)
+
+
+@pytest.mark.parametrize("chunk", range(3))
+def test_worlds_with_amounts_are_as_the_plain_stepper_says(chunk: int) -> None:
+    total: Counter[str] = Counter()
+    rng = np.random.default_rng(300 + chunk)
+    while total["transitions"] < 12_000:
+        scenario = with_amounts(random_scenario(rng), rng)
+        if rng.random() < 0.3:
+            scenario = with_times(scenario, rng)
+        some = min(1000, 20_000 // len(scenario.robots))
+        seed = int(rng.integers(2**32))
+        total += compare(scenario, seed, some, faulty=seed % 3 == 0)
+    assert total["unsure"] < 0.02 * total["transitions"]
+    for what in ("rescues", "appeared", "served"):
         assert total[what] > 50, (what, total)
 
 

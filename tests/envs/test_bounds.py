@@ -19,6 +19,8 @@ def scenario(half: float, engine: str, faulty: bool, seen: bool, heavy: float) -
     team = list(Scenario().robots)
     heavy = heavy if engine == "discs" else min(heavy, 8.0)  # rapier takes masses up to 16 : 1
     team[0] = team[0].replace(mass_kg=heavy, drive_force_n=200.0)
+    if seen:
+        team[1] = team[1].replace(abilities={"food": 6.0})
     faults = [
         Fault(robot=robot.name, kind=kind, value=MOST[kind] if kind != "motor_gain" else 0.5)
         for robot, kind in zip((*team, *team, *team), KINDS, strict=False)
@@ -32,7 +34,11 @@ def scenario(half: float, engine: str, faulty: bool, seen: bool, heavy: float) -
         faults=tuple(faults) if faulty else (),
         observe_faults=seen,
         tasks=(
-            Task(name="both", needs=("food", "food"), service_s=0.3 if seen else 0.0),
+            Task(
+                name="both",
+                needs={"food": 7.0, "medicine": 0.5} if seen else ("food", "food"),
+                service_s=0.3 if seen else 0.0,
+            ),
             Task(name="one", needs=("medicine",), deadline_s=(0.5, 2.0) if seen else None),
         ),
         obstacles=(Obstacle(shape="disc", radius_m=0.05),),

@@ -34,6 +34,22 @@ def test_services_and_deadlines_have_words() -> None:
     assert other.endswith("0.15 m, for 0.5 s; if they leave, it starts anew; lost after 4 to 8 s")
 
 
+def test_amounts_have_words() -> None:
+    robots = [robot.model_dump() for robot in Scenario().robots]
+    robots[0]["abilities"] = {"food": 1.5}
+    first, second = Scenario().tasks
+    tasks = (first.replace(needs={"food": 2.0, "medicine": 1.0}), second)
+    made = Scenario().replace(robots=robots, tasks=tasks, rescue_radius_m=0.045)
+    lines = scenario_words(made).splitlines()
+    assert lines[0] == (
+        "task_1: 2 food (of food_0 1.5, food_1 1) and 1 medicine (of medical_0 1), together within "
+        "0.045 m"
+    )
+    assert lines[2].startswith("task_1: helpers hardly meet")
+    alone = made.replace(tasks=(first.replace(needs={"food": 1.5}),))
+    assert "hardly" not in scenario_words(alone), "one robot is enough"
+
+
 def test_what_is_doubtful() -> None:
     scenario = Scenario.model_validate(
         {

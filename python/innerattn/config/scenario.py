@@ -15,6 +15,7 @@ from pydantic import Field, PrivateAttr, ValidationError, field_validator
 from pydantic_core import PydanticCustomError
 
 from innerattn import _core
+from innerattn.config.amounts import Amounts, list_or_table
 from innerattn.config.files import preset_names, preset_table, toml_table
 from innerattn.config.model import ADDED_LATER, Model, Told, config_error
 from innerattn.config.near import did_you_mean
@@ -33,7 +34,10 @@ class Robot(Model):
 
     name: str = Field(description="unique name; 1 to 64 letters, digits, '_' or '-'")
     kind: str = Field(description="kind, shared by robots that are alike")
-    abilities: tuple[str, ...] = Field(description="what it can do for a victim")
+    abilities: tuple[str, ...] | Amounts = Field(
+        description="what it can do for a victim: a list, or a table with an amount of each, such "
+        "as { water = 1.2 }; in a list each has the amount 1"
+    )
     max_speed_mps: Annotated[float, Told(0.01, 100.0)] = Field(description="speed limit [m/s]")
     mass_kg: Annotated[float, Told(0.01, 1_000.0)] = Field(description="mass [kg]")
     radius_m: Annotated[float, Told(0.005, 10.0)] = Field(
@@ -48,16 +52,25 @@ class Robot(Model):
         "None: a new random place each episode",
     )
 
+    _check_abilities = field_validator("abilities", mode="before")(list_or_table)
+
+    def amount(self, ability: str) -> float:
+        """How much it gives of an ability, 0 without it."""
+        if isinstance(self.abilities, dict):
+            return self.abilities.get(ability, 0.0)
+        return float(ability in self.abilities)
+
 
 _Seconds = Annotated[float, Told(0.001, 1e6)]
 
 
 class Task(Model):
-    """One kind of emergency: the abilities a victim needs, each from a robot of its own."""
+    """One kind of emergency: the abilities a victim needs, and how long it takes and waits."""
 
     name: str = Field(description="unique name; 1 to 64 letters, digits, '_' or '-'")
-    needs: Annotated[tuple[str, ...], Told(1, 8)] = Field(
-        description="needed abilities; the same may stand twice"
+    needs: Annotated[tuple[str, ...], Told(1, 8)] | Amounts = Field(
+        description="needed abilities: a list, each from a robot of its own, the same may stand "
+        "twice; or a table of amounts, such as { water = 3.0 }, that the helpers must have together"
     )
     service_s: Annotated[float, ADDED_LATER, Told(0.0, 1e6)] = Field(
         0.0,
@@ -75,12 +88,30 @@ class Task(Model):
         "that each victim's is drawn from [s]; None: never",
     )
 
+    _check_needs = field_validator("needs", mode="before")(list_or_table)
+
     @field_validator("deadline_s", mode="before")
     @classmethod
     def _number_or_pair(cls, value: object) -> object:
         if isinstance(value, (list, tuple)) and len(value) != 2:
             raise PydanticCustomError("type", "Input should be a number or a pair [low, high]")
         return value
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """The needs that a robot of its own meets each; none where needs are sums."""
+        return () if isinstance(self.needs, dict) else self.needs
+
+    @property
+    def sums(self) -> Amounts:
+        """The amounts that helpers must have together; none where needs are a list."""
+        return self.needs if isinstance(self.needs, dict) else {}
+
+    def amount(self, ability: str) -> float:
+        """How much of an ability is needed: an amount, or how many robots."""
+        if isinstance(self.needs, dict):
+            return self.needs.get(ability, 0.0)
+        return float(self.needs.count(ability))
 
     @property
     def deadlines_s(self) -> tuple[float, float] | None:
@@ -299,7 +330,7 @@ class Scenario(Model, Shown):
             self._rules = _core.Rules(self.model_dump_json())
         except ValueError as error:
             missing = _need_of_nobody(self.robots, self.tasks)
-            if missing and ".needs = " in str(error):
+            if missing and ".needs" in str(error):
                 raise ValueError(missing) from error
             raise
 
@@ -352,6 +383,11 @@ class Scenario(Model, Shown):
     def num_victims(self) -> int:
         """Number of victim slots V."""
         return self._rules.num_victims
+
+    @property
+    def max_helpers(self) -> int:
+        """Most robots that can help one victim."""
+        return self._rules.max_helpers
 
     @property
     def has_services(self) -> bool:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import hypot, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from innerattn import _core
-from innerattn.config.scenario import Scenario
+from innerattn.config.scenario import Robot, Scenario, Task
 
 Bounds = tuple[NDArray[np.float32], NDArray[np.float32]]
 """Least and most values, arrays of one shape."""
@@ -61,16 +61,21 @@ def _observation_columns(scenario: Scenario, own: int, speeds: list[float]) -> I
         place = half + far if robot == own else 2 * half + far
         speed = speeds[own] + fast if robot == own else speeds[own] + speeds[robot] + fast
         yield from (_both_ways(place), _both_ways(place), _both_ways(speed), _both_ways(speed))
-        yield from (_FLAG for _ in range(len(abilities) + 1))  # and availability
+        yield from ((0.0, _most(scenario.robots, ability)) for ability in abilities)
+        yield _FLAG  # availability
         if scenario.observe_faults:
             yield from (bounds for kind, bounds in _FAULT_RANGES.items() if kind != "unavailable")
     for _ in range(scenario.num_victims):
         yield _FLAG
         for ability in abilities:
-            most = max(task.needs.count(ability) for task in scenario.tasks)
-            yield 0.0, float(max(most, 1))
+            yield 0.0, _most(scenario.tasks, ability)
         yield from (_both_ways(2 * half + far), _both_ways(2 * half + far))
         yield from [_FLAG] * (scenario.has_services + scenario.has_deadlines)
+
+
+def _most(ones: Sequence[Robot | Task], ability: str) -> float:
+    """Largest amount of an ability, at least 1."""
+    return max(1.0, *(one.amount(ability) for one in ones))
 
 
 def _most_speeds(scenario: Scenario) -> list[float]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
+from innerattn.config.amounts import in_words
 from innerattn.envs.colours import robot_looks
 
 if TYPE_CHECKING:
@@ -119,7 +120,9 @@ def _paint_victims(axes: Axes, scenario: Scenario, victims: NDArray[np.void]) ->
     markers = [_TASK_MARKERS[i % len(_TASK_MARKERS)] for i in range(len(scenario.tasks))]
     style: dict[str, Any] = {"color": _VICTIM_COLOUR, "linestyle": "", "markersize": 11}
     for task, marker in zip(scenario.tasks, markers, strict=True):
-        legend[f"{task.name}:\n{' + '.join(task.needs)}"] = Line2D([], [], marker=marker, **style)
+        legend[f"{task.name}:\n{' + '.join(in_words(task.needs))}"] = Line2D(
+            [], [], marker=marker, **style
+        )
     ring_style: dict[str, Any] = {"markerfacecolor": "none", "linestyle": "", "markersize": 13}
     legend["rescue radius"] = Line2D([], [], marker="o", color=_VICTIM_COLOUR, **ring_style)
     for victim in victims[victims["present"].astype(bool)]:

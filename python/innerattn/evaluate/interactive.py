@@ -272,7 +272,7 @@ class InteractiveWorld:
         if last is None or last.task == now.task:
             return []
         tasks = self.scenario.tasks
-        if any(len(tasks[one.task].needs) != 2 for one in (last, now)):
+        if any(len(tasks[one.task].roles) != 2 for one in (last, now)):
             return []
         before, after = (
             next(other for other in one.helpers if other != robot) for one in (last, now)

@@ -7,13 +7,23 @@ from collections import Counter
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.config import Scenario
+from innerattn.config import Scenario, Task
 
 
 def shared_abilities(scenario: Scenario) -> tuple[str, ...]:
     """Abilities that several robots have, sorted: where there is a choice of whom to send."""
     owners = Counter(ability for robot in scenario.robots for ability in set(robot.abilities))
     return tuple(sorted(ability for ability, count in owners.items() if count > 1))
+
+
+def columns_of_choices(task: Task, shared: set[str], rescues: NDArray[np.void]) -> list[str]:
+    """The columns of events of ``task`` whose helpers could have been others.
+
+    Those of the needs that several robots can meet; where needs are sums, those of all helpers.
+    """
+    if task.sums:
+        return [name for name in rescues.dtype.names or () if name.startswith("helper_")]
+    return [f"helper_{need}" for need, ability in enumerate(task.roles) if ability in shared]
 
 
 def count_cooperation(rescues: NDArray[np.void], scenario: Scenario) -> dict[str, dict[str, int]]:
@@ -26,15 +36,16 @@ def count_cooperation(rescues: NDArray[np.void], scenario: Scenario) -> dict[str
     Returns:
         For each task, in order, the number of rescues by robot: of all robots, in order, with a
         shared ability that the task needs. In the default team these are the two food robots.
+        Where needs are sums every helper with such an ability counts.
     """
     shared = set(shared_abilities(scenario))
     counts: dict[str, dict[str, int]] = {}
     for index, task in enumerate(scenario.tasks):
         of_task = rescues[rescues["task"] == index]
         total = np.zeros(scenario.num_robots, np.int64)
-        for need, ability in enumerate(task.needs):
-            if ability in shared:
-                total += np.bincount(of_task[f"helper_{need}"], minlength=len(total))
+        for name in columns_of_choices(task, shared, rescues):
+            helper = of_task[name]
+            total += np.bincount(helper[helper >= 0], minlength=len(total))
         chosen = shared & set(task.needs)
         counts[task.name] = {
             robot.name: int(total[i])

@@ -62,7 +62,7 @@ def choices_of(record: Record) -> Choices:
     """Every choice that the team of a record made.
 
     A need counts if several robots have the ability and the task needs it once; where it is needed
-    twice there is no single robot that should have gone.
+    twice, or where needs are sums, there is no single robot that should have gone.
 
     Raises:
         ValueError: positions, velocities or victims were not recorded.
@@ -74,8 +74,8 @@ def choices_of(record: Record) -> Choices:
     shared = shared_abilities(scenario)
     parts = []
     for index, task in enumerate(scenario.tasks):
-        for need, ability in enumerate(task.needs):
-            if ability in shared and task.needs.count(ability) == 1:
+        for need, ability in enumerate(task.roles):
+            if ability in shared and task.roles.count(ability) == 1:
                 events = rescues[rescues["task"] == index]
                 able = np.array([ability in robot.abilities for robot in scenario.robots])
                 times = np.where(able, _times(record, events), np.inf)

@@ -39,7 +39,7 @@ def handoffs_of_all_robots(record: Record) -> NDArray[np.void]:
     Returns:
         (N,) `HANDOFF`, in the order of episodes and of the second rescue.
     """
-    tasks = [task.name for task in record.scenario.tasks if len(task.needs) == 2]
+    tasks = [task.name for task in record.scenario.tasks if len(task.roles) == 2]
     found = [
         handoffs(record, robot, first, later)
         for robot in record.robot_names

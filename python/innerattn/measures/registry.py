@@ -11,7 +11,7 @@ from itertools import takewhile
 
 import numpy as np
 
-from innerattn.measures import deadlines, dispatch_quality, rescues, waiting
+from innerattn.measures import deadlines, dispatch_quality, helpers, rescues, waiting
 from innerattn.measures.measure import Measure, Value
 from innerattn.measures.sharing import imbalance
 from innerattn.records.record import Record
@@ -25,6 +25,7 @@ _BUILT_IN = (
     *dispatch_quality.MEASURES,
     *waiting.MEASURES,
     *deadlines.MEASURES,
+    *helpers.MEASURES,
 )
 
 

@@ -59,10 +59,10 @@ def right_partners(obs: Tensor, columns: PartnerColumns, available: Tensor | Non
         there = there & available.unsqueeze(1)
     if not teammates:
         return there
-    own = obs[:, :, list(columns.abilities)] > 0.0  # (R, B, A)
+    own = obs[:, :, list(columns.abilities)]  # (R, B, A)
     needs = obs[:, :, list(columns.victim_needs)]
-    helps = (own & (needs > 0.0)).any(2) & (obs[:, :, columns.victim_present] > 0.5)
-    missing = needs - own.to(needs.dtype) > 0.0
+    helps = ((own > 0.0) & (needs > 0.0)).any(2) & (obs[:, :, columns.victim_present] > 0.5)
+    missing = needs - own > 0.0
     flat = [column for one in columns.teammate_abilities for column in one]
     has = obs[:, :, flat].view(robots, batch, teammates, -1) > 0.0
     useful = (has & missing.unsqueeze(2)).any(3)  # (R, B, T)

@@ -42,7 +42,8 @@ class Record(Shown):
         first_episode: number of the first episode.
         lengths: (E,) int64 steps of each episode.
         rescues: (N,) structured int64: episode, step, slot, victim, task, helper_0, ...;
-            helper_k filled the task's need k, -1 beyond its last need.
+            helper_k filled the task's need k, -1 beyond its last need; where needs are sums,
+            the nearest helper comes first, and -1 is nobody.
         lost: (M,) structured int64: episode, step, slot, victim, task; victims that were lost.
         reward_names: C names of reward components.
         rewards_total: (E, R, C) float64 sum over the episode.
@@ -84,6 +85,5 @@ class Record(Shown):
 
 
 def rescue_dtype(scenario: Scenario) -> np.dtype[np.void]:
-    """The fields of `Record.rescues`: as many helpers as any task has needs."""
-    most = max(len(task.needs) for task in scenario.tasks)
-    return np.dtype([*_EVENT, *((f"helper_{k}", np.int64) for k in range(most))])
+    """The fields of `Record.rescues`: as many helpers as any victim can have."""
+    return np.dtype([*_EVENT, *((f"helper_{k}", np.int64) for k in range(scenario.max_helpers))])

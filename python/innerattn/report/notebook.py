@@ -14,6 +14,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from innerattn.config import Scenario
+from innerattn.config.amounts import in_words
 from innerattn.envs import BatchEnv
 from innerattn.envs.render import draw_world
 from innerattn.evaluate import Evaluation
@@ -120,7 +121,7 @@ def _team(scenario: Scenario) -> Table:
     heads = columns(["robot", "kind", "abilities"], ["m/s", "kg"])
     rows = [
         [
-            *(robot.name, robot.kind, ", ".join(robot.abilities)),
+            *(robot.name, robot.kind, ", ".join(in_words(robot.abilities))),
             *(f"{robot.max_speed_mps:g}", f"{robot.mass_kg:g}"),
         ]
         for robot in scenario.robots
@@ -129,7 +130,7 @@ def _team(scenario: Scenario) -> Table:
 
 
 def _tasks(scenario: Scenario) -> Table:
-    rows = [[task.name, ", ".join(task.needs)] for task in scenario.tasks]
+    rows = [[task.name, ", ".join(in_words(task.needs))] for task in scenario.tasks]
     return plain_table(columns(["task", "needs"]), rows)
 
 

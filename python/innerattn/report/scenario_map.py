@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from innerattn.config import Obstacle, Scenario
+from innerattn.config.amounts import in_words
 
 _COLUMNS, _ROWS = 61, 31
 _CORNER, _SIDE, _UPRIGHT = "+", "-", "|"
@@ -46,7 +47,8 @@ def _legend(scenario: Scenario) -> Iterator[str]:
     yield f"{scenario.arena_half_width_m * 2:g} m from wall to wall"
     placed = [robot for robot in scenario.robots if robot.start_m is not None]
     for letter, robot in zip(_letters(), placed, strict=False):
-        yield f"{letter}  {robot.name} starts here ({', '.join(robot.abilities) or 'no ability'})"
+        offers = ", ".join(in_words(robot.abilities)) or "no ability"
+        yield f"{letter}  {robot.name} starts here ({offers})"
     if scenario.victim_places_m:
         yield f"{_PLACE}  a victim may appear here"
     else:

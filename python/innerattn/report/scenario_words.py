@@ -29,9 +29,13 @@ def scenario_words(scenario: Scenario) -> str:
 def _tasks(scenario: Scenario) -> Iterator[str]:
     for task in scenario.tasks:
         helpers = []
-        for need in dict.fromkeys(task.needs):
+        for need, amount in task.sums.items():
+            given = {robot.name: robot.amount(need) for robot in scenario.robots}
+            some = ", ".join(f"{name} {one:g}" for name, one in given.items() if one > 0.0)
+            helpers.append(f"{amount:g} {need} (of {some})")
+        for need in dict.fromkeys(task.roles):
             able = [robot.name for robot in scenario.robots if need in robot.abilities]
-            count = task.needs.count(need)
+            count = task.roles.count(need)
             some = " or ".join(able) if count == 1 else f"{count} of {', '.join(able)}"
             helpers.append(f"{need} ({some})")
         near = f"together within {scenario.rescue_radius_m:g} m"
@@ -61,7 +65,7 @@ def _doubts(scenario: Scenario) -> Iterator[str]:
             robot.radius_m for robot in scenario.robots if set(task.needs) & set(robot.abilities)
         )
         least = sum(radii[:2]) / 2.0
-        if len(task.needs) > 1 and scenario.rescue_radius_m < least:
+        if _needs_several(task, scenario) and scenario.rescue_radius_m < least:
             yield (
                 f"{task.name}: helpers hardly meet; without overlap of bodies rescue_radius_m "
                 f"must be at least {least:g}"
@@ -75,6 +79,16 @@ def _doubts(scenario: Scenario) -> Iterator[str]:
             f"wall_clearance_m = {largest:g} would do"
         )
     yield from closed_off(scenario)
+
+
+def _needs_several(task: Task, scenario: Scenario) -> bool:
+    """Whether no robot alone can rescue its victims."""
+    if not task.sums:
+        return len(task.needs) > 1
+    return not any(
+        all(robot.amount(need) >= amount for need, amount in task.sums.items())
+        for robot in scenario.robots
+    )
 
 
 def _fault(fault: Fault) -> str:

@@ -17,12 +17,16 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
         "rescue_radius_m": scenario.rescue_radius_m,
         "has_services": scenario.has_services,
         "has_deadlines": scenario.has_deadlines,
-        "tasks": [{"name": task.name, "needs": list(task.needs)} for task in scenario.tasks],
+        "tasks": [
+            {"name": task.name, "needs": list(task.needs), "amounts": task.sums}
+            for task in scenario.tasks
+        ],
         "robots": [
             {
                 "name": robot.name,
                 "kind": robot.kind,
                 "abilities": list(robot.abilities),
+                "amounts": robot.abilities if isinstance(robot.abilities, dict) else {},
                 "radius_m": robot.radius_m,
             }
             for robot in scenario.robots

@@ -72,7 +72,7 @@ impl Batch {
         Worlds::check(&options).map_err(|error| raised(py, &error))?;
         let (robots, width) = (rules.team.len(), rules.layout.width());
         let outputs = Outputs::new(py, num_envs, robots, width, give)?;
-        let rescue_dtype = event_dtype(py, rules.scenario.max_needs())?;
+        let rescue_dtype = event_dtype(py, rules.scenario.max_helpers())?;
         let threads = num_threads.unwrap_or(1) * THREAD_BYTES;
         probe(py, num_envs * World::most_bytes(&rules) + SLACK_BYTES + threads)?;
         let worlds = py.detach(|| Worlds::new(rules, options)).map_err(|error| raised(py, &error))?;
@@ -318,13 +318,13 @@ impl Batch {
         shaped(py, gather(shape.iter().product(), numbers)?, shape)
     }
 
-    /// Rescues as a structured array: env, episode, step, slot, victim, task and one helper for each
-    /// possible need.
+    /// Rescues as a structured array: env, episode, step, slot, victim, task and the most helpers
+    /// that there can be.
     fn events(&self, py: Python, rescues: &[Rescue]) -> PyResult<Py<PyAny>> {
         if rescues.is_empty() {
             return Ok(self.no_rescues.clone_ref(py));
         }
-        let helpers = self.worlds.rules().scenario.max_needs();
+        let helpers = self.worlds.rules().scenario.max_helpers();
         let mut rows = Vec::new();
         reserve(&mut rows, rescues.len() * (RESCUE_FIELDS.len() + helpers))?;
         for rescue in rescues {

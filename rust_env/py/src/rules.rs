@@ -28,6 +28,11 @@ impl Rules {
         self.0.scenario.num_victims()
     }
 
+    #[getter]
+    fn max_helpers(&self) -> usize {
+        self.0.scenario.max_helpers()
+    }
+
     fn __eq__(&self, other: &Bound<PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|other| self.0.scenario == other.get().0.scenario)
     }

@@ -2,14 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Abilities;
+
 /// A kind of victim: the abilities that must meet at it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Task {
     /// Unique name, such as `task_1`.
     pub name: String,
-    /// Needed abilities, with repeats if several robots of one ability are needed.
-    pub needs: Vec<String>,
+    /// Needed abilities: a list, with repeats if several robots of one ability are needed, or sums.
+    pub needs: Abilities,
     /// How long all needs of a victim must be met before it is rescued, s.
     #[serde(default)]
     pub service_s: f64,
@@ -24,8 +26,9 @@ pub struct Task {
 impl Task {
     /// A task whose victims are rescued at touch and wait for ever.
     #[must_use]
-    pub fn new(name: &str, needs: Vec<String>) -> Self {
-        Self { name: name.into(), needs, service_s: 0.0, service: Interrupted::Keep, deadline_s: None }
+    pub fn new(name: &str, needs: impl Into<Abilities>) -> Self {
+        let (name, needs) = (name.into(), needs.into());
+        Self { name, needs, service_s: 0.0, service: Interrupted::Keep, deadline_s: None }
     }
 }
 

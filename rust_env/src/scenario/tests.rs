@@ -77,10 +77,39 @@ fn teams_have_their_limits() {
 }
 
 #[test]
+fn amounts_are_finite_and_the_team_has_what_is_needed() {
+    let needing = |amount: f64| {
+        refusal(move |scenario| {
+            scenario.robots[0].abilities = [("food", 1.5), ("water", 0.25)].into();
+            scenario.tasks[1].needs = [("food", amount)].into();
+        })
+    };
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e7] {
+        assert!(needing(bad).starts_with("scenario.tasks[1].needs.food = "), "{}", needing(bad));
+        assert!(needing(bad).ends_with(": must be in 0.000001..=1000000"), "{}", needing(bad));
+    }
+    let rule = "task \"task_2\" needs more than the whole team has, which is 2.5";
+    assert_eq!(needing(2.6), format!("scenario.tasks[1].needs.food = 2.6: {rule}"));
+    let mut scenario = Scenario::default();
+    scenario.robots[0].abilities = [("food", 0.7), ("water", 0.25)].into();
+    scenario.tasks[0].needs = [("food", 1.7), ("water", 0.25)].into();
+    assert_eq!(scenario.validate(), Ok(()), "a name is an amount of 1");
+    assert_eq!(scenario.abilities(), ["food", "information", "medicine", "water"]);
+    assert_eq!(scenario.max_helpers(), 2);
+    assert_eq!(Scenario::from_json(&scenario.to_json()), Ok(scenario));
+    let zero = refusal(|scenario| scenario.robots[3].abilities = [("medicine", 0.0)].into());
+    assert!(zero.starts_with("scenario.robots[3].abilities.medicine = 0: must be in"), "{zero}");
+    let none = refusal(|scenario| scenario.tasks[0].needs = [].into());
+    assert_eq!(none, "scenario.tasks[0].needs (their number) = 0: must be in 1..=8");
+    let text = Scenario::from_json(r#"{"tasks": [{"name": "t", "needs": 3}]}"#).expect_err("a number");
+    assert!(text.to_string().contains("must be a list of names or a table of amounts"), "{text}");
+}
+
+#[test]
 fn a_task_needs_distinct_able_robots() {
     let needs = |needs: &[&str]| {
         let mut scenario = Scenario::default();
-        scenario.tasks[1].needs = needs.iter().map(ToString::to_string).collect();
+        scenario.tasks[1].needs = needs.iter().map(ToString::to_string).collect::<Vec<_>>().into();
         scenario.validate()
     };
     assert_eq!(needs(&["food", "food", "medicine"]), Ok(()));
@@ -91,10 +120,10 @@ fn a_task_needs_distinct_able_robots() {
     assert!(needs(&[]).is_err() && needs(&["food"; 9]).is_err());
     // One robot of two abilities cannot fill two needs, but may free another for one.
     let mut scenario = Scenario::default();
-    scenario.robots[2].abilities = vec!["medicine".into(), "information".into()];
-    scenario.tasks[0].needs = vec!["medicine".into(), "information".into()];
+    scenario.robots[2].abilities = vec!["medicine".into(), "information".into()].into();
+    scenario.tasks[0].needs = vec!["medicine".into(), "information".into()].into();
     assert_eq!(scenario.validate(), Ok(()));
-    scenario.tasks[0].needs.push("medicine".into());
+    scenario.tasks[0].needs = ["medicine", "information", "medicine"].map(String::from).to_vec().into();
     assert!(scenario.validate().is_err());
 }
 

@@ -1,11 +1,12 @@
 //! The rules that a scenario's values obey, all of them, but for whether everything finds a place in the
 //! arena, which [`crate::rules::Rules::new`] tries out.
 
+use super::abilities::reaches;
 use super::check::{broken, counts, named, within};
 use super::{
-    Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_MASS_RATIO_RAPIER, MAX_NEEDS, MAX_OBSTACLES,
-    MAX_PLACES, MAX_ROBOTS, MAX_TIME_S, MAX_TRAVEL_RADII, MAX_VICTIMS, Robot, START_GAP_M, Scenario, Shape,
-    Task,
+    AMOUNTS, Abilities, Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_MASS_RATIO_RAPIER, MAX_NEEDS,
+    MAX_OBSTACLES, MAX_PLACES, MAX_ROBOTS, MAX_TIME_S, MAX_TRAVEL_RADII, MAX_VICTIMS, Robot, START_GAP_M,
+    Scenario, Shape, Task,
 };
 use crate::error::Result;
 use crate::fault::{Fault, Spec};
@@ -59,9 +60,10 @@ impl Scenario {
             if self.robots[..index].iter().any(|other| other.name == robot.name) {
                 return broken(&key("name"), &robot.name, "names must differ");
             }
-            for ability in &robot.abilities {
+            for ability in robot.abilities.names() {
                 named(&key("abilities"), ability)?;
             }
+            validate_amounts(&robot.abilities, &key("abilities"))?;
             within(&key("max_speed_mps"), robot.max_speed_mps, 0.01, 100.0, "m/s")?;
             within(&key("mass_kg"), robot.mass_kg, 0.01, 1000.0, "kg")?;
             within(&key("radius_m"), robot.radius_m, 0.005, 10.0, "m")?;
@@ -100,9 +102,19 @@ impl Scenario {
             if self.tasks[..index].iter().any(|other| other.name == task.name) {
                 return broken(&key("name"), &task.name, "names must differ");
             }
-            counts(&key("needs (their number)"), task.needs.len(), 1, MAX_NEEDS)?;
-            if !self.can_serve(&task.needs) {
-                let needs = task.needs.join(" + ");
+            let needs: Vec<&str> = task.needs.names().collect();
+            counts(&key("needs (their number)"), needs.len(), 1, MAX_NEEDS)?;
+            validate_amounts(&task.needs, &key("needs"))?;
+            for (need, amount) in task.needs.amounts().into_iter().flatten() {
+                let sum: f64 = self.robots.iter().map(|robot| robot.abilities.amount(need)).sum();
+                if !reaches(sum, *amount) {
+                    let rule =
+                        format!("task {:?} needs more than the whole team has, which is {sum}", task.name);
+                    return broken(&key(&format!("needs.{need}")), amount, &rule);
+                }
+            }
+            if task.needs.amounts().is_none() && !self.can_serve(&needs) {
+                let needs = needs.join(" + ");
                 return broken(&key("needs"), &needs, "the team has no distinct able robot for each need");
             }
             validate_times(task, key)?;
@@ -111,9 +123,9 @@ impl Scenario {
     }
 
     /// Whether distinct robots can fill all needs at once.
-    fn can_serve(&self, needs: &[String]) -> bool {
-        let able = |need: &String| {
-            let has = |(_, robot): &(usize, &Robot)| robot.abilities.contains(need);
+    fn can_serve(&self, needs: &[&str]) -> bool {
+        let able = |need: &&str| {
+            let has = |(_, robot): &(usize, &Robot)| robot.abilities.amount(need) > 0.0;
             self.robots.iter().enumerate().filter(has).fold(0_u64, |mask, (index, _)| mask | 1 << index)
         };
         fillable(&needs.iter().map(able).collect::<Vec<u64>>())
@@ -259,6 +271,16 @@ impl Scenario {
             _ => Ok(()),
         }
     }
+}
+
+/// Refuses amounts out of range.
+fn validate_amounts(abilities: &Abilities, key: &str) -> Result<()> {
+    let (low, high) = AMOUNTS;
+    abilities
+        .amounts()
+        .into_iter()
+        .flatten()
+        .try_for_each(|(name, amount)| within(&format!("{key}.{name}"), *amount, low, high, ""))
 }
 
 /// Refuses services and deadlines out of range, and a deadline that comes before the service can end.

@@ -8,7 +8,9 @@ use innerattn_env::reward::{COMPONENTS, NUM_COMPONENTS};
 use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
-use innerattn_env::scenario::{Actions, Deadline, Engine, Interrupted, Obstacle, Robot, Scenario, Shape};
+use innerattn_env::scenario::{
+    Abilities, Actions, Deadline, Engine, Interrupted, Obstacle, Robot, Scenario, Shape,
+};
 use innerattn_env::tasks::{Loss, Rescue};
 
 /// Every engine: each must keep every promise.
@@ -157,6 +159,19 @@ pub fn with_times(mut scenario: Scenario) -> Scenario {
         task.deadline_s = Some(Deadline::Between([4.0 * scenario.dt_s, 12.0 * scenario.dt_s]));
     }
     Scenario { rescue_radius_m: 0.4, lost_cost: 0.5, ..scenario }
+}
+
+/// The same with amounts: some robots have amounts, and the first task needs sums.
+pub fn with_amounts(mut scenario: Scenario) -> Scenario {
+    for (index, robot) in scenario.robots.iter_mut().enumerate().filter(|(index, _)| index % 2 == 0) {
+        let share = |name: &str| (name.to_string(), 0.3 + 0.7 * index as f64);
+        robot.abilities = Abilities::Amounts(robot.abilities.names().map(share).collect());
+    }
+    let names = scenario.abilities();
+    let team = |name: &str| scenario.robots.iter().map(|robot| robot.abilities.amount(name)).sum::<f64>();
+    let needs = Abilities::Amounts(names.iter().map(|name| (name.to_string(), 0.6 * team(name))).collect());
+    scenario.tasks[0].needs = needs;
+    Scenario { rescue_radius_m: 0.6, ..scenario }
 }
 
 /// A disc at a random place, a box at a random place, and a box that stays.

@@ -102,7 +102,7 @@ fn the_heavier_pushes_the_lighter() {
     (robots[0].mass_kg, robots[1].mass_kg) = (4.0, 0.5);
     let mut scenario = Scenario { robots, ..Scenario::default() };
     scenario.tasks.truncate(1);
-    scenario.tasks[0].needs = vec!["food".into()];
+    scenario.tasks[0].needs = vec!["food".into()].into();
     let cases = [((1.0, 0.0), 4.0 / 4.5), ((0.0, -1.0), -0.5 / 4.5), ((1.0, -1.0), 3.5 / 4.5)];
     for (engine, (speeds, common)) in ENGINES.iter().flat_map(|engine| cases.map(|case| (*engine, case))) {
         let at = [Vec2::new(-0.08, 0.0), Vec2::new(0.08, 0.0)];

@@ -5,7 +5,8 @@ use innerattn_env::batch::Options;
 use innerattn_env::scenario::{Actions, Scenario, Shaping, Situation};
 
 use crate::common::{
-    ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_times,
+    ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
+    with_amounts, with_times,
 };
 
 const STEPS: usize = 150;
@@ -32,6 +33,7 @@ fn scenarios() -> Vec<Scenario> {
             end_when_rescued: Some(2),
             ..tight.clone()
         },
+        with_amounts(tight.clone()),
         with_times(tight),
     ];
     let by = |engine| scenarios.clone().map(|scenario| Scenario { engine, ..scenario });

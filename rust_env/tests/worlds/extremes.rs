@@ -73,7 +73,7 @@ fn extreme(source: &mut Stream) -> Scenario {
         .map(|index| Robot {
             name: format!("robot_{index}"),
             kind: "robot".into(),
-            abilities: vec!["aid".into()],
+            abilities: vec!["aid".into()].into(),
             max_speed_mps: scaled(source, 0.01, 100.0),
             mass_kg: scaled(source, light, light * ratio),
             radius_m: scaled(source, small, large),

@@ -13,7 +13,8 @@ use innerattn_env::scenario::{Actions, Engine, Scenario};
 use serde_json::{Value, json};
 
 use crate::common::{
-    ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_times,
+    ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
+    with_amounts, with_times,
 };
 
 const ENVS: usize = 2;
@@ -50,6 +51,7 @@ fn scenarios() -> Vec<Scenario> {
                 ..tight.clone()
             },
             with_times(Scenario { engine, ..tight.clone() }),
+            with_amounts(Scenario { engine, ..tight.clone() }),
         ]
     };
     ENGINES.into_iter().flat_map(with).collect()
@@ -132,6 +134,7 @@ fn strange(source: &mut Stream) -> Value {
         json!(large),
         json!([]),
         json!([0.1, 0.1]),
+        json!({"food": 1.2}),
         json!({}),
         json!({"name": "x"}),
     ];

@@ -6,7 +6,8 @@ use innerattn_env::scenario::{Scenario, Situation};
 use proptest::prelude::*;
 
 use crate::common::{
-    Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_times,
+    Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_amounts,
+    with_times,
 };
 
 const ENVS: usize = 6;
@@ -25,6 +26,7 @@ fn scenarios() -> Vec<Scenario> {
             contact_cost: 1.0,
             ..tight.clone()
         },
+        with_amounts(tight.clone()),
         with_times(tight),
     ]
 }

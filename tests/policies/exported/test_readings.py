@@ -81,6 +81,20 @@ def test_rows_of_worlds_with_services_and_deadlines(tmp_path: Path) -> None:
         team.row("food_0", readings)
 
 
+def test_rows_of_worlds_with_amounts(tmp_path: Path) -> None:
+    robots = [robot.model_dump() for robot in Scenario().robots]
+    robots[1]["abilities"], robots[3]["abilities"] = {"food": 2.5}, {"medicine": 0.3, "food": 0.2}
+    tasks = [{"name": "task_1", "needs": {"food": 3.1, "medicine": 0.3}}, TASKS[1]]
+    changes = {"scenario.tasks": tasks, "scenario.robots": robots}
+    team = Exported(made_export(tmp_path, "td-inner", **changes)[1], backend="numpy")
+    env = worlds(team, 16, 1)
+    obs = played(env, 6, 0)
+    for world in range(16):
+        for index, robot in enumerate(ROBOTS):
+            row = team.row(robot, readings_of(team, robot, env, world))
+            np.testing.assert_array_equal(row, obs[world, index])
+
+
 @BOTH
 def test_victims_are_there_in_some_worlds_and_not_in_others(team: Exported) -> None:
     """The test above meets full and empty slots, and victims that a robot cannot help."""

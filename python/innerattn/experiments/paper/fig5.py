@@ -152,7 +152,7 @@ def all_handoffs(record: Record) -> NDArray[np.void]:
     Returns:
         (N,) `HANDOFF`, by robot, then by order of the tasks.
     """
-    tasks = [task.name for task in record.scenario.tasks if len(task.needs) == 2]
+    tasks = [task.name for task in record.scenario.tasks if len(task.roles) == 2]
     rows = [
         handoffs(record, robot, first, later)
         for robot in alike_robots(record)

@@ -73,7 +73,7 @@ def choose_scene(group: Sequence[FinishedRun]) -> HandoffScene | None:
         None where the first run has no attention, not two tasks of two needs, or no such handoff.
     """
     run, record = group[0], group[0].recorded
-    tasks = [task.name for task in record.scenario.tasks if len(task.needs) == 2]
+    tasks = [task.name for task in record.scenario.tasks if len(task.roles) == 2]
     alike = alike_robots(record)
     if "attention" not in record.steps or len(tasks) < 2 or not alike:
         return None

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from innerattn.measures.cooperation import shared_abilities
+from innerattn.measures.cooperation import columns_of_choices, shared_abilities
 from innerattn.records.record import Record
 from innerattn.stats import Estimate
 from innerattn.stats.bootstrap import RESAMPLES, percentile_interval
@@ -119,10 +119,9 @@ def counts_by_episode(record: Record) -> dict[str, NDArray[np.int64]]:
     for index, task in enumerate(scenario.tasks):
         of_task = events[events["task"] == index]
         total = np.zeros((record.num_episodes, scenario.num_robots), np.int64)
-        for need, ability in enumerate(task.needs):
-            if ability in shared:
-                episode = of_task["episode"] - record.first_episode
-                np.add.at(total, (episode, of_task[f"helper_{need}"]), 1)
+        for name in columns_of_choices(task, shared, events):
+            some = of_task[of_task[name] >= 0]
+            np.add.at(total, (some["episode"] - record.first_episode, some[name]), 1)
         chosen = shared & set(task.needs)
         able = [bool(chosen & set(robot.abilities)) for robot in scenario.robots]
         counts[task.name] = total[:, able]

@@ -49,9 +49,9 @@ def handoffs(record: Record, robot: str, first_task: str, later_task: str) -> ND
     if first_task == later_task:
         raise ValueError(f"first_task and later_task are both {first_task!r}: must differ")
     for task in tasks:
-        needs = record.scenario.tasks[task].needs
+        needs = record.scenario.tasks[task].roles
         if len(needs) != 2:
-            raise ValueError(f"task {names[task]!r} has {len(needs)} needs: must have 2")
+            raise ValueError(f"task {names[task]!r} has {len(needs)} needs: must have a list of 2")
     events = record.rescues
     helpers = np.stack([events["helper_0"], events["helper_1"]], -1)
     own = _own_rescues(events, index)

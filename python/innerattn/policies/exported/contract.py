@@ -22,6 +22,7 @@ _Sha256 = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
 _Name = Annotated[str, StringConstraints(pattern="^[A-Za-z0-9_-]{1,200}$")]
 _File = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,200}\.(onnx|safetensors)$")]
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Amounts = dict[str, _Positive]
 _Share = Annotated[float, Field(ge=0, le=1)]
 _Number = Annotated[float, Field(allow_inf_nan=False)]
 _Index = Annotated[int, Field(ge=0, lt=2**20)]
@@ -59,7 +60,7 @@ class Member:
 
     name: _Name
     kind: _Name
-    abilities: tuple[str, ...]
+    abilities: tuple[str, ...] | _Amounts
     max_speed_mps: _Positive
     mass_kg: _Positive
     radius_m: _Positive
@@ -69,12 +70,12 @@ class Member:
 
 @dataclass(frozen=True)
 class NeededAbilities:
-    """One kind of victim: the abilities that it needs, each from a robot of its own."""
+    """One kind of victim: the abilities that it needs, from a robot of its own each, or as sums."""
 
     __pydantic_config__ = _STRICT
 
     name: str
-    needs: tuple[str, ...]
+    needs: tuple[str, ...] | _Amounts
 
 
 @dataclass(frozen=True)

@@ -57,13 +57,16 @@ class RowBuilder:
         self._most_position_m = 2.0 * contract.arena_half_width_m
         own = set(team[robot].abilities)
         self._needs = {
-            task.name: np.array([1, *(task.needs.count(one) for one in abilities)], np.float32)
+            task.name: np.array([1, *(_needed(task.needs, one) for one in abilities)], np.float32)
             for task in contract.tasks
         }
         self._cannot_help = {task.name: own.isdisjoint(task.needs) for task in contract.tasks}
         blocks = np.zeros((len(team), self._width), np.float32)
         for block, other in zip(blocks, self._order, strict=True):
-            block[4 : self._available] = [float(one in team[other].abilities) for one in abilities]
+            offered = team[other].abilities
+            if not isinstance(offered, Mapping):
+                offered = dict.fromkeys(offered, 1.0)
+            block[4 : self._available] = [offered.get(one, 0.0) for one in abilities]
             block[self._available] = 1.0
             block[self._available + 1 :] = self._healthy
         self._fixed = np.zeros(len(self._names), np.float32)
@@ -241,6 +244,13 @@ class RowBuilder:
 _MOST_SHOWN = 60
 _SHARES = frozenset({"motor_gain", "speed_limit"})
 """Kinds of faults whose healthy value is 1; that of the others is 0."""
+
+
+def _needed(needs: Sequence[str] | Mapping[str, float], ability: str) -> float:
+    """How much of an ability is needed; of a list, how many robots."""
+    if isinstance(needs, Mapping):
+        return needs.get(ability, 0.0)
+    return float(needs.count(ability))
 
 
 def _given(readings: Mapping[str, Any], key: str, place: str = "") -> Any:

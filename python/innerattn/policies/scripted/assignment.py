@@ -29,7 +29,8 @@ class Needs:
 
     Attributes:
         able: (R, A) bool, robot has ability (abilities sorted).
-        of_task: (K, N) int64, ability of each need of each task, -1 beyond a task's last.
+        of_task: (K, N) int64, ability of each need of each task, -1 beyond a task's last; needs
+            may be sums, see `coalitions`.
     """
 
     def __init__(self, scenario: Scenario) -> None:

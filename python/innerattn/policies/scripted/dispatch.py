@@ -17,6 +17,7 @@ from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
 from innerattn.errors import ConfigError
 from innerattn.policies.policy import Policy, PolicyInput, WorldState
 from innerattn.policies.scripted.assignment import Needs, assign, can_be_rescued, pair_costs
+from innerattn.policies.scripted.coalitions import Coalitions
 from innerattn.policies.scripted.steering import Steering
 from innerattn.policies.scripted.timing import Timing
 
@@ -59,6 +60,7 @@ class _Dispatcher(ABC):
         self.needs = Needs(scenario)
         self.steering = Steering(scenario)
         self._timing = Timing(scenario)
+        self._coalitions = Coalitions(scenario)
 
     def act(self, view: PolicyInput) -> NDArray[Any]:
         """See `Policy.act`; robots without a victim are drawn to the centre."""
@@ -95,6 +97,8 @@ class GreedyPolicy(_Dispatcher):
         distance = np.where(helpful, (way * way).sum(-1), np.inf)
         if self._timing.is_needed:
             times = self.steering.arrival_times(state.positions, state.velocities, places)
+            if self._coalitions.is_needed:
+                permitted = self._coalitions.alone(state, times, permitted)
             helpful &= self._timing.in_time(state, times, permitted)[:, None]
             distance = np.where(helpful, distance, np.inf)
             distance = np.where(helpful & self._timing.held(state, times), -1.0, distance)
@@ -102,7 +106,10 @@ class GreedyPolicy(_Dispatcher):
 
 
 class HungarianPolicy(_Dispatcher):
-    """Robots are assigned to needs at the least total cost in arrival times, anew every step."""
+    """Robots are assigned to needs at the least total cost in arrival times, anew every step.
+
+    Where needs are sums, the robots of a coalition are assigned in place of needs.
+    """
 
     name = "hungarian"
 
@@ -110,11 +117,14 @@ class HungarianPolicy(_Dispatcher):
         """See `_Dispatcher.choose`."""
         permitted = self.needs.permitted(state.victims["present"], state.victims["task"])
         faults = self._faults(state)
+        needed = np.asarray(permitted.any(1))
         if faults is not None:
-            needed = np.asarray(permitted.any(1))
             permitted &= (faults["unavailable"] < 1.0)[:, :, None, None]
-            permitted &= can_be_rescued(permitted, needed)[:, None, :, None]
         times = self.steering.arrival_times(state.positions, state.velocities, places, faults)
+        if self._coalitions.is_needed:
+            permitted, needed = self._coalitions.shared(state, times, permitted, needed)
+        if faults is not None:
+            permitted &= can_be_rescued(permitted, needed)[:, None, :, None]
         held = None
         if self._timing.is_needed:
             permitted &= self._timing.in_time(state, times, permitted)[:, None, :, None]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from innerattn.config.amounts import in_words
 from innerattn.report.table import Row, Table, columns, plain_table, print_table, section
 from innerattn.report.tables.text import number, plus_minus
 from innerattn.stats import Estimate
@@ -170,7 +171,7 @@ def _cooperation(summary: Summary, scenario: Scenario) -> Table:
         of_task = counts[task.name]
         total = sum(of_task.values())
         cells = [_with_share(of_task[robot], total) if robot in of_task else "" for robot in robots]
-        rows.append([f"{task.name} ({' + '.join(task.needs)})", *cells])
+        rows.append([f"{task.name} ({' + '.join(in_words(task.needs))})", *cells])
     if len(robots) > _MOST_COLUMNS:
         rows = [list(column) for column in zip(*rows, strict=True)]
         rows[0][0] = "robot"

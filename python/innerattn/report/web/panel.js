@@ -21,7 +21,7 @@ class RobotList {
       const faults = run.faultsAt(episode, step, index).map((one) => faultText(this.worlds, one));
       if (run.isBlocked(episode, step, index)) faults.push("blocked");
       note.className = faults.length ? "bad" : "";
-      const parts = faults.length ? faults : [`offers ${listed(robot.abilities)}`];
+      const parts = faults.length ? faults : [`offers ${listed(withAmounts(robot.abilities, robot.amounts))}`];
       if (run.attention && look.robot >= 0 && index !== look.robot) {
         const weight = percent(chosenWeight(run, episode, step, look, index)), { name } = this.worlds.robots[look.robot];
         parts.push(look.received ? `gives ${name} ${weight}` : `${weight} of ${name}'s attention`);
@@ -89,10 +89,10 @@ function fillLegend(list, worlds) {
   list.replaceChildren();
   for (const kind of worlds.kinds) {
     const robot = worlds.robots.find((one) => one.kind === kind);
-    row(robotSymbol(worlds, robot), `${kind} robot, offers ${listed(robot.abilities)}`);
+    row(robotSymbol(worlds, robot), `${kind} robot, offers ${listed(withAmounts(robot.abilities, robot.amounts))}`);
   }
   worlds.tasks.forEach((task, index) => {
-    row(taskSymbol(index), `victim of ${task.name}, needs ${listed(task.needs)}`);
+    row(taskSymbol(index), `victim of ${task.name}, needs ${listed(withAmounts(task.needs, task.amounts))}`);
   });
   const line = (d, stroke = "var(--ink)", more = {}) => symbol(svg("path", { d, stroke, fill: "none", "stroke-width": 2.5, ...more }));
   const disc = (fill, stroke, radius = 8) => svg("circle", { r: radius, fill, stroke, "stroke-width": 2 });
@@ -102,7 +102,7 @@ function fillLegend(list, worlds) {
   row(line("M-9 0H9", kind, { opacity: 0.4 }), "pale line behind a robot: its trail, the last 15 steps");
   row(line("M-9 4Q-2 -6 5 -1M1 -4L7 1L0 3", kind), "arrow: attention, from the robot that attends; the wider, the larger the weight");
   row(symbol(disc("var(--floor)", kind)), "small disc at a victim: what it needs");
-  row(symbol(disc(kind, kind)), "filled small disc: a robot that offers it is inside the rescue radius");
+  row(symbol(disc(kind, kind)), "filled small disc: robots that offer it, enough of it, are inside the rescue radius");
   const ring = svg("circle", { r: 9, fill: "none", stroke: "var(--victim)", "stroke-dasharray": "4 3", "stroke-width": 1.5 });
   row(symbol(ring), "dashed circle: the rescue radius");
   const brackets = svg("path", { d: "M-7 -6a9 9 0 0 0 0 12M7 -6a9 9 0 0 1 0 12", fill: "none", stroke: "var(--blocked)", "stroke-width": 3 });

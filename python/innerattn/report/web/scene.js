@@ -149,14 +149,13 @@ class Scene {
     });
   }
 
-  /** Whether a robot that offers what is needed is near enough. */
+  /** Whether robots that offer what is needed are near enough. */
   isMet(victim, need, radius) {
     const [x, y] = this.at(victim.x, victim.y);
-    return this.worlds.robots.some((robot) => {
+    return this.worlds.isReached(victim.task, need, this.worlds.robots.filter((robot) => {
       const [px, py] = this.spots[robot.index];
-      return robot.abilities.includes(need) && Math.hypot(px - x, py - y) <= radius &&
-        !this.run.isAway(this.episode, this.step, robot.index);
-    });
+      return Math.hypot(px - x, py - y) <= radius && !this.run.isAway(this.episode, this.step, robot.index);
+    }));
   }
 
   drawNeed(need, x, y, size, met) {

@@ -30,10 +30,22 @@ class Worlds {
     return this.tasks[task].needs.some((need) => this.robots[robot].abilities.includes(need));
   }
 
+  /** Whether robots have what a task needs of an ability: one of them, or together the amount. */
+  isReached(task, need, robots) {
+    const able = robots.filter((robot) => robot.abilities.includes(need)), { amounts } = this.tasks[task];
+    if (!(need in amounts)) return able.length > 0;
+    return able.reduce((sum, robot) => sum + (robot.amounts[need] ?? 1), 0) >= amounts[need] * (1 - 1e-9);
+  }
+
   obstacle(episode, index) {
     const at = 2 * (episode * this.obstacles.length + index);
     return [this.places[at] * this.unit, this.places[at + 1] * this.unit];
   }
+}
+
+/** Abilities or needs for readers; an amount stands before its name. */
+function withAmounts(names, amounts) {
+  return names.map((name) => (name in amounts ? `${amounts[name]} ${name}` : name));
 }
 
 /** The shortest beginnings that tell some names apart. */

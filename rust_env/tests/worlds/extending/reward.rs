@@ -1,6 +1,6 @@
 use innerattn_env::reward::{Component, Happened};
 use innerattn_env::rules::Rules;
-use innerattn_env::scenario::{MAX_NEEDS, Scenario};
+use innerattn_env::scenario::{MAX_HELPERS, Scenario};
 use innerattn_env::tasks::Rescue;
 
 const TEAMWORK: Component = Component {
@@ -21,7 +21,7 @@ const TEAMWORK: Component = Component {
 #[test]
 fn helpers_are_paid_for_each_other() {
     let rules = Rules::new(Scenario::default()).expect("a valid scenario");
-    let mut helpers = [None; MAX_NEEDS];
+    let mut helpers = [None; MAX_HELPERS];
     (helpers[0], helpers[1]) = (Some(1), Some(3));
     let rescue = Rescue { env: 0, episode: 0, step: 7, slot: 0, victim: 2, task: 0, helpers };
     let happened = Happened {

@@ -22,7 +22,7 @@ fn alone(faults: Vec<Fault>) -> Scenario {
     let mut scenario =
         Scenario { robots, faults, arena_half_width_m: 100.0, episode_steps: 100, ..Scenario::default() };
     scenario.tasks.truncate(1);
-    scenario.tasks[0].needs = vec!["food".into()];
+    scenario.tasks[0].needs = vec!["food".into()].into();
     scenario
 }
 

@@ -148,13 +148,13 @@ class LiveRun {
     return robot < 0 ? this.now.rescued : this.now.helped[robot];
   }
 
-  /** Abilities that victims need and no robot offers that is not out, with the victims' tasks. */
+  /** Abilities that victims need and robots that are not out do not offer, with the victims' tasks. */
   hopeless() {
     const { robots, tasks } = this.worlds, found = new Map();
     const there = robots.filter(({ index }) => !this.isAway(0, this.last, index));
     for (const { task } of this.now.victims) {
       for (const need of tasks[task].needs) {
-        if (there.some(({ abilities }) => abilities.includes(need))) continue;
+        if (this.worlds.isReached(task, need, there)) continue;
         found.set(need, (found.get(need) ?? new Set()).add(`victims of ${tasks[task].name}`));
       }
     }
