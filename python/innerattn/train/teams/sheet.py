@@ -55,7 +55,7 @@ class TeamSheet:
         abilities = [name.removeprefix("own.ability.") for name in own]
         self._demand = torch.tensor(
             [
-                sum(task.needs.count(ability) for task in scenario.tasks) / len(scenario.tasks)
+                sum(task.amount(ability) for task in scenario.tasks) / len(scenario.tasks)
                 for ability in abilities
             ],
             dtype=torch.float32,
