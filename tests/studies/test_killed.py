@@ -26,7 +26,7 @@ needs_ray = pytest.mark.skipif(
 @needs_ray
 def test_a_killed_worker_changes_nothing(tmp_path: Path) -> None:
     text = TINY.replace("train.env_steps = 192", "train.env_steps = 4_800")
-    killed = on_ray(tmp_path, text, every_s=4.0, for_s=9.0)
+    killed = on_ray(tmp_path, text, wanted=2, every_s=4.0)
     assert killed.count > 0
 
 
@@ -36,7 +36,7 @@ def test_a_worker_is_killed_every_20_s(
     tmp_path: Path, record_property: Callable[[str, object], None]
 ) -> None:
     """24 runs on two nodes."""
-    killed = on_ray(tmp_path, LONG, every_s=20.0, for_s=300.0)
+    killed = on_ray(tmp_path, LONG, wanted=14, every_s=20.0)
     assert killed.count > 4
     assert max(killed.lost, default=0) <= INTERVAL_ENV_STEPS
     record_property("workers killed on Ray", killed.count)

@@ -77,25 +77,29 @@ def command(file: Path, out: Path, *more: str) -> list[str]:
 
 
 def kill_one(study: StudyFolder, chance: random.Random, killed: Killed) -> None:
-    """Kill the process of a claim that is in force, by the number that the claim holds."""
+    """Kill the process of a run that has saved a checkpoint, by the number that its claim holds."""
     states = study.ledger().states(run.key for run in study.planned)
-    working = [key for key, state in states.items() if state == "claimed"]
-    if not working:
+    claims, begun = study.path / "claims", []
+    for key in (key for key, state in states.items() if state == "claimed"):
+        number = max(int(path.name.split(".")[1]) for path in claims.glob(f"{key}.*"))
+        run = study.path / "work" / f"{key}.{number}" / key
+        if (run / "checkpoints" / "latest").exists():
+            begun.append((claims / f"{key}.{number}", run))
+    if not begun:
         return
-    key = chance.choice(working)
-    claims = study.path / "claims"
-    number = max(int(path.name.split(".")[1]) for path in claims.glob(f"{key}.*"))
-    owner = (claims / f"{key}.{number}").read_text().split()
-    run = study.path / "work" / f"{key}.{number}" / key
+    claim, run = chance.choice(begun)
     try:
-        os.kill(int(owner[2]), signal.SIGKILL)
-    except (ProcessLookupError, IndexError):
+        os.kill(int(claim.read_text().split()[2]), signal.SIGKILL)
+    except (FileNotFoundError, ProcessLookupError, IndexError):
         return
     killed.count += 1
-    lines = (run / "metrics.jsonl").read_bytes().splitlines() if run.is_dir() else []
-    latest = run / "checkpoints" / "latest"
-    if lines and latest.exists():
-        killed.lost.append(json.loads(lines[-1])["env_steps"] - int(latest.read_text()))
+    try:
+        lines = (run / "metrics.jsonl").read_bytes().splitlines()
+        latest = int((run / "checkpoints" / "latest").read_text())
+    except FileNotFoundError:  # another worker has taken it over
+        return
+    if lines:
+        killed.lost.append(json.loads(lines[-1])["env_steps"] - latest)
 
 
 def results(study: StudyFolder) -> dict[str, tuple[object, ...]]:
@@ -127,18 +131,25 @@ def compare(study: StudyFolder, other: StudyFolder) -> None:
     assert one == two
 
 
-def on_ray(folder: Path, text: str, every_s: float, for_s: float) -> Killed:
-    """Work through a study on Ray while workers are killed, and beside it undisturbed."""
+def on_ray(folder: Path, text: str, wanted: int, every_s: float) -> Killed:
+    """Work through a study on Ray and beside it undisturbed.
+
+    On Ray, up to ``wanted`` workers are killed, ``every_s`` seconds or more apart: however slow
+    the machine is, they are looked for until the study ends.
+    """
     file = folder / "study.toml"
     file.write_text(text)
     killed, chance = Killed(), random.Random(0)
     with cluster(2) as address:
         process = subprocess.Popen(command(file, folder / "killed", "--ray", address))
-        begun = time.monotonic()
-        while process.poll() is None:
-            time.sleep(every_s)
-            if (folder / "killed" / "study.toml").exists() and time.monotonic() - begun < for_s:
+        while process.poll() is None and killed.count < wanted:
+            time.sleep(0.5)
+            before = killed.count
+            if (folder / "killed" / "study.toml").exists():
                 kill_one(open_study(folder / "killed"), chance, killed)
+            if killed.count > before:
+                time.sleep(every_s)
+        process.wait()
         assert process.returncode == 0, process.returncode
     subprocess.run(command(file, folder / "whole"), check=True)
     compare(open_study(folder / "killed"), open_study(folder / "whole"))
