@@ -85,10 +85,10 @@ def test_ctrl_c_ends_a_long_step_and_nothing_moves(num_threads: int) -> None:
         signal.raise_signal(signal.SIGINT)
 
     thread = threading.Thread(target=interrupt)
-    thread.start()
     kept = [env.snapshot()]
 
     def go_on() -> None:
+        thread.start()  # here, for a slow machine takes its time to begin
         for _ in range(50):
             kept.append(env.snapshot())
             env.step(actions)

@@ -21,8 +21,6 @@ from innerattn.train import Progress, resume, train
 from innerattn.train.weights import digest_of
 from innerattn.train.workers.start import MODULE
 
-pytestmark = pytest.mark.timeout(180)
-
 SMALL = {
     "train.workers": 2,
     "train.env_steps": 480,

@@ -16,8 +16,6 @@ from innerattn.records.run_folder import read_info
 from innerattn.train import train
 from innerattn.train.workers.choose import with_number_of_workers
 
-pytestmark = pytest.mark.timeout(240)
-
 VALUES = {
     "train.workers": 2,
     "train.method": "td-inner",
