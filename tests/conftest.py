@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent / "support"))
 
 from in_turn import do_in_turn
 from made_run import made_run
+from once import made_once
 from small_study import begin_small
 
 from innerattn.cli.main import main
@@ -63,9 +64,19 @@ def tiny() -> list[str]:
 @pytest.fixture(scope="session")
 def run_dir(tmp_path_factory: pytest.TempPathFactory, tiny: list[str]) -> Path:
     """A run's folder; not to be changed."""
-    path = tmp_path_factory.mktemp("runs") / "tiny"
-    assert main(["train", "--run-dir", str(path), "--seed", "3", *tiny]) == 0
-    return path
+
+    def make(folder: Path) -> None:
+        assert main(["train", "--run-dir", str(folder / "tiny"), "--seed", "3", *tiny]) == 0
+
+    return made_once(tmp_path_factory, "run_dir", make) / "tiny"
+
+
+@pytest.fixture(scope="session")
+def plain_team(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a run by td-inner, ``run``, and of its export, ``export``; not to be changed."""
+    from made_export import made_export  # PyTorch takes long to load what exports
+
+    return made_once(tmp_path_factory, "plain_team", lambda folder: made_export(folder, "td-inner"))
 
 
 @pytest.fixture(scope="session")
@@ -97,11 +108,13 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="session")
 def finished_study(tmp_path_factory: pytest.TempPathFactory, small: dict[str, object]) -> Path:
     """Folder of two finished runs, td-inner and td-uniform, seed 0; not to be changed."""
-    out = tmp_path_factory.mktemp("studies") / "finished"
-    study = begin_small("paper", out, ("td-inner", "td-uniform"), 1, small)
-    work(study.ledger(), study.to_do)
-    shutil.rmtree(study.path)
-    return out
+
+    def make(folder: Path) -> None:
+        study = begin_small("paper", folder, ("td-inner", "td-uniform"), 1, small)
+        work(study.ledger(), study.to_do)
+        shutil.rmtree(study.path)
+
+    return made_once(tmp_path_factory, "finished_study", make)
 
 
 @pytest.fixture
@@ -113,26 +126,38 @@ def study(tmp_path: Path, finished_study: Path) -> Path:
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> list[FinishedRun]:
     """Three runs with and two without inner attention, and one of another situation."""
-    folder = tmp_path_factory.mktemp("runs")
+    cases = [
+        *(Case("mixed", "td-inner", seed) for seed in (2, 0, 1)),
+        *(Case("mixed", "td-uniform", seed) for seed in (0, 1)),
+        Case("single", "ppo-inner", 0),
+    ]
+
+    def make(folder: Path) -> None:
+        for case in cases:
+            made_run(folder, case.situation, case.method, case.seed)
+
+    folder = made_once(tmp_path_factory, "made_runs", make)
     return [
-        *(made_run(folder, "mixed", "td-inner", seed) for seed in (2, 0, 1)),
-        *(made_run(folder, "mixed", "td-uniform", seed) for seed in (0, 1)),
-        made_run(folder, "single", "ppo-inner", 0),
+        read_run(case, folder / f"{case.situation}-{case.method}-s{case.seed}") for case in cases
     ]
 
 
 @pytest.fixture(scope="session")
 def crossed_study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[FinishedRun]]:
     """Runs of all arms in mixed, two of each, in a study's folder."""
-    out, found = tmp_path_factory.mktemp("crossed"), []
     cases = [Case("mixed", arm.method, seed, arm.variant) for seed in range(2) for arm in ARMS]
-    for number, case in enumerate(cases):  # no two runs alike
-        made = made_run(out / "made", "mixed", case.method, case.seed, chance=number)
-        folder = out / "runs" / f"mixed-{case.method}-{case.variant}-quick-s{case.seed}"
-        folder.parent.mkdir(exist_ok=True)
-        made.folder.rename(folder)
-        found.append(read_run(case, folder))
-    return out, found
+
+    def folder_of(out: Path, case: Case) -> Path:
+        return out / "runs" / f"mixed-{case.method}-{case.variant}-quick-s{case.seed}"
+
+    def make(out: Path) -> None:
+        (out / "runs").mkdir()
+        for number, case in enumerate(cases):  # no two runs alike
+            made = made_run(out / "made", "mixed", case.method, case.seed, chance=number)
+            made.folder.rename(folder_of(out, case))
+
+    out = made_once(tmp_path_factory, "crossed_study", make)
+    return out, [read_run(case, folder_of(out, case)) for case in cases]
 
 
 @pytest.fixture

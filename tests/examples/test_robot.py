@@ -9,14 +9,13 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from made_export import made_export
 
 STEPS = 8
 
 
-@pytest.fixture(scope="module")
-def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return made_export(tmp_path_factory.mktemp("robot"), "td-inner")[1]
+@pytest.fixture
+def export(plain_team: Path) -> Path:
+    return plain_team / "export"
 
 
 @pytest.fixture

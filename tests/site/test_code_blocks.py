@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_export import made_export
 
 from innerattn.cli.main import COMMANDS, _parse, main
 from innerattn.config import Scenario, load_run_config
@@ -101,9 +100,9 @@ def place(tmp_path: Path, run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
     return tmp_path
 
 
-def test_python_blocks(place: Path) -> None:
+def test_python_blocks(place: Path, plain_team: Path) -> None:
     """Blocks of a page run one after the other, as a reader would run them."""
-    _, export = made_export(place, "td-inner")
+    export = shutil.copytree(plain_team / "export", place / "export")
     shutil.copytree(export, "my-team")
     for page in of_language("python"):
         with BatchEnv("mixed", 2, seed=0) as env:

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from made_export import made_export
 
 from innerattn.cli.main import main
 from innerattn.cli.start import main as start
 from innerattn.errors import InnerattnError, UnsealedRunWarning
 from innerattn.policies import Exported
+from innerattn.records.run_folder import newest_weights
 
 PAGE = (Path(__file__).parents[2] / "docs" / "faq.md").read_text("utf-8")
 QUOTED = re.findall(r"(?m)^\*\*`(.+?)`\*\* —", PAGE)
@@ -117,11 +117,8 @@ def test_a_run_without_a_manifest(run_dir: Path, tmp_path: Path) -> None:
     assert one_of_the_page(str(warned[0].message)) == "has no manifest.json"
 
 
-@pytest.mark.filterwarnings("ignore::innerattn.errors.UnsealedRunWarning")
-def test_readings_and_files_of_robots(tmp_path: Path) -> None:
-    for seed, name in enumerate("ab"):
-        made_export(tmp_path / name, "td-inner", **{"train.seed": seed})
-    one, other = tmp_path / "a" / "export", tmp_path / "b" / "export"
+def test_readings_and_files_of_robots(plain_team: Path, tmp_path: Path) -> None:
+    one = shutil.copytree(plain_team / "export", tmp_path / "export")
     body = {"position": (0.0, 0.0), "velocity": (0.0, 0.0)}
     bad = {"position": (float("nan"), 0.0), "velocity": (0.0, 0.0)}
     team = Exported(one, backend="numpy")
@@ -133,7 +130,7 @@ def test_readings_and_files_of_robots(tmp_path: Path) -> None:
     assert refusal(team, {**timed, "now": 1.5}) == STALE
     assert refusal(team, {**timed, "own": {**body, "heading": 0.0}}) == UNKNOWN
     assert refusal(team, [0.0, 0.0, 0.0]) == SHORT
-    shutil.copy(other / "weights.safetensors", one / "weights.safetensors")
+    shutil.copy(newest_weights(plain_team / "run"), one / "weights.safetensors")
     with pytest.raises(InnerattnError) as caught:
         Exported(one, backend="numpy")
     assert one_of_the_page(str(caught.value)) == "is of another team"

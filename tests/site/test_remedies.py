@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_export import made_export
 
 from innerattn.cli.main import main
 from innerattn.config import RunConfig, Scenario, load_run_config
 from innerattn.errors import EXTRA_OF, ExportError
 from innerattn.policies import Exported
+from innerattn.records.run_folder import newest_weights
 from innerattn.train import load_policy
 from innerattn.train.checkpoint_info import Best
 from innerattn.train.saved import best_name
@@ -130,8 +130,8 @@ def test_names_of_gpus_are_valid() -> None:
         assert config.train.device == name
 
 
-def test_readings_that_are_mended(tmp_path: Path) -> None:
-    _, folder = made_export(tmp_path / "a", "td-inner")
+def test_readings_that_are_mended(plain_team: Path) -> None:
+    folder = plain_team / "export"
     team = Exported(folder, backend="numpy")
     body = {"position": (0.0, 0.0), "velocity": (0.0, 0.0)}
     others = dict.fromkeys(team.robot_names[1:], None)
@@ -176,10 +176,9 @@ def test_the_command_of_a_card_trains_a_team_of_the_package(
     assert asked[0].train == config.train
 
 
-def test_a_team_with_a_file_of_another_is_exported_again(tmp_path: Path) -> None:
-    run, folder = made_export(tmp_path / "a", "td-inner")
-    _, other = made_export(tmp_path / "b", "td-inner", **{"train.seed": 5})
-    shutil.copy(other / "weights.safetensors", folder / "weights.safetensors")
+def test_a_team_with_a_file_of_another_is_exported_again(plain_team: Path, tmp_path: Path) -> None:
+    run, folder = plain_team / "run", shutil.copytree(plain_team / "export", tmp_path / "export")
+    shutil.copy(newest_weights(run), folder / "weights.safetensors")
     with pytest.raises(ExportError, match="is of another team"):
         Exported(folder, backend="numpy")
     assert main(["export", str(run), "-o", str(tmp_path / "again")]) == 0

@@ -3,6 +3,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from once import made_once
 
 from innerattn.config import RunConfig, load_run_config
 from innerattn.train import train
@@ -34,4 +35,8 @@ def small_config_fixture() -> Callable[..., RunConfig]:
 @pytest.fixture(scope="session")
 def finished_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run that went to its end; tests must not change it."""
-    return train(small_config(), tmp_path_factory.mktemp("runs") / "run")
+
+    def make(folder: Path) -> None:
+        train(small_config(), folder / "run")
+
+    return made_once(tmp_path_factory, "finished_run", make) / "run"
