@@ -13,7 +13,7 @@ from innerattn.envs import BatchEnv
 EXACT = 1e-6
 CHUNKS = 8
 LEAST = 104_000
-"""Transitions of all chunks together."""
+"""Transitions of all chunks together, half of which are for `make test-slow`."""
 
 
 def state_of(env: BatchEnv) -> State:
@@ -213,7 +213,10 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
     return seen
 
 
-@pytest.mark.parametrize("chunk", range(CHUNKS))
+@pytest.mark.parametrize(
+    "chunk",
+    [n if n < CHUNKS // 2 else pytest.param(n, marks=pytest.mark.slow) for n in range(CHUNKS)],
+)
 def test_worlds_are_as_the_plain_stepper_says(chunk: int) -> None:
     total: Counter[str] = Counter()
     rng = np.random.default_rng(100 + chunk)

@@ -12,7 +12,17 @@ from innerattn.train import train
 LEARNING_RATE = 0.003
 
 
-@pytest.mark.parametrize("method", ["td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo"])
+@pytest.mark.parametrize(
+    "method",
+    [
+        "td-uniform",
+        "ppo-inner",
+        *(
+            pytest.param(one, marks=pytest.mark.slow)
+            for one in ("td-inner", "ppo-uniform", "mappo")
+        ),
+    ],
+)
 def test_two_robots_learn_to_rescue(method: str, tmp_path: Path) -> None:
     team = Scenario()
     scenario = Scenario(

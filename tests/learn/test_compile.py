@@ -93,8 +93,8 @@ def agree(algorithm: str, robots: int, backend: str, network: dict, numbers: dic
     ("algorithm", "robots", "attention"),
     [
         ("td", 4, "inner"),
-        ("ppo", 4, "uniform"),
-        ("ppo", 1, "inner"),
+        pytest.param("ppo", 4, "uniform", marks=pytest.mark.slow),
+        pytest.param("ppo", 1, "inner", marks=pytest.mark.slow),
         pytest.param("td", 1, "inner", marks=pytest.mark.slow),
         pytest.param("td", 4, "uniform", marks=pytest.mark.slow),
         pytest.param("ppo", 4, "inner", marks=pytest.mark.slow),
@@ -104,21 +104,23 @@ def test_the_traced_update_agrees(algorithm: str, robots: int, attention: str) -
     agree(algorithm, robots, "aot_eager", {"attention": attention}, {})
 
 
-SAMPLED = {"policy_gradient": "sampled", "entropy_target": "maac"}
-
-
 @pytest.mark.parametrize(
-    ("algorithm", "numbers"),
+    ("algorithm", "attention", "numbers"),
     [
         pytest.param(
-            "td", {"policy_gradient": "sampled", "entropy_target": "maac"}, marks=pytest.mark.slow
+            "td",
+            "inner",
+            {"policy_gradient": "sampled", "entropy_target": "maac"},
+            marks=pytest.mark.slow,
         ),
-        ("ppo", {"advantage": "value"}),
+        ("ppo", "uniform", {"advantage": "value"}),
     ],
 )
-def test_the_traced_update_agrees_masked_and_clipped(algorithm: str, numbers: dict) -> None:
+def test_the_traced_update_agrees_masked_and_clipped(
+    algorithm: str, attention: str, numbers: dict
+) -> None:
     numbers = numbers | {"critic_grad_clip": 0.3, "actor_grad_clip": 0.02}
-    agree(algorithm, 4, "aot_eager", {"attention": "inner", "mask_unavailable": True}, numbers)
+    agree(algorithm, 4, "aot_eager", {"attention": attention, "mask_unavailable": True}, numbers)
 
 
 def test_the_traced_update_agrees_without_attention() -> None:

@@ -57,6 +57,14 @@ FAULTS = {
     ]
 }
 ARRIVALS = {"ppo.bootstrap": "afterstate", "scenario.rescue_radius_m": 0.9}
+ALIKE = (
+    "td-uniform",
+    "ppo-uniform",
+    "mappo schedule",
+    "mappo potential",
+    "mappo augmented",
+)
+"""Cases whose state is that of others: all are drawn from, and each is cut by `make test-slow`."""
 METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo")
 CASES: dict[str, dict[str, Any]] = {
     **{method: {"train.method": method} for method in METHODS},
@@ -147,7 +155,10 @@ def whole(
     return of
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(one, marks=pytest.mark.slow) if one in ALIKE else one for one in CASES],
+)
 def test_a_run_that_was_cut_is_the_run_that_was_not(
     small_config: Configure,
     whole: Callable[[str], tuple[str, str]],
@@ -185,7 +196,7 @@ def test_a_new_process_goes_on_alike(
     assert left_by(run) == whole(case)
 
 
-@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     case=st.sampled_from(sorted(CASES)),
     cuts=st.lists(st.integers(1, 20), min_size=1, max_size=4),
