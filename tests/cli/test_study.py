@@ -71,6 +71,7 @@ def test_everything_is_killed_and_goes_on(file: Path) -> None:
     assert sorted(os.listdir("studies/tiny/runs")) == sorted(one["key"] for one in found["runs"])
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_saves_and_frees_every_run(file: Path) -> None:
     """A terminal sends it to all processes of the command; none may take it for a second one."""
     file.write_text(TINY.replace("train.env_steps = 192", "train.env_steps = 1_000_000"))
