@@ -16,8 +16,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from innerattn.config import load_run_config
-from innerattn.config.load import ANY
 from innerattn.config.files import write_whole
+from innerattn.config.load import ANY
 from innerattn.errors import InnerattnError, RunError
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import read_run
