@@ -152,7 +152,7 @@ def test_every_key_is_an_option(capsys: pytest.CaptureFixture[str]) -> None:
     in_a_file = {f"scenario.{name}" for name in ("robots", "tasks", "obstacles", "faults")}
     in_a_file.add("train.schedule")
     for section, table in load_run_config().model_dump().items():
-        for key in table:
+        for key in table or ():  # a family has a file of its own
             offered = f"--{section}.{key.replace('_', '-')} " in text.replace(",", " ")
             assert offered != (f"{section}.{key}" in in_a_file), f"{section}.{key}"
 

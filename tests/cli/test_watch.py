@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -159,6 +160,15 @@ def test_scripts_stand_beside_runs_of_the_same_worlds_only(run_dir: Path, tmp_pa
     config.write_text(config.read_text().replace('"mixed"', '"double"'))
     reseal(other)
     assert _scripts_beside([run_dir, other]) == {}
+
+
+def test_no_script_stands_beside_a_run_for_many_teams(run_dir: Path, tmp_path: Path) -> None:
+    run = Path(shutil.copytree(run_dir, tmp_path / "other"))
+    config = run / "config.toml"
+    text = re.sub(r'(?m)^method = ".*"$', 'method = "team-max"', config.read_text())
+    config.write_text(f"{text}\n[family]\nrobots = [2, 3]\n")
+    reseal(run)
+    assert _scripts_beside([run]) == {}
 
 
 @pytest.mark.usefixtures("interruptible")

@@ -259,8 +259,8 @@ def test_worlds_with_amounts_are_as_the_plain_stepper_says(chunk: int) -> None:
         seed = int(rng.integers(2**32))
         total += compare(scenario, seed, some, faulty=seed % 3 == 0)
     assert total["unsure"] < 0.02 * total["transitions"]
-    for what in ("rescues", "appeared", "served"):
-        assert total[what] > 50, (what, total)
+    for what, least in (("rescues", 50), ("appeared", 50), ("served", 0)):
+        assert total[what] > least, (what, total)
 
 
 @pytest.mark.parametrize("situation", ["single", "double", "mixed"])

@@ -4,6 +4,7 @@ import re
 from html.parser import HTMLParser
 from importlib import import_module
 from pathlib import Path
+from typing import Any, get_args
 from urllib.parse import unquote, urlsplit
 
 import pytest
@@ -12,6 +13,7 @@ from playwright.sync_api import Browser
 
 from innerattn.cli.main import COMMANDS
 from innerattn.config import RunConfig, Scenario
+from innerattn.config.team import TeamConfig
 
 ROOT = Path(__file__).parents[2]
 
@@ -84,9 +86,10 @@ def test_the_reference_has_every_command_key_and_name(site: Path) -> None:
 
     commands, keys, names = (text_of(one) for one in ("commands", "keys", "python"))
     assert all(f"usage: innerattn {name}" in commands for name in COMMANDS)
-    sections = [field.annotation for field in RunConfig.model_fields.values()]
-    for model in (Scenario, *sections):
-        for key in model.model_fields:  # type: ignore[union-attr]
+    sections: list[Any] = [field.annotation for field in RunConfig.model_fields.values()]
+    sections = [(*get_args(one), one)[0] for one in sections]  # some may be left out
+    for model in (Scenario, TeamConfig, *sections):
+        for key in model.model_fields:
             assert re.search(rf"^\s*{key}$", keys, flags=re.MULTILINE), key
     rooms = [import_module(f"innerattn.{name}") for name in rooms_with_names()]
     assert len(rooms) > 12

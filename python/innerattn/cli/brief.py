@@ -44,7 +44,7 @@ BRIEF: Mapping[str, Brief] = {
             ("--warm-start NAME", "script to imitate first: hungarian or greedy ({warm_start})"),
             ("--seed N", "seed of everything random ({seed})"),
             ("--seeds LIST", "one run for each seed: 0..4, or 0,3,7"),
-            ("--family any|FILE", "one policy for many teams: built-in, or ranges in a TOML file"),
+            ("--family any|FILE", "one policy for many teams: built-in or ranges"),
             ("--train.env-steps N", "length of learning, summed over worlds ({train.env_steps:,})"),
             ("--config FILE", "TOML file with configuration keys (docs/reference)"),
             ("--run-dir FOLDER", "folder to make for the run (under runs)"),

@@ -111,11 +111,12 @@ class Watch(Command):
 
 
 def _scripts_beside(folders: Sequence[Path]) -> dict[str, float]:
-    """Rescues per episode of scripts in the worlds of training; none where these differ."""
+    """Rescues per episode of scripts in the worlds of training; none where these are several."""
     from innerattn.evaluate.training_score import training_rescues
     from innerattn.records.run_folder import read_config
 
     configs = [read_config(folder) for folder in folders]
-    if any(one.training_scenario != configs[0].training_scenario for one in configs):
+    same = all(one.training_scenario == configs[0].training_scenario for one in configs)
+    if not same or any(one.family is not None for one in configs):
         return {}
     return {name: training_rescues(configs[0], name, SCRIPT_EPISODES, 1) for name in SCRIPTS}
