@@ -207,7 +207,7 @@ class TeamLearner:
         reward, ended = torch.stack(rollout.rewards), torch.stack(rollout.ended)
         terminated = torch.stack(rollout.terminated)
         # Where a time limit ended an episode, the value before its last step stands for the one
-        # after it: nobody sees that state.
+        # after it: the relations of that state are not worked out.
         following = torch.where(ended, values[:-1], values[1:])
         advantage = generalised_advantage(
             reward.unsqueeze(1),
