@@ -5,6 +5,7 @@ use crate::geometry::Vec2;
 use crate::robot::Body;
 use crate::scenario::{MAX_VICTIMS, Scenario, VictimOrder};
 use crate::tasks::deadline::Deadlines;
+use crate::tasks::order::Order;
 use crate::tasks::service::Service;
 use crate::tasks::{Needs, Victim};
 
@@ -46,7 +47,7 @@ pub struct Layout {
     abilities: Vec<String>,
     robots: usize,
     victims: usize,
-    order: VictimOrder,
+    sorted: VictimOrder,
     /// Whether each robot's block ends with the faults in effect.
     faults: bool,
     /// For each task, how many of each ability it needs.
@@ -54,6 +55,7 @@ pub struct Layout {
     /// For each task, how long its victims are served; none where all are rescued at touch.
     services: Option<Vec<Service>>,
     deadlines: Option<Deadlines>,
+    order: Option<Order>,
     /// The columns that never change, of all robots (R × D); zeros elsewhere.
     fixed: Vec<f32>,
 }
@@ -69,10 +71,11 @@ impl Layout {
         let mut layout = Self {
             robots: scenario.robots.len(),
             victims: scenario.num_victims(),
-            order: scenario.victim_order,
+            sorted: scenario.victim_order,
             faults: scenario.observe_faults,
             services: Some(Service::of_tasks(scenario)).filter(|_| scenario.has_services()),
             deadlines: Deadlines::new(scenario),
+            order: Order::new(scenario),
             abilities,
             needs,
             fixed: vec![],
@@ -122,6 +125,7 @@ impl Layout {
         3 + self.abilities.len()
             + usize::from(self.services.is_some())
             + usize::from(self.deadlines.is_some())
+            + usize::from(self.order.is_some())
     }
 
     /// Width D of a row.
@@ -159,6 +163,7 @@ impl Layout {
             names.extend(["x", "y"].map(|axis| format!("victim_{victim}.relative_position.{axis}")));
             names.extend(self.services.iter().map(|_| format!("victim_{victim}.served")));
             names.extend(self.deadlines.iter().map(|_| format!("victim_{victim}.time_left")));
+            names.extend(self.order.iter().map(|_| format!("victim_{victim}.blocked")));
         }
         names
     }
@@ -223,7 +228,7 @@ impl Layout {
         let Scene { tasks, victims, step, .. } = scene;
         let mut sorted = [(0_u8, 0.0_f32, 0_u8); MAX_VICTIMS];
         for (slot, victim) in victims.iter().enumerate() {
-            let (kind, distance) = match self.order {
+            let (kind, distance) = match self.sorted {
                 VictimOrder::Relevant => rank(victim.as_ref(), body, tasks, own),
                 VictimOrder::Slot => (0, 0.0),
             };
@@ -250,7 +255,11 @@ impl Layout {
                 row[3 + abilities] = services[victim.task as usize].share(victim);
             }
             if let Some(deadlines) = &self.deadlines {
-                row[self.victim_width() - 1] = deadlines.share_left(victim, step);
+                row[3 + abilities + usize::from(self.services.is_some())] =
+                    deadlines.share_left(victim, step);
+            }
+            if let Some(order) = &self.order {
+                row[self.victim_width() - 1] = f32::from(u8::from(order.is_blocked(victim, victims)));
             }
         }
     }

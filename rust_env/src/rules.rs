@@ -13,6 +13,7 @@ use crate::scenario::Scenario;
 use crate::spawn::{Crowded, Spawn};
 use crate::tasks::Needs;
 use crate::tasks::deadline::Deadlines;
+use crate::tasks::order::Order;
 use crate::tasks::service::Service;
 
 /// One of the scenario's faults, as numbers.
@@ -45,6 +46,8 @@ pub struct Rules {
     pub services: Vec<Service>,
     /// When victims are lost, if ever.
     pub deadlines: Option<Deadlines>,
+    /// Which tasks come before which, if any.
+    pub order: Option<Order>,
     /// The obstacles' forms.
     pub solids: Vec<Solid>,
     /// Motion and contacts.
@@ -90,6 +93,7 @@ impl Rules {
             layout: Layout::new(&scenario, &tasks),
             services: Service::of_tasks(&scenario),
             deadlines: Deadlines::new(&scenario),
+            order: Order::new(&scenario),
             weights: Weights::new(&scenario),
             faults: processes(&scenario),
             spawn,

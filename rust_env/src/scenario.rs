@@ -3,6 +3,7 @@
 
 mod abilities;
 mod check;
+mod order;
 mod task;
 mod validity;
 

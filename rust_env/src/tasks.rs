@@ -1,10 +1,12 @@
 //! Victims and what becomes of them: who is present, what it needs, which robots rescue it. How long that
-//! takes is in `service.rs`, until when there is time in `deadline.rs`, needs as sums in `sums.rs`.
+//! takes is in `service.rs`, until when there is time in `deadline.rs`, who waits for whom in `order.rs`, needs
+//! as sums in `sums.rs`.
 //!
 //! A step settles them in this order: robots have moved; slot by slot, service goes on and victims are
 //! rescued; those whose deadline has come are lost; new ones appear.
 
 pub mod deadline;
+pub mod order;
 pub mod service;
 pub mod sums;
 

@@ -201,16 +201,19 @@ impl World {
         ending
     }
 
-    /// Serves and rescues victims by the rescue rule, slot by slot; no robot helps twice in one step.
+    /// Serves and rescues victims by the rescue rule, slot by slot; no robot helps twice in one step. Who has
+    /// to wait is decided before anybody is rescued.
     fn settle(&mut self, rules: &Rules, env: usize, rescues: &mut Vec<Rescue>) {
         let radius = rules.scenario.rescue_radius_m as f32;
         let mut busy = self.faults.unavailable();
+        let blocked = rules.order.as_ref().map_or(0, |order| order.blocked(&self.victims));
         for (slot, place) in self.victims.iter_mut().enumerate() {
             let Some(victim) = place else { continue };
             let service = rules.services[victim.task as usize];
             let needs = &rules.tasks[victim.task as usize];
-            let found = needs.helpers(victim.position, &rules.team, &self.positions, radius, busy);
-            let Some(helpers) = found else {
+            let waits = blocked >> slot & 1 == 1;
+            let helpers = || needs.helpers(victim.position, &rules.team, &self.positions, radius, busy);
+            let Some(helpers) = (!waits).then(helpers).flatten() else {
                 service.interrupt(victim);
                 continue;
             };

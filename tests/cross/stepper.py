@@ -159,9 +159,10 @@ class Stepper:
         unsure = (state.present & (close.any(-1) | tied.any(-1))).any(-1)
         found: list[tuple[int, ...]] = []
         near = (distances <= radius) & state.available[:, None]
+        waiting = self.waiting(state)
         for env in np.flatnonzero((state.present & near.any(-1)).any(-1)):
             busy: set[int] = set()
-            for slot in np.flatnonzero(state.present[env]):
+            for slot in np.flatnonzero(state.present[env] & ~waiting[env]):
                 free = [int(r) for r in np.flatnonzero(near[env, slot]) if r not in busy]
                 free.sort(key=lambda robot: (distances[env, slot, robot], robot))
                 task = int(state.victims["task"][env, slot])
@@ -173,6 +174,19 @@ class Stepper:
                     busy |= set(helpers)
                     found.append((int(env), int(slot), *helpers))
         return found, unsure
+
+    def waiting(self, state: State) -> Bools:
+        """Victims that have to wait for others, (E, V)."""
+        found = np.zeros(state.victims.shape, dtype=bool)
+        for index, task in enumerate(self.scenario.tasks):
+            for other, name in enumerate(one.name for one in self.scenario.tasks):
+                if name in task.after:
+                    here, there = (
+                        state.present & (state.victims["task"] == one) for one in (index, other)
+                    )
+                    came = np.where(there, state.victims["appeared_step"], np.iinfo(int).max)
+                    found |= here & (came.min(1)[:, None] <= state.victims["appeared_step"])
+        return found
 
     def settle(
         self, state: State, met: list[tuple[int, ...]]
@@ -297,7 +311,7 @@ class Stepper:
         return blocks.reshape(envs, robots, -1), unsure
 
     def _times_seen(self, state: State) -> list[Array]:
-        """The columns of services and deadlines, those that the scenario has, each (E, V)."""
+        """The columns of services, deadlines and order that the scenario has, each (E, V)."""
         found = []
         if self.service.any():
             found.append(state.victims["served"].astype(np.float64))
@@ -306,6 +320,8 @@ class Stepper:
             due = state.victims["deadline_step"]
             left = np.clip((due - state.steps[:, None]) / longest, 0.0, 1.0)
             found.append(np.where(due < 0, 1.0, left))
+        if any(task.after for task in self.scenario.tasks):
+            found.append(self.waiting(state).astype(np.float64))
         return found
 
 

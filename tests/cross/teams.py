@@ -107,3 +107,13 @@ def with_amounts(scenario: Scenario, rng: np.random.Generator) -> Scenario:
             needs[one] = min(needs[one], most)  # rounding may go beyond
         tasks.append(task.replace(needs=needs) if rng.random() < 0.7 else task)
     return scenario.replace(robots=robots, tasks=tuple(tasks))
+
+
+def with_order(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, where some tasks come after others; a hidden order of all has no cycle."""
+    order = rng.permutation(len(scenario.tasks)).tolist()
+    tasks = list(scenario.tasks)
+    for place, index in enumerate(order):
+        after = tuple(tasks[other].name for other in order[:place] if rng.random() < 0.6)
+        tasks[index] = tasks[index].replace(after=after)
+    return scenario.replace(tasks=tuple(tasks))

@@ -150,7 +150,16 @@ def test_every_value_survives_the_way_there_and_back() -> None:
             *TEAM[1:],
             {**TEAM[0], "radius_m": 0.04, "drive_force_n": 3.5, "start_m": [0.25, -0.5]},
         ],
-        "tasks": [{**TASK, "service_s": 0.75, "service": "restart", "deadline_s": [1.5, 2.5]}],
+        "tasks": [
+            {
+                **TASK,
+                "service_s": 0.75,
+                "service": "restart",
+                "deadline_s": [1.5, 2.5],
+                "after": ["other"],
+            },
+            {**TASK, "name": "other"},
+        ],
         "max_victims": 7,
         "obstacles": [{"shape": "box", "half_extents_m": [0.1, 0.2], "position_m": [0.3, 0.4]}],
         "arena_half_width_m": 2.0,

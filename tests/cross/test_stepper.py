@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from stepper import State, Stepper
-from teams import random_scenario, with_amounts, with_times
+from teams import random_scenario, with_amounts, with_order, with_times
 
 from innerattn.config import Scenario, Task
 from innerattn.envs import BatchEnv
@@ -168,6 +168,11 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
             assert_close(after.victims["served"][stays], (served / needed)[stays], "service")
             seen["served"] += int(((served > 0) & stays).sum())
         seen["lost"] += int(lost.sum())
+        if scenario.has_order:
+            waiting = plain.waiting(before)
+            assert (before.victims["blocked"] == waiting).all()
+            seen["waiting"] += int(waiting.sum())
+            seen["went on"] += int((waiting & ~gone & ~plain.waiting(after)).sum())
 
         goal = scenario.end_when_rescued
         terminated = rescued >= goal if goal else np.zeros(num_envs, dtype=bool)
@@ -190,7 +195,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         ended = result.terminated | result.truncated
         assert (after.faults[~ended] == before.faults[~ended]).all()
         rows, tied = plain.observations(after)
-        times = scenario.has_services + scenario.has_deadlines
+        times = scenario.has_services + scenario.has_deadlines + scenario.has_order
         block = rows.shape[-1] - before.victims.shape[1] * (3 + len(plain.abilities) + times)
         scale = scenario.arena_half_width_m
         assert_close(result.obs[..., :block], rows[..., :block], "observation", scale)
@@ -261,6 +266,22 @@ def test_worlds_with_amounts_are_as_the_plain_stepper_says(chunk: int) -> None:
     assert total["unsure"] < 0.02 * total["transitions"]
     for what, least in (("rescues", 50), ("appeared", 50), ("served", 0)):
         assert total[what] > least, (what, total)
+
+
+@pytest.mark.parametrize("chunk", range(3))
+def test_worlds_with_an_order_of_tasks_are_as_the_plain_stepper_says(chunk: int) -> None:
+    total: Counter[str] = Counter()
+    rng = np.random.default_rng(400 + chunk)
+    while total["transitions"] < 12_000:
+        scenario = with_order(random_scenario(rng), rng)
+        if rng.random() < 0.5:
+            scenario = with_times(scenario, rng)
+        some = min(1000, 20_000 // len(scenario.robots))
+        seed = int(rng.integers(2**32))
+        total += compare(scenario, seed, some, faulty=seed % 3 == 0)
+    assert total["unsure"] < 0.02 * total["transitions"]
+    for what in ("rescues", "appeared", "waiting", "went on"):
+        assert total[what] > 50, (what, total)
 
 
 @pytest.mark.parametrize("situation", ["single", "double", "mixed"])

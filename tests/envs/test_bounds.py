@@ -39,7 +39,12 @@ def scenario(half: float, engine: str, faulty: bool, seen: bool, heavy: float) -
                 needs={"food": 7.0, "medicine": 0.5} if seen else ("food", "food"),
                 service_s=0.3 if seen else 0.0,
             ),
-            Task(name="one", needs=("medicine",), deadline_s=(0.5, 2.0) if seen else None),
+            Task(
+                name="one",
+                needs=("medicine",),
+                deadline_s=(0.5, 2.0) if seen else None,
+                after=("both",) if seen else (),
+            ),
         ),
         obstacles=(Obstacle(shape="disc", radius_m=0.05),),
     )

@@ -41,6 +41,17 @@ def test_a_file_of_worlds_without_deadlines_has_no_column_for_them(tmp_path: Pat
     assert back.lost.dtype == LOST_DTYPE
 
 
+def test_who_was_blocked_is_read_as_it_was_written(tmp_path: Path) -> None:
+    plain = Scenario.preset("double")
+    worlds = plain.replace(tasks=(plain.tasks[0], plain.tasks[1].replace(after=("task_1",))))
+    policy = scripted_policy("hungarian", worlds)
+    record = run_episodes(policy, worlds, 6, 2, record=("victims",))
+    assert record.steps["victims"]["blocked"].any()
+    write_records([record], tmp_path)
+    (back,) = read_records(tmp_path, steps=True)
+    np.testing.assert_array_equal(back.steps["victims"], record.steps["victims"], strict=True)
+
+
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [

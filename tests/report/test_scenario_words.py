@@ -89,3 +89,12 @@ def test_what_no_team_can_do_is_refused_with_the_value_that_would_do() -> None:
     with pytest.raises((ConfigError, ValueError), match=r"rescue_radius_m = 0\.15: .* 0\.3"):
         Scenario.model_validate({**two, **task, "rescue_radius_m": 0.15})
     Scenario.model_validate({**two, **task, "rescue_radius_m": 0.3})
+
+
+def test_what_a_task_waits_for() -> None:
+    plain = Scenario.preset("mixed")
+    ordered = plain.replace(tasks=(plain.tasks[0], plain.tasks[1].replace(after=("task_1",))))
+    first, second = scenario_words(ordered).splitlines()[:2]
+    assert first.startswith("task_1: ")
+    assert "after" not in first
+    assert second.endswith("within 0.15 m; after task_1")

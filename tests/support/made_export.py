@@ -41,6 +41,7 @@ def readings_of(team: Exported, robot: str, env: object, world: int) -> dict[str
         victim = {"task": tasks[one["task"]], "position": (float(one["x"]), float(one["y"]))}
         victim |= {"served": float(one["served"])} if scenario.has_services else {}
         victim |= {"time_left": float(share)} if scenario.has_deadlines else {}
+        victim |= {"blocked": float(one["blocked"])} if scenario.has_order else {}
         victims.append(victim if one["present"] else None)
     own = bodies.pop(robot)
     return {"own": own, "teammates": bodies, "victims": victims}

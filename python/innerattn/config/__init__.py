@@ -14,13 +14,14 @@ if TYPE_CHECKING:
     from innerattn.config.ppo import PPOConfig
     from innerattn.config.registry import register_algorithm, register_attention
     from innerattn.config.run import BUDGETS, RunConfig, refuse_late_faults
-    from innerattn.config.scenario import SCENARIOS, Fault, Obstacle, Robot, Scenario, Task
+    from innerattn.config.scenario import SCENARIOS, Fault, Obstacle, Robot, Scenario
     from innerattn.config.sections import (
         EvaluateConfig,
         ImitationConfig,
         NetworkConfig,
         TrainConfig,
     )
+    from innerattn.config.task import Task
     from innerattn.config.td import TDConfig
 
 __all__ = [
@@ -65,7 +66,7 @@ __getattr__ = lazy_names(
         "SCENARIOS": "scenario",
         "Scenario": "scenario",
         "TDConfig": "td",
-        "Task": "scenario",
+        "Task": "task",
         "TrainConfig": "sections",
         "load_run_config": "load",
         "read_toml": "load",

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationError, field_validator
-from pydantic_core import PydanticCustomError
 
 from innerattn import _core
 from innerattn.config.amounts import Amounts, list_or_table
 from innerattn.config.files import preset_names, preset_table, toml_table
 from innerattn.config.model import ADDED_LATER, Model, Told, config_error
 from innerattn.config.near import did_you_mean
+from innerattn.config.task import Task
 from innerattn.errors import ConfigError
 from innerattn.shown import Shown
 
@@ -59,65 +59,6 @@ class Robot(Model):
         if isinstance(self.abilities, dict):
             return self.abilities.get(ability, 0.0)
         return float(ability in self.abilities)
-
-
-_Seconds = Annotated[float, Told(0.001, 1e6)]
-
-
-class Task(Model):
-    """One kind of emergency: the abilities a victim needs, and how long it takes and waits."""
-
-    name: str = Field(description="unique name; 1 to 64 letters, digits, '_' or '-'")
-    needs: Annotated[tuple[str, ...], Told(1, 8)] | Amounts = Field(
-        description="needed abilities: a list, each from a robot of its own, the same may stand "
-        "twice; or a table of amounts, such as { water = 3.0 }, that the helpers must have together"
-    )
-    service_s: Annotated[float, ADDED_LATER, Told(0.0, 1e6)] = Field(
-        0.0,
-        description="how long all needs must be met before a victim is rescued [s]; 0: rescued at "
-        "touch",
-    )
-    service: Annotated[Literal["keep", "restart"], ADDED_LATER] = Field(
-        "keep",
-        description="what happens to a service when the needs are not met any more; keep: it goes "
-        "on later; restart: it starts anew",
-    )
-    deadline_s: Annotated[_Seconds | tuple[_Seconds, _Seconds] | None, ADDED_LATER] = Field(
-        None,
-        description="how long after it appeared a victim is lost, a number or a pair [low, high] "
-        "that each victim's is drawn from [s]; None: never",
-    )
-
-    _check_needs = field_validator("needs", mode="before")(list_or_table)
-
-    @field_validator("deadline_s", mode="before")
-    @classmethod
-    def _number_or_pair(cls, value: object) -> object:
-        if isinstance(value, (list, tuple)) and len(value) != 2:
-            raise PydanticCustomError("type", "Input should be a number or a pair [low, high]")
-        return value
-
-    @property
-    def roles(self) -> tuple[str, ...]:
-        """The needs that a robot of its own meets each; none where needs are sums."""
-        return () if isinstance(self.needs, dict) else self.needs
-
-    @property
-    def sums(self) -> Amounts:
-        """The amounts that helpers must have together; none where needs are a list."""
-        return self.needs if isinstance(self.needs, dict) else {}
-
-    def amount(self, ability: str) -> float:
-        """How much of an ability is needed: an amount, or how many robots."""
-        if isinstance(self.needs, dict):
-            return self.needs.get(ability, 0.0)
-        return float(self.needs.count(ability))
-
-    @property
-    def deadlines_s(self) -> tuple[float, float] | None:
-        """The least and the largest deadline [s]."""
-        one = self.deadline_s
-        return (one, one) if isinstance(one, float) else one
 
 
 class Obstacle(Model):
@@ -398,3 +339,8 @@ class Scenario(Model, Shown):
     def has_deadlines(self) -> bool:
         """Whether some victims can be lost."""
         return any(task.deadline_s is not None for task in self.tasks)
+
+    @property
+    def has_order(self) -> bool:
+        """Whether some victims have to wait for others."""
+        return any(task.after for task in self.tasks)

@@ -190,8 +190,9 @@ class BatchEnv(Shown):
         """Victims by slot, (E, V) structured: present, task, id, appeared_step, x, y (m).
 
         Where the scenario has services also ``served``, the share of its service that a victim has
-        had, and where it has deadlines ``deadline_step``, the steps done in the episode when it is
-        lost (-1: never). A slot without a victim has 0 and -1.
+        had; where it has deadlines ``deadline_step``, the steps done in the episode when it is lost
+        (-1: never); and where its tasks have an order ``blocked``, whether it has to wait for
+        others. A slot without a victim has 0 and -1.
         """
         return victim_table(*self._core.victims(), self.scenario)
 
@@ -225,8 +226,9 @@ class BatchEnv(Shown):
 
         Columns are `state_names`: for each robot x, y [m] and x, y velocity [m/s]; for each victim
         slot one column per task (1 where such a victim is present), x, y [m], and where the
-        scenario has them the share of its service that it has had, and the time that it has left as
-        a share of the longest deadline; for each obstacle x, y [m]. Empty slots are zeros.
+        scenario has them the share of its service that it has had, the time that it has left as a
+        share of the longest deadline, and 1 if it has to wait for others; for each obstacle x, y
+        [m]. Empty slots are zeros.
         """
         return world_states(
             self.positions(),

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn import _core
-from innerattn.config.scenario import Robot, Scenario, Task
+from innerattn.config.scenario import Robot, Scenario
+from innerattn.config.task import Task
 
 Bounds = tuple[NDArray[np.float32], NDArray[np.float32]]
 """Least and most values, arrays of one shape."""
@@ -46,7 +47,7 @@ def state_bounds(scenario: Scenario) -> Bounds:
         columns += [place, place, _both_ways(speed), _both_ways(speed)]
     for _ in range(scenario.num_victims):
         columns += [_FLAG] * len(scenario.tasks) + [place, place]
-        columns += [_FLAG] * (scenario.has_services + scenario.has_deadlines)
+        columns += [_FLAG] * _columns_by_choice(scenario)
     columns += [place, place] * len(scenario.obstacles)
     return _as_arrays(columns)
 
@@ -70,12 +71,17 @@ def _observation_columns(scenario: Scenario, own: int, speeds: list[float]) -> I
         for ability in abilities:
             yield 0.0, _most(scenario.tasks, ability)
         yield from (_both_ways(2 * half + far), _both_ways(2 * half + far))
-        yield from [_FLAG] * (scenario.has_services + scenario.has_deadlines)
+        yield from [_FLAG] * _columns_by_choice(scenario)
 
 
 def _most(ones: Sequence[Robot | Task], ability: str) -> float:
     """Largest amount of an ability, at least 1."""
     return max(1.0, *(one.amount(ability) for one in ones))
+
+
+def _columns_by_choice(scenario: Scenario) -> int:
+    """How many columns of a victim are there only where the scenario asks for them."""
+    return scenario.has_services + scenario.has_deadlines + scenario.has_order
 
 
 def _most_speeds(scenario: Scenario) -> list[float]:

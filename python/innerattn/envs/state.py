@@ -21,6 +21,7 @@ def state_names(scenario: Scenario) -> list[str]:
     ]
     columns = [*(f"task.{task.name}" for task in scenario.tasks), "position.x", "position.y"]
     columns += ["served"] * scenario.has_services + ["time_left"] * scenario.has_deadlines
+    columns += ["blocked"] * scenario.has_order
     victims = [
         f"victim_{slot}.{column}" for slot in range(scenario.num_victims) for column in columns
     ]
@@ -62,6 +63,8 @@ def world_states(
     if scenario.has_deadlines:
         left = shares_left(scenario, victims, step_counts)
         times.append((left * present)[..., None])
+    if scenario.has_order:
+        times.append(victims["blocked"][..., None])
     parts = [
         np.concatenate([positions, velocities], axis=2),
         np.concatenate([is_task & present[..., None], places, *times], axis=2),

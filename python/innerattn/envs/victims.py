@@ -19,7 +19,7 @@ def victim_dtype(scenario: Scenario) -> np.dtype[np.void]:
     """The fields of `BatchEnv.victims`."""
     times = [("served", "f4")] * scenario.has_services
     times += [("deadline_step", "i8")] * scenario.has_deadlines
-    return np.dtype(_FIELDS + times)
+    return np.dtype(_FIELDS + times + [("blocked", "?")] * scenario.has_order)
 
 
 def victim_table(
@@ -28,12 +28,12 @@ def victim_table(
     """The victims of E worlds by slot, (E, V) structured.
 
     Args:
-        numbers: (E, V, 5) present, task, id, appeared_step, deadline_step.
+        numbers: (E, V, 6) present, task, id, appeared_step, deadline_step, blocked.
         places: (E, V, 3) x, y [m], served.
         scenario: the worlds' description.
     """
     table = np.empty(numbers.shape[:2], dtype=victim_dtype(scenario))
-    columns = ("present", "task", "id", "appeared_step", "deadline_step")
+    columns = ("present", "task", "id", "appeared_step", "deadline_step", "blocked")
     sources = [*zip(columns, np.moveaxis(numbers, -1, 0), strict=True)]
     sources += zip(("x", "y", "served"), np.moveaxis(places, -1, 0), strict=True)
     for name, values in sources:

@@ -50,6 +50,8 @@ def _times(task: Task) -> str:
     if task.deadlines_s:
         low, high = task.deadlines_s
         words += f"; lost after {low:g} s" if low == high else f"; lost after {low:g} to {high:g} s"
+    if task.after:
+        words += f"; after {' and '.join(task.after)}"
     return words
 
 

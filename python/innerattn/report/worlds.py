@@ -17,6 +17,7 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
         "rescue_radius_m": scenario.rescue_radius_m,
         "has_services": scenario.has_services,
         "has_deadlines": scenario.has_deadlines,
+        "has_order": scenario.has_order,
         "tasks": [
             {"name": task.name, "needs": list(task.needs), "amounts": task.sums}
             for task in scenario.tasks

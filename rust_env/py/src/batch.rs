@@ -189,22 +189,24 @@ impl Batch {
         let slots = self.worlds.rules().scenario.num_victims();
         let envs = self.worlds.num_envs();
         let rules = self.worlds.rules();
-        let (mut numbers, mut places) = (zeros(envs * slots * 5)?, zeros(envs * slots * 3)?);
-        let rows = numbers.chunks_exact_mut(5).zip(places.chunks_exact_mut(3));
-        let victims = self.worlds.worlds().flat_map(|world| &world.victims);
-        for ((number, place), victim) in rows.zip(victims) {
+        let (mut numbers, mut places) = (zeros(envs * slots * 6)?, zeros(envs * slots * 3)?);
+        let rows = numbers.chunks_exact_mut(6).zip(places.chunks_exact_mut(3));
+        let worlds = self.worlds.worlds();
+        let victims = worlds.flat_map(|world| world.victims.iter().map(move |one| (one, &world.victims)));
+        for ((number, place), (victim, all)) in rows.zip(victims) {
             if let Some(victim) = victim {
                 let deadline =
                     if victim.deadline_step == u32::MAX { -1 } else { victim.deadline_step.into() };
                 let [task, id, appeared] = [victim.task, victim.id, victim.appeared_step].map(i64::from);
-                number.copy_from_slice(&[1, task, id, appeared, deadline]);
+                let blocked = rules.order.as_ref().is_some_and(|order| order.is_blocked(victim, all));
+                number.copy_from_slice(&[1, task, id, appeared, deadline, blocked.into()]);
                 let served = rules.services[victim.task as usize].share(victim);
                 place.copy_from_slice(&[victim.position.x, victim.position.y, served]);
             } else {
-                number.copy_from_slice(&[0, -1, -1, -1, -1]);
+                number.copy_from_slice(&[0, -1, -1, -1, -1, 0]);
             }
         }
-        Ok((shaped(py, numbers, [envs, slots, 5])?, shaped(py, places, [envs, slots, 3])?))
+        Ok((shaped(py, numbers, [envs, slots, 6])?, shaped(py, places, [envs, slots, 3])?))
     }
 
     fn step_counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {

@@ -29,6 +29,7 @@ fn played(engine: Engine, steps: usize) -> Batch {
     });
     let mut tasks = Scenario::default().tasks;
     tasks[0].service_s = 0.3;
+    tasks[0].after = vec!["task_2".into()];
     tasks[1].deadline_s = Some(Deadline::Between([0.5, 2.0]));
     let scenario = Scenario {
         engine,

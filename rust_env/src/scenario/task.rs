@@ -21,14 +21,23 @@ pub struct Task {
     /// How long after it appeared a victim is lost, s; never if absent.
     #[serde(default)]
     pub deadline_s: Option<Deadline>,
+    /// Names of the tasks that come before it: its victims wait for theirs.
+    #[serde(default)]
+    pub after: Vec<String>,
 }
 
 impl Task {
-    /// A task whose victims are rescued at touch and wait for ever.
+    /// A task whose victims are rescued at touch and wait for ever, and for nobody.
     #[must_use]
     pub fn new(name: &str, needs: impl Into<Abilities>) -> Self {
-        let (name, needs) = (name.into(), needs.into());
-        Self { name, needs, service_s: 0.0, service: Interrupted::Keep, deadline_s: None }
+        Self {
+            name: name.into(),
+            needs: needs.into(),
+            service_s: 0.0,
+            service: Interrupted::Keep,
+            deadline_s: None,
+            after: vec![],
+        }
     }
 }
 

@@ -239,3 +239,25 @@ fn a_deadline_is_a_number_or_a_pair() {
         assert!(error.starts_with("scenario: deadline_s must be a number or a pair [low, high]"), "{error}");
     }
 }
+
+#[test]
+fn tasks_come_after_known_others_and_never_after_themselves() {
+    let after = |first: &[&str], second: &[&str]| {
+        refusal(|scenario| {
+            for (task, names) in scenario.tasks.iter_mut().zip([first, second]) {
+                task.after = names.iter().map(ToString::to_string).collect();
+            }
+        })
+    };
+    let of = |rest: &str| format!("scenario.tasks[1].after = {rest}");
+    assert_eq!(after(&[], &["task_2"]), of("\"task_2\": a task cannot come after itself"));
+    assert_eq!(after(&[], &["fire"]), of("\"fire\": no such task; the scenario has task_1, task_2"));
+    assert_eq!(after(&[], &["task_1", "task_1"]), of("\"task_1\": is named twice"));
+    assert_eq!(
+        after(&["task_2"], &["task_1"]),
+        "scenario.tasks[0].after = [task_2]: \"task_1\" would come after itself; the order must have no cycle"
+    );
+    let mut scenario = Scenario::default();
+    scenario.tasks[1].after = vec!["task_1".into()];
+    assert_eq!(scenario.validate(), Ok(()));
+}

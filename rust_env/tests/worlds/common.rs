@@ -174,6 +174,13 @@ pub fn with_amounts(mut scenario: Scenario) -> Scenario {
     Scenario { rescue_radius_m: 0.6, ..scenario }
 }
 
+/// The same with an order of tasks: all others come after the first.
+pub fn with_order(mut scenario: Scenario) -> Scenario {
+    let first = scenario.tasks[0].name.clone();
+    scenario.tasks[1..].iter_mut().for_each(|task| task.after = vec![first.clone()]);
+    Scenario { rescue_radius_m: 0.4, ..scenario }
+}
+
 /// A disc at a random place, a box at a random place, and a box that stays.
 pub fn some_obstacles() -> Vec<Obstacle> {
     let disc = |radius| Obstacle {

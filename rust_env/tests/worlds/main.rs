@@ -12,6 +12,7 @@ mod extending;
 mod extremes;
 mod faults;
 mod fuzz;
+mod order;
 mod snapshot;
 mod speed;
 mod structure;

@@ -57,16 +57,17 @@ def test_rows_are_those_of_the_worlds_to_the_bit(
 TIMES = {"service_s": 0.9, "deadline_s": (1.0, 3.0)}
 TASKS = [
     {"name": "task_1", "needs": ("food", "medicine"), **TIMES},
-    {"name": "task_2", "needs": ("food", "information")},
+    {"name": "task_2", "needs": ("food", "information"), "after": ("task_1",)},
 ]
 
 
-def test_rows_of_worlds_with_services_and_deadlines(tmp_path: Path) -> None:
+def test_rows_of_worlds_with_services_deadlines_and_order(tmp_path: Path) -> None:
     changes = {"scenario.tasks": TASKS, "scenario.rescue_radius_m": 1.0}
     team = Exported(made_export(tmp_path, "td-inner", **changes)[1], backend="numpy")
     env = worlds(team, 16, 1)
     obs = played(env, 6, 0)
     assert env.victims()["served"].any()
+    assert env.victims()["blocked"].any()
     for world in range(16):
         for index, robot in enumerate(ROBOTS):
             row = team.row(robot, readings_of(team, robot, env, world))

@@ -89,6 +89,17 @@ def test_services_and_losses_are_those_of_the_record() -> None:
         assert record.steps["victims"][e, start, slot]["deadline_step"] == deadline >= end
 
 
+def test_who_waits_is_that_of_the_record() -> None:
+    plain = Scenario.preset("mixed")
+    worlds = plain.replace(tasks=(plain.tasks[0].replace(after=("task_2",)), plain.tasks[1]))
+    record = run_episodes(scripted_policy("hungarian", worlds), worlds, 4, 5, record=FIELDS)
+    (run,) = (document := replay_document([record], ["one"]))["runs"]
+    waits = unpacked(document, run["waits"])
+    assert (waits == record.steps["victims"]["blocked"]).all()
+    assert waits.any()
+    assert document["worlds"]["has_order"]
+
+
 def test_eighty_episodes_of_four_robots_stay_below_a_megabyte() -> None:
     page = replay_page([watched(episodes=80)], ["one"])
     assert len(page.encode()) < 1_000_000

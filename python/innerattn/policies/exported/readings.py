@@ -19,8 +19,9 @@ from innerattn.policies.exported.contract import Contract
 _KEYS = frozenset({"own", "teammates", "victims", "now", "victims_time"})
 _BODY_KEYS = frozenset({"position", "velocity", "available", "faults", "time"})
 _VICTIM_KEYS = frozenset({"task", "position"})
-_TIMES = ("served", "time_left")
-"""Shares that are read of each victim where an observation has columns for them."""
+TIMES = ("served", "time_left", "blocked")
+"""Shares that are read of each victim where an observation has columns for them; whether it is
+blocked is 0 or 1."""
 _MOST_SPEED_MPS = 1e4
 _FAULT = "own.fault."
 _NUMBERS = (float, int, np.floating, np.integer)
@@ -48,7 +49,7 @@ class RowBuilder:
         self._healthy = [1.0 if one in _SHARES else 0.0 for one in self._faults]
         self._available = 4 + len(abilities)
         self._width = self._available + 1 + len(self._faults)
-        self._times = [one for one in _TIMES if f"victim_0.{one}" in self._names]
+        self._times = [one for one in TIMES if f"victim_0.{one}" in self._names]
         self._victim_keys = _VICTIM_KEYS | set(self._times)
         self._places_at = 1 + len(abilities)
         self._victim_width = self._places_at + 2 + len(self._times)

@@ -22,7 +22,7 @@ from innerattn.policies.exported.decision import Decision, velocity_command
 from innerattn.policies.exported.folder import ExportFolder, read_export
 from innerattn.policies.exported.frame import Frame
 from innerattn.policies.exported.network import NumpyActor, probabilities_of
-from innerattn.policies.exported.readings import RowBuilder
+from innerattn.policies.exported.readings import TIMES, RowBuilder
 from innerattn.policies.exported.tensors import tensors_in
 from innerattn.policies.policy import PolicyInput
 
@@ -230,7 +230,7 @@ def _check_columns(contract: Contract) -> None:
     names = [column.name for column in contract.observation]
     faults = [name for name in names if name.startswith("own.fault.")]
     own = 4 + len(abilities) + 1 + len(faults)  # position and velocity, and availability
-    times = sum(f"victim_0.{one}" in names for one in ("served", "time_left"))
+    times = sum(f"victim_0.{one}" in names for one in TIMES)
     victim = 3 + len(abilities) + times  # presence and place
     expected = len(contract.robots) * own + contract.victim_slots * victim
     if len(names) != expected or bool(faults) != contract.observe_faults:

@@ -22,6 +22,8 @@ _MOST_PLANS = 1000  # beyond, solving each world on its own is the faster way
 _OWN_SHARE = 0.3
 _HOLD_S = 2e4
 """More than any other plan saves, and little beside `FORBIDDEN`, for 64 robots together."""
+_WAIT_S = 2 * _HOLD_S
+"""More than `_HOLD_S`: nobody stays at a victim that waits while there is another one to help."""
 
 
 class Needs:
@@ -62,6 +64,7 @@ def pair_costs(
     times: NDArray[np.float64],
     permitted: NDArray[np.bool_],
     held: NDArray[np.bool_] | None = None,
+    blocked: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
     """Cost of sending a robot to fill a need of a victim.
 
@@ -74,6 +77,8 @@ def pair_costs(
         permitted: (E, R, V, N) which robot can fill which need.
         held: (E, R, V) robots that must go on with the service of a victim, if they can; None:
             nobody.
+        blocked: (E, V) victims that have to wait for others, to which only robots go that no other
+            victim needs; None: none.
 
     Returns:
         (E, R, V * N) float64 [s], `FORBIDDEN` where not permitted.
@@ -86,6 +91,8 @@ def pair_costs(
     costs = np.maximum(own, last) + _OWN_SHARE * own
     if held is not None:
         costs = costs - _HOLD_S * held[..., None]
+    if blocked is not None:
+        costs = costs + _WAIT_S * blocked[:, None, :, None]
     costs = np.where(permitted, costs, FORBIDDEN)
     return costs.reshape(*times.shape[:2], -1)
 

@@ -21,6 +21,9 @@ from innerattn.policies.scripted.coalitions import Coalitions
 from innerattn.policies.scripted.steering import Steering
 from innerattn.policies.scripted.timing import Timing
 
+_FAR_M2 = 1e6
+"""More than the square of any distance in an arena [m²]."""
+
 
 class RandomPolicy:
     """Every robot draws every action at random, all with the same chance."""
@@ -102,6 +105,8 @@ class GreedyPolicy(_Dispatcher):
             helpful &= self._timing.in_time(state, times, permitted)[:, None]
             distance = np.where(helpful, distance, np.inf)
             distance = np.where(helpful & self._timing.held(state, times), -1.0, distance)
+        if self._timing.has_order:
+            distance = distance + _FAR_M2 * state.victims["blocked"][:, None]
         return np.where(helpful.any(-1), distance.argmin(-1), -1)
 
 
@@ -121,7 +126,10 @@ class HungarianPolicy(_Dispatcher):
         if faults is not None:
             permitted &= (faults["unavailable"] < 1.0)[:, :, None, None]
         times = self.steering.arrival_times(state.positions, state.velocities, places, faults)
+        blocked = state.victims["blocked"] if self._timing.has_order else None
         if self._coalitions.is_needed:
+            if blocked is not None:  # their coalitions would take robots from others
+                permitted &= ~blocked[:, None, :, None]
             permitted, needed = self._coalitions.shared(state, times, permitted, needed)
         if faults is not None:
             permitted &= can_be_rescued(permitted, needed)[:, None, :, None]
@@ -129,7 +137,7 @@ class HungarianPolicy(_Dispatcher):
         if self._timing.is_needed:
             permitted &= self._timing.in_time(state, times, permitted)[:, None, :, None]
             held = self._timing.held(state, times)
-        need = assign(pair_costs(times, permitted, held))
+        need = assign(pair_costs(times, permitted, held, blocked))
         return np.where(need >= 0, need // permitted.shape[-1], -1)
 
 

@@ -1,4 +1,4 @@
-"""What services and deadlines mean for who goes where."""
+"""What services, deadlines and the order of tasks mean for who goes where."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ class Timing:
 
     Attributes:
         is_needed: whether there are any; where not, everybody goes as ever.
+        has_order: whether victims may have to wait for others.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         """Take times from ``scenario``."""
         self._services, self._deadlines = scenario.has_services, scenario.has_deadlines
         self.is_needed = self._services or self._deadlines
+        self.has_order = scenario.has_order
         self._service_s = np.array([task.service_s for task in scenario.tasks])
         self._dt = scenario.dt_s
 

@@ -64,11 +64,12 @@ def _rounded(values: NDArray[np.float32]) -> list[list[float]]:
 
 
 def _times(victim: np.void) -> dict[str, float | int]:
-    """The share of its service that a victim has had, and when it is lost, where there is such."""
+    """A victim's share of its service, when it is lost, and if it waits, where there is such."""
     names = victim.dtype.names or ()
     served = {"served": round(float(victim["served"]), 3)} if "served" in names else {}
     due = {"deadline": int(victim["deadline_step"])} if "deadline_step" in names else {}
-    return {**served, **due}
+    waits = {"waits": bool(victim["blocked"])} if "blocked" in names else {}
+    return {**served, **due, **waits}
 
 
 def _wrong(robot: np.void) -> dict[str, float]:

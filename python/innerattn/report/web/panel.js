@@ -119,6 +119,10 @@ function fillLegend(list, worlds) {
   if (worlds.has_deadlines) {
     row(symbol(eventMark("lost", 0, 0)), "a victim is lost; seconds below a victim: until it is");
   }
+  if (worlds.has_order) {
+    const corners = points(taskCorners(0, 0, 0, 7));
+    row(symbol(svg("polygon", { points: corners, fill: "none", stroke: "var(--victim)", "stroke-dasharray": "2 2" })), "dashed victim: it waits until others are rescued or lost");
+  }
   row(symbol(eventMark("handoff", 0, 0)), "a handoff: a robot rescues with another partner than before");
   row(symbol(svg("rect", { x: -9, y: -9, width: 18, height: 18, fill: "var(--grid)", stroke: "var(--line)" })), "grey band in a chart: from the rescue before a handoff to that after it");
 }

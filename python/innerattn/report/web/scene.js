@@ -112,7 +112,13 @@ class Scene {
     context.beginPath();
     taskCorners(victim.task, x, y, 7).forEach(([px, py]) => context.lineTo(px, py));
     context.closePath();
-    context.fill();
+    if (this.run.waits(this.episode, this.step, victim)) {
+      context.setLineDash([2, 2]);
+      context.stroke();
+      context.setLineDash([]);
+    } else {
+      context.fill();
+    }
     this.room.take(x, y, 8, 8);
     this.drawTimes(victim, x, y);
   }

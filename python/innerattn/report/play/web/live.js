@@ -119,6 +119,10 @@ class LiveRun {
     return this.moment(step).victims.find((one) => one.id === id)?.served ?? 0;
   }
 
+  waits(episode, step, { id }) {
+    return this.moment(step).victims.find((one) => one.id === id)?.waits ?? false;
+  }
+
   isBlocked(episode, step, robot) {
     return this.moment(step).blocked[robot];
   }

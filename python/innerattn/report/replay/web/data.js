@@ -45,7 +45,8 @@ class Run {
     ));
     const lists = (spec, toRow) => byEpisode(buffer, spec, this.episodes, toRow);
     this.shares = described.served ? view(buffer, described.served) : null;
-    this.slots = described.served ? described.served.shape[2] : 0;
+    this.waiting = described.waits ? view(buffer, described.waits) : null;
+    this.slots = (described.served ?? described.waits)?.shape[2] ?? 0;
     this.victims = lists(described.victims, ([, id, task, from, to, x, y, slot, deadline]) => (
       { id, task, from, to, x: x * worlds.unit, y: y * worlds.unit, slot, deadline }
     ));
@@ -89,6 +90,12 @@ class Run {
   served(episode, step, victim) {
     if (!this.shares) return 0;
     return this.shares[(episode * this.steps + Math.floor(step)) * this.slots + victim.slot] / 255;
+  }
+
+  /** Whether a victim has to wait for others. */
+  waits(episode, step, victim) {
+    if (!this.waiting) return false;
+    return this.waiting[(episode * this.steps + Math.floor(step)) * this.slots + victim.slot] === 1;
   }
 
   isBlocked(episode, step, robot) {
