@@ -154,6 +154,19 @@ def test_rescues_and_termination() -> None:
     assert env.agents == []
 
 
+def test_losses() -> None:
+    plain = Scenario.preset("double")
+    mortal = plain.replace(tasks=tuple(task.replace(deadline_s=0.2) for task in plain.tasks))
+    env = parallel_env(mortal)
+    env.reset(seed=0)
+    stay = dict.fromkeys(env.agents, 0)
+    lost = [{info["lost"] for info in env.step(stay)[-1].values()} for _ in range(4)]
+    assert lost == [{0}, {2}, {0}, {2}]
+    endless = parallel_env(plain)
+    endless.reset(seed=0)
+    assert not any("lost" in info for info in endless.step(stay)[-1].values())
+
+
 @pytest.mark.parametrize("scenario", [CROWDED, Scenario.preset("mixed")])
 def test_state_is_the_world(scenario: Scenario) -> None:
     env, batch = parallel_env(scenario, seed=2), BatchEnv(scenario, 1, 2, autoreset="disabled")

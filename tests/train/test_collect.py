@@ -1,6 +1,7 @@
 """The collector against a plain loop over a second, equal batch of worlds."""
 
 import numpy as np
+import pytest
 import torch
 from torch import Tensor
 
@@ -60,6 +61,31 @@ def test_transitions_and_counts_against_a_plain_loop() -> None:
     tally = collector.take_tally()
     assert (tally.episodes, tally.rescues, tally.total_episodes) == (episodes, rescues, 15)
     assert tally.all_rescues == all_rescues > 0
+
+
+def test_losses_are_counted_where_victims_can_be_lost() -> None:
+    plain = Scenario.preset("double")
+    mortal = plain.replace(tasks=tuple(task.replace(deadline_s=1.0) for task in plain.tasks))
+    env, other = (BatchEnv(mortal, 5, seed=3, num_threads=1) for _ in range(2))
+    collector = Collector(env, Scripted(env), torch.device("cpu"))
+    other.reset()
+    lost = 0
+    for _ in range(40):
+        transitions, _ = collector.step()
+        other.step(transitions.actions.numpy())
+        lost += len(other.lost())
+    state = collector.resume_state()
+    assert collector.take_tally().all_lost == lost > 0
+    assert collector.take_tally().all_lost == 0
+    collector.load_resume_state(state)
+    assert collector.take_tally().all_lost == lost
+    collector.load_resume_state({**state, "tally": state["tally"][:4]})  # of an older version
+    assert collector.take_tally().all_lost == 0
+    endless = BatchEnv(plain, 5, seed=3, num_threads=1)
+    others = Collector(endless, Scripted(endless), torch.device("cpu"))
+    assert others.take_tally().all_lost is None
+    with pytest.raises(ValueError, match="'tally' has 5 numbers: must have 4"):
+        others.load_resume_state({**others.resume_state(), "tally": state["tally"]})
 
 
 def test_transitions_stay_when_the_worlds_go_on() -> None:

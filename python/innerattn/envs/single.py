@@ -31,7 +31,8 @@ class RescueEnv(gymnasium.Env[Any, Any]):
     """One rescue world for `gymnasium.make("innerattn/Rescue-v0")`.
 
     The reward is the sum of all robots' rewards. An info holds ``robot_rewards``, (R,) float32, and
-    ``rescues``, the number of this step's rescues.
+    ``rescues``, the number of this step's rescues; where the scenario has deadlines also ``lost``,
+    the number of victims that were lost in it.
 
     Args:
         scenario: the world, or the name of a preset.
@@ -111,6 +112,8 @@ class RescueEnv(gymnasium.Env[Any, Any]):
         self._going_on = not (terminated or truncated)
         self._screen.follow(self._env)
         info = {"robot_rewards": step.reward[0].copy(), "rescues": len(step.rescues)}
+        if self._env.scenario.has_deadlines:
+            info["lost"] = len(self._env.lost())
         reward = float(team_rewards(step.reward)[0])
         return self._form.observed(step.obs[0]), reward, terminated, truncated, info
 

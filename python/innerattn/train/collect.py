@@ -33,12 +33,14 @@ class Tally:
         rescues: in those episodes, whenever they began.
         total_episodes: all that ended so far.
         all_rescues: of all worlds, whether or not their episodes have ended.
+        all_lost: victims lost in all worlds; None where none can be lost.
     """
 
     episodes: int
     rescues: int
     total_episodes: int
     all_rescues: int
+    all_lost: int | None = None
 
 
 class Collector:
@@ -70,7 +72,7 @@ class Collector:
         self._afterstates = afterstates
         self._obs = self._tensor(staggered(env) if stagger_starts else env.reset())
         self._open_rescues: NDArray[np.int64] = np.zeros(env.num_envs, np.int64)
-        self._episodes = self._rescues = self._total = self._all_rescues = 0
+        self._episodes = self._rescues = self._total = self._all_rescues = self._all_lost = 0
 
     def step(self) -> tuple[Transitions, Tensor]:
         """One control step of all worlds, with actions sampled from the policy.
@@ -101,13 +103,15 @@ class Collector:
         self._obs = self._tensor(step.obs)
         np.add.at(self._open_rescues, step.rescues["env"], 1)
         self._all_rescues += len(step.rescues)
+        if self._env.scenario.has_deadlines:
+            self._all_lost += len(self._env.lost())
         self._count(step.terminated | step.truncated)
         return transitions, truncated
 
     def take_tally(self) -> Tally:
         """Counts since the last call, of all workers."""
-        own = torch.tensor([self._episodes, self._rescues, self._total, self._all_rescues])
-        self._episodes = self._rescues = self._all_rescues = 0
+        own = self._counts()
+        self._episodes = self._rescues = self._all_rescues = self._all_lost = 0
         return Tally(*workers.total(own).tolist())
 
     def resume_state(self) -> dict[str, Tensor]:
@@ -115,7 +119,7 @@ class Collector:
         return {
             "obs": self._obs,
             "open_rescues": torch.from_numpy(self._open_rescues),
-            "tally": torch.tensor([self._episodes, self._rescues, self._total, self._all_rescues]),
+            "tally": self._counts(),
         }
 
     def load_resume_state(self, state: State) -> None:
@@ -125,10 +129,16 @@ class Collector:
         rescues = take_within(state, "open_rescues", torch.int64, 0, _MOST, worlds)
         self._open_rescues = rescues.numpy().copy()
         tally = take_within(state, "tally", torch.int64, 0, _MOST, None).tolist()
-        if len(tally) not in (3, 4):
-            raise ValueError(f"'tally' has {len(tally)} numbers: must have 4")
+        if not 3 <= len(tally) <= (most := len(self._counts())):
+            raise ValueError(f"'tally' has {len(tally)} numbers: must have {most}")
         self._episodes, self._rescues, self._total = tally[:3]
-        self._all_rescues = sum(tally[3:])  # which older versions did not count
+        self._all_rescues = sum(tally[3:4])  # which older versions did not count, nor the next
+        self._all_lost = sum(tally[4:])
+
+    def _counts(self) -> Tensor:
+        """The numbers of a `Tally`."""
+        counts = [self._episodes, self._rescues, self._total, self._all_rescues]
+        return torch.tensor(counts + [self._all_lost] * self._env.scenario.has_deadlines)
 
     def _count(self, ended: NDArray[np.bool_]) -> None:
         count = int(ended.sum())

@@ -29,7 +29,8 @@ _COUNTS = ("skipped_updates",)
 Metrics = Mapping[str, Any]
 """One line: env_steps, episodes, updates, seconds, env_steps_per_s, updates_per_s, losses by name,
 rescues_per_episode (of the episodes that ended; none where none did), rescues_per_env_step (of all
-worlds) and attention_entropy by robot and head [nats], empty where the critic has no attention."""
+worlds), attention_entropy by robot and head [nats], empty where the critic has no attention, and
+where victims can be lost lost_per_env_step (of all worlds)."""
 
 
 class MetricsFile:
@@ -192,6 +193,8 @@ class Interval:
             "rescues_per_env_step": tally.all_rescues / max(steps, 1),
             "attention_entropy": dict(entropy),
         }
+        if tally.all_lost is not None:
+            line["lost_per_env_step"] = tally.all_lost / max(steps, 1)
         self._seconds, self._env_steps, self._updates = seconds, env_steps, updates
         self._losses = {}
         return line
