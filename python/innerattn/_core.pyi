@@ -162,6 +162,9 @@ class Batch:
         Fields: env, episode, step, slot, victim, task.
         """
 
+    def turned_away(self) -> NDArray[np.int64]:
+        """Victims that found all slots of their task taken in the last step, (E,)."""
+
     def _panic_in_next_step(self, envs: Sequence[int]) -> None:
         """For tests: let these worlds fail in the next step."""
 

@@ -219,6 +219,11 @@ impl Batch {
         self.shards.iter().flat_map(|shard| &shard.events.losses)
     }
 
+    /// The env of each victim that was turned away in the last step, in order.
+    pub fn turned_away(&self) -> impl Iterator<Item = u32> {
+        self.shards.iter().flat_map(|shard| &shard.events.turned_away).copied()
+    }
+
     /// Lets these worlds panic in the next step, to test what happens then.
     #[doc(hidden)]
     pub fn panic_in_next_step(&mut self, envs: Vec<usize>) {

@@ -19,6 +19,8 @@ pub enum Purpose {
     SensorNoise = 4,
     /// How long victims wait before they are lost.
     Deadlines = 5,
+    /// How many victims arrive in a control step.
+    Arrivals = 6,
 }
 
 /// A stream of random numbers whose state is its key and the count of words drawn.
@@ -51,6 +53,11 @@ impl Stream {
     /// Uniform in `[0, 1)`, a multiple of 2⁻²⁴.
     pub fn unit(&mut self) -> f32 {
         (self.0.next_u32() >> 8) as f32 * (1.0 / 16_777_216.0)
+    }
+
+    /// Uniform in `[0, 1)`, a multiple of 2⁻⁵³; two words.
+    pub fn fine_unit(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 * f64::EPSILON * 0.5
     }
 
     /// Uniform in `[low, high)`.

@@ -12,6 +12,7 @@ use crate::robot::{Body, bodies};
 use crate::scenario::Scenario;
 use crate::spawn::{Crowded, Spawn};
 use crate::tasks::Needs;
+use crate::tasks::arrivals::Arrivals;
 use crate::tasks::deadline::Deadlines;
 use crate::tasks::order::Order;
 use crate::tasks::service::Service;
@@ -46,6 +47,8 @@ pub struct Rules {
     pub services: Vec<Service>,
     /// When victims are lost, if ever.
     pub deadlines: Option<Deadlines>,
+    /// How many victims come whatever becomes of others, if any.
+    pub arrivals: Option<Arrivals>,
     /// Which tasks come before which, if any.
     pub order: Option<Order>,
     /// The obstacles' forms.
@@ -93,6 +96,7 @@ impl Rules {
             layout: Layout::new(&scenario, &tasks),
             services: Service::of_tasks(&scenario),
             deadlines: Deadlines::new(&scenario),
+            arrivals: Arrivals::new(&scenario),
             order: Order::new(&scenario),
             weights: Weights::new(&scenario),
             faults: processes(&scenario),

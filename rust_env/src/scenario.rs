@@ -2,6 +2,7 @@
 //! nothing plays by a scenario before [`crate::rules::Rules::new`] has found it valid.
 
 mod abilities;
+mod arrivals;
 mod check;
 mod order;
 mod task;
@@ -33,6 +34,8 @@ pub const MAX_NEEDS: usize = 8;
 pub const MAX_HELPERS: usize = MAX_ROBOTS;
 /// Least and largest amount of an ability or a need.
 pub const AMOUNTS: (f64, f64) = (1e-6, 1e6);
+/// Largest rate at which victims of a task arrive, 1/s.
+pub const MAX_ARRIVAL_RATE_HZ: f64 = 100.0;
 /// Longest service or deadline of a victim, s; no episode takes longer.
 pub const MAX_TIME_S: f64 = 1e6;
 /// Gap between robots, and between robots and solids, when an episode starts, m.
@@ -56,6 +59,8 @@ pub enum Situation {
     Double,
     /// Waves of 1 to `max_victims` victims of random tasks; the next comes when all are rescued.
     Mixed,
+    /// Victims of each task arrive at random, at its own rate; up to `max_victims` of each wait at once.
+    Poisson,
 }
 
 /// What a robot is told to do each step.
@@ -181,7 +186,7 @@ pub struct Scenario {
     pub robots: Vec<Robot>,
     /// The kinds of victims.
     pub tasks: Vec<Task>,
-    /// Most victims of a wave in the mixed situation.
+    /// Most victims of a wave in the mixed situation, and of each task at once where they arrive at random.
     pub max_victims: usize,
     /// Solid things in the arena.
     pub obstacles: Vec<Obstacle>,
@@ -312,13 +317,15 @@ impl Scenario {
         serde_json::to_string(self).expect("plain data serialises")
     }
 
-    /// Slots for victims: 1 in single, one per task in double, `max_victims` in mixed.
+    /// Slots for victims: 1 in single, one per task in double, `max_victims` in mixed, `max_victims` per task
+    /// in poisson.
     #[must_use]
     pub fn num_victims(&self) -> usize {
         match self.situation {
             Situation::Single => 1,
             Situation::Double => self.tasks.len(),
             Situation::Mixed => self.max_victims,
+            Situation::Poisson => self.tasks.len() * self.max_victims,
         }
     }
 

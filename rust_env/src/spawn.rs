@@ -40,6 +40,8 @@ pub struct Spawn {
     situation: Situation,
     num_tasks: usize,
     num_slots: usize,
+    /// Slots of each task where victims arrive.
+    slots_per_task: usize,
 }
 
 impl Spawn {
@@ -56,6 +58,7 @@ impl Spawn {
             situation: scenario.situation,
             num_tasks: scenario.tasks.len(),
             num_slots: scenario.num_victims(),
+            slots_per_task: scenario.max_victims,
         }
     }
 
@@ -110,6 +113,7 @@ impl Spawn {
         match self.situation {
             Situation::Single | Situation::Double => slots.iter().any(Option::is_none),
             Situation::Mixed => slots.iter().all(Option::is_none),
+            Situation::Poisson => false, // they come by themselves, see `place_arrivals`
         }
     }
 
@@ -132,7 +136,11 @@ impl Spawn {
     /// Tasks that a victim of this slot may have.
     #[must_use]
     pub fn tasks_of_slot(&self, slot: usize) -> RangeInclusive<usize> {
-        if self.situation == Situation::Double { slot..=slot } else { 0..=self.num_tasks - 1 }
+        match self.situation {
+            Situation::Single | Situation::Mixed => 0..=self.num_tasks - 1,
+            Situation::Double => slot..=slot,
+            Situation::Poisson => slot / self.slots_per_task..=slot / self.slots_per_task,
+        }
     }
 
     /// How far a victim may be from the centre on each axis, m.
@@ -157,8 +165,8 @@ impl Spawn {
             && slots.iter().enumerate().all(|(slot, victim)| victim.is_none_or(|victim| known(slot, &victim)))
     }
 
-    /// Lets victims appear at `step` in the empty slots that the situation wants to be filled, and counts
-    /// them in `appeared`. Returns whether all found a clear place.
+    /// Lets victims appear at `step` in the empty slots that the situation wants to be filled, or in all where
+    /// they arrive, and counts them in `appeared`. Returns whether all found a clear place.
     pub fn place_victims(
         &self,
         stream: &mut Stream,
@@ -171,7 +179,7 @@ impl Spawn {
         let mut clear = true;
         let solids = self.placed(obstacles);
         let wanted = match self.situation {
-            Situation::Single | Situation::Double => slots.len(),
+            Situation::Single | Situation::Double | Situation::Poisson => slots.len(),
             Situation::Mixed => 1 + stream.below(slots.len()),
         };
         for index in 0..wanted {
@@ -179,7 +187,7 @@ impl Spawn {
                 continue;
             }
             let task = match self.situation {
-                Situation::Double => index,
+                Situation::Double | Situation::Poisson => *self.tasks_of_slot(index).start(),
                 Situation::Single | Situation::Mixed => stream.below(self.num_tasks),
             };
             let others = slots.iter().flatten().map(|victim| victim.position);
@@ -189,6 +197,35 @@ impl Spawn {
             *appeared += 1;
         }
         clear
+    }
+
+    /// Lets victims of the tasks `due` appear at `step`, each in the first empty slot of its task, and counts
+    /// them in `appeared`. Returns how many find none.
+    #[allow(clippy::too_many_arguments)]
+    pub fn place_arrivals(
+        &self,
+        stream: &mut Stream,
+        due: impl Iterator<Item = usize>,
+        step: u32,
+        appeared: &mut u32,
+        robots: &[Vec2],
+        obstacles: &[Vec2],
+        slots: &mut [Option<Victim>],
+    ) -> usize {
+        let solids = self.placed(obstacles);
+        let mut turned_away = 0;
+        for task in due {
+            let mut own = task * self.slots_per_task..(task + 1) * self.slots_per_task;
+            let Some(slot) = own.find(|slot| slots[*slot].is_none()) else {
+                turned_away += 1;
+                continue;
+            };
+            let others = slots.iter().flatten().map(|victim| victim.position);
+            let place = self.placing.victim(stream, robots, &others, &solids);
+            slots[slot] = Some(Victim::new(*appeared, task as u32, step, place.at));
+            *appeared += 1;
+        }
+        turned_away
     }
 
     /// Number of the first listed place of victims that is too near to an obstacle with a given place.

@@ -1,10 +1,11 @@
 //! Victims and what becomes of them: who is present, what it needs, which robots rescue it. How long that
 //! takes is in `service.rs`, until when there is time in `deadline.rs`, who waits for whom in `order.rs`, needs
-//! as sums in `sums.rs`.
+//! as sums in `sums.rs`, how many come by themselves in `arrivals.rs`.
 //!
 //! A step settles them in this order: robots have moved; slot by slot, service goes on and victims are
 //! rescued; those whose deadline has come are lost; new ones appear.
 
+pub mod arrivals;
 pub mod deadline;
 pub mod order;
 pub mod service;
@@ -242,6 +243,8 @@ pub struct Events {
     pub rescues: Vec<Rescue>,
     /// Those that were lost.
     pub losses: Vec<Loss>,
+    /// The env of each that arrived when all slots of its task were taken.
+    pub turned_away: Vec<u32>,
 }
 
 impl Events {
@@ -249,6 +252,7 @@ impl Events {
     pub fn clear(&mut self) {
         self.rescues.clear();
         self.losses.clear();
+        self.turned_away.clear();
     }
 }
 

@@ -1,5 +1,7 @@
 //! One world: how an episode begins and what a step does. Its state is plain numbers.
 
+use std::iter::repeat_n;
+
 use serde::{Deserialize, Serialize};
 
 use crate::fault::{Kind, Levels};
@@ -122,16 +124,26 @@ impl World {
         self.freeze(rules);
     }
 
-    /// Lets the victims appear that the situation wants now.
-    fn fill_slots(&mut self, rules: &Rules) {
+    /// Lets the victims appear that the situation wants now, or that arrive. Returns how many of these found
+    /// all slots of their task taken.
+    fn fill_slots(&mut self, rules: &Rules) -> usize {
         let Self { seed, stream, episode, step, positions, obstacles, victims, .. } = self;
-        if rules.spawn.wants_victims(victims) {
-            let mut words = Stream::new(*seed, *stream, *episode, Purpose::Victims).resume(self.victim_words);
-            let appeared = &mut self.appeared;
-            rules.spawn.place_victims(&mut words, *step, appeared, positions, obstacles, victims);
-            self.victim_words = words.words();
-            self.set_deadlines(rules);
+        let arrivals = rules.arrivals.iter();
+        let mut due = arrivals.flat_map(|one| one.due(*step, *seed, *stream, *episode)).peekable();
+        if !rules.spawn.wants_victims(victims) && due.peek().is_none() {
+            return 0;
         }
+        let mut words = Stream::new(*seed, *stream, *episode, Purpose::Victims).resume(self.victim_words);
+        let (appeared, mut turned_away) = (&mut self.appeared, 0);
+        if rules.arrivals.is_some() {
+            turned_away =
+                rules.spawn.place_arrivals(&mut words, due, *step, appeared, positions, obstacles, victims);
+        } else {
+            rules.spawn.place_victims(&mut words, *step, appeared, positions, obstacles, victims);
+        }
+        self.victim_words = words.words();
+        self.set_deadlines(rules);
+        turned_away
     }
 
     /// Says of every victim when it is lost.
@@ -177,7 +189,8 @@ impl World {
         }
         self.step += 1;
         self.fresh = false;
-        self.fill_slots(rules);
+        let turned_away = self.fill_slots(rules);
+        events.turned_away.extend(repeat_n(env as u32, turned_away));
         let now = self.now();
         self.faults.update(rules, now);
         self.freeze(rules);

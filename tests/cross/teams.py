@@ -109,6 +109,16 @@ def with_amounts(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     return scenario.replace(robots=robots, tasks=tuple(tasks))
 
 
+def with_arrivals(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, where victims of each task arrive at random, of some tasks none."""
+    rates = (0.0, 0.5, 2.0, 9.0)
+    tasks = tuple(
+        task.replace(arrival_rate_hz=rates[rng.integers(len(rates))]) for task in scenario.tasks
+    )
+    most = min(scenario.max_victims, 32 // len(tasks))
+    return scenario.replace(situation="poisson", tasks=tasks, max_victims=most)
+
+
 def with_order(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     """The same, where some tasks come after others; a hidden order of all has no cycle."""
     order = rng.permutation(len(scenario.tasks)).tolist()

@@ -145,7 +145,7 @@ def test_an_unknown_key_is_refused_by_both(place: str) -> None:
 def test_every_value_survives_the_way_there_and_back() -> None:
     """Values that are no default: a key read under another name, or not at all, would differ."""
     changed = {
-        "situation": "double",
+        "situation": "poisson",
         "robots": [
             *TEAM[1:],
             {**TEAM[0], "radius_m": 0.04, "drive_force_n": 3.5, "start_m": [0.25, -0.5]},
@@ -157,6 +157,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
                 "service": "restart",
                 "deadline_s": [1.5, 2.5],
                 "after": ["other"],
+                "arrival_rate_hz": 0.25,
             },
             {**TASK, "name": "other"},
         ],
@@ -194,7 +195,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         assert getattr(scenario, key) != getattr(default, key)
     assert compiled(changed) == scenario.model_dump(mode="json")
     del changed["victim_area_m"]
-    listed = {**changed, "victim_places_m": [[0.5, 0.25], [-1.5, 0.0]]}
+    listed = {**changed, "max_victims": 1, "victim_places_m": [[0.5, 0.25], [-1.5, 0.0]]}
     assert compiled(listed) == Scenario.model_validate(listed).model_dump(mode="json")
     assert compiled(listed)["victim_places_m"] == listed["victim_places_m"]
 

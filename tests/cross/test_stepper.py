@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from stepper import State, Stepper
-from teams import random_scenario, with_amounts, with_order, with_times
+from teams import random_scenario, with_amounts, with_arrivals, with_order, with_times
 
 from innerattn.config import Scenario, Task
 from innerattn.envs import BatchEnv
@@ -77,7 +77,9 @@ def check_victims(
     empty = ~stays.any(1) if scenario.situation == "mixed" else (~stays).any(1)
     assert (new["present"][~empty] == stays[~empty]).all()
     fresh = new["present"] & ~stays
-    if scenario.situation == "mixed":
+    if scenario.has_arrivals:
+        check_arrivals(env, new, stays)
+    elif scenario.situation == "mixed":
         size = new["present"][empty].sum(1)
         assert (size >= 1).all()
         assert (new["present"][empty] == (np.arange(new.shape[1]) < size[:, None])).all()
@@ -102,6 +104,22 @@ def check_victims(
     apart = np.linalg.norm(after.positions[envs] - at[:, None], axis=-1)
     assert (apart >= scenario.spawn_clearance_m - EXACT).all()
     return int(fresh.sum())
+
+
+def check_arrivals(env: BatchEnv, victims: np.ndarray, stays: np.ndarray) -> None:
+    """Checks the slots (E, V) of those that arrived, and of those that found none."""
+    scenario = env.scenario
+    there, full = victims["present"], np.zeros(len(victims), dtype=bool)
+    for task, plain in enumerate(scenario.tasks):
+        own = slice(task * scenario.max_victims, (task + 1) * scenario.max_victims)
+        assert (victims["task"][:, own][there[:, own]] == task).all()
+        full |= there[:, own].all(1) & (plain.arrival_rate_hz > 0)
+        fresh = there[:, own] & ~stays[:, own]
+        assert not fresh.any() or plain.arrival_rate_hz
+        # They take the first of the empty slots.
+        empty = np.cumsum(~stays[:, own], axis=1) * ~stays[:, own]
+        assert (fresh == ((empty > 0) & (empty <= fresh.sum(1)[:, None]))).all()
+    assert full[env.turned_away() > 0].all()
 
 
 def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = False) -> Counter[str]:
@@ -160,6 +178,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
             gone[world, slot] = True
             rescued[world] += 1
         assert (env.step_counts() == steps + 1).all()
+        seen["turned away"] += int(env.turned_away().sum())
         seen["appeared"] += check_victims(env, before, after, gone, given)
         given = np.maximum(given, after.victims["id"].max(1) + 1)
         if plain.service.any():
@@ -281,6 +300,22 @@ def test_worlds_with_an_order_of_tasks_are_as_the_plain_stepper_says(chunk: int)
         total += compare(scenario, seed, some, faulty=seed % 3 == 0)
     assert total["unsure"] < 0.02 * total["transitions"]
     for what in ("rescues", "appeared", "waiting", "went on"):
+        assert total[what] > 50, (what, total)
+
+
+@pytest.mark.parametrize("chunk", range(3))
+def test_worlds_in_which_victims_arrive_are_as_the_plain_stepper_says(chunk: int) -> None:
+    total: Counter[str] = Counter()
+    rng = np.random.default_rng(500 + chunk)
+    while total["transitions"] < 12_000:
+        scenario = with_arrivals(random_scenario(rng), rng)
+        if rng.random() < 0.5:
+            scenario = with_times(with_order(scenario, rng), rng)
+        some = min(1000, 20_000 // len(scenario.robots))
+        seed = int(rng.integers(2**32))
+        total += compare(scenario, seed, some, faulty=seed % 3 == 0)
+    assert total["unsure"] < 0.02 * total["transitions"]
+    for what in ("rescues", "appeared", "turned away", "lost"):
         assert total[what] > 50, (what, total)
 
 

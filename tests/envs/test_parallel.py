@@ -167,6 +167,25 @@ def test_losses() -> None:
     assert not any("lost" in info for info in endless.step(stay)[-1].values())
 
 
+def test_victims_that_are_turned_away() -> None:
+    plain = Scenario.preset("mixed")
+    tasks = tuple(task.replace(arrival_rate_hz=6.0) for task in plain.tasks)
+    worlds = plain.replace(situation="poisson", max_victims=1, tasks=tasks)
+    env, batch = parallel_env(worlds, seed=2), BatchEnv(worlds, 1, 2, autoreset="disabled")
+    env.reset(seed=2)
+    batch.reset(seed=2)
+    stay, found = dict.fromkeys(env.agents, 0), []
+    for _ in range(9):
+        told = {info["turned_away"] for info in env.step(stay)[-1].values()}
+        batch.step(np.zeros((1, 4), np.int64))
+        found.append(int(batch.turned_away()[0]))
+        assert told == {found[-1]}
+    assert sum(found) > 2
+    other = parallel_env(plain)
+    other.reset(seed=0)
+    assert not any("turned_away" in info for info in other.step(stay)[-1].values())
+
+
 @pytest.mark.parametrize("scenario", [CROWDED, Scenario.preset("mixed")])
 def test_state_is_the_world(scenario: Scenario) -> None:
     env, batch = parallel_env(scenario, seed=2), BatchEnv(scenario, 1, 2, autoreset="disabled")

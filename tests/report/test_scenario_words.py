@@ -91,6 +91,16 @@ def test_what_no_team_can_do_is_refused_with_the_value_that_would_do() -> None:
     Scenario.model_validate({**two, **task, "rescue_radius_m": 0.3})
 
 
+def test_how_many_arrive() -> None:
+    plain = Scenario.preset("mixed")
+    tasks = (plain.tasks[0].replace(arrival_rate_hz=0.25), plain.tasks[1])
+    arriving = plain.replace(situation="poisson", max_victims=3, tasks=tasks)
+    first, second = scenario_words(arriving).splitlines()[:2]
+    assert first.endswith("within 0.15 m; 0.25 a second arrive, at most 3 wait at once")
+    assert second.endswith("within 0.15 m; 0 a second arrive, at most 3 wait at once")
+    assert "arrive" not in scenario_words(plain)
+
+
 def test_what_a_task_waits_for() -> None:
     plain = Scenario.preset("mixed")
     ordered = plain.replace(tasks=(plain.tasks[0], plain.tasks[1].replace(after=("task_1",))))

@@ -168,10 +168,11 @@ class Scenario(Model, Shown):
 
     place: ClassVar[str] = "scenario"
 
-    situation: Literal["single", "double", "mixed"] = Field(
+    situation: Literal["single", "double", "mixed", "poisson"] = Field(
         "mixed",
         description="single: one victim at a time; double: one of each task, always; "
-        "mixed: waves of 1 to max_victims victims of random tasks",
+        "mixed: waves of 1 to max_victims victims of random tasks; poisson: victims of each task "
+        "arrive at random, at the task's arrival_rate_hz",
     )
     robots: Annotated[tuple[Robot, ...], Told(1, 64)] = Field(
         default_factory=_default_team, description="the team"
@@ -180,7 +181,7 @@ class Scenario(Model, Shown):
         default_factory=_default_tasks, description="kinds of victim"
     )
     max_victims: Annotated[Count, Told(1, 32)] = Field(
-        2, description="most victims of a wave in mixed"
+        2, description="most victims of a wave in mixed, and of each task at once in poisson"
     )
     obstacles: Annotated[tuple[Obstacle, ...], Told(0, 64)] = Field(
         (), description="fixed bodies in the way"
@@ -325,6 +326,13 @@ class Scenario(Model, Shown):
         """Number of victim slots V."""
         return self._rules.num_victims
 
+    def slots_of(self, task: int) -> range:
+        """The slots that victims of a task may have."""
+        if self.situation in ("single", "mixed"):
+            return range(self.num_victims)
+        each = self.max_victims if self.has_arrivals else 1
+        return range(self.num_victims)[task * each : (task + 1) * each]
+
     @property
     def max_helpers(self) -> int:
         """Most robots that can help one victim."""
@@ -344,3 +352,8 @@ class Scenario(Model, Shown):
     def has_order(self) -> bool:
         """Whether some victims have to wait for others."""
         return any(task.after for task in self.tasks)
+
+    @property
+    def has_arrivals(self) -> bool:
+        """Whether victims arrive whatever becomes of others, so that some may find no slot."""
+        return self.situation == "poisson"

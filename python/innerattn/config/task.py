@@ -41,6 +41,11 @@ class Task(Model):
         description="names of the tasks that come before it: a victim waits while one of theirs is "
         "there that appeared no later",
     )
+    arrival_rate_hz: Annotated[float, ADDED_LATER, Told(0.0, 100.0)] = Field(
+        0.0,
+        description="how many of its victims arrive on average, where the situation is poisson "
+        "[1/s]",
+    )
 
     _check_needs = field_validator("needs", mode="before")(list_or_table)
 

@@ -203,6 +203,13 @@ class BatchEnv(Shown):
         """
         return self._core.lost()
 
+    def turned_away(self) -> NDArray[np.int64]:
+        """Victims that found all slots of their task taken in the last step, (E,) int64.
+
+        They never appear. There are none but where victims arrive whatever becomes of others.
+        """
+        return self._core.turned_away()
+
     def step_counts(self) -> NDArray[np.int64]:
         """Steps done in each world's episode, (E,) int64."""
         return self._core.step_counts()

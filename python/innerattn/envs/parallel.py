@@ -66,7 +66,8 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
     Observations are (D,) float32, columns named by `BatchEnv.observation_names`. Rewards are
     floats. An info holds ``reward_components`` (name to float; they add up to the reward) and
     ``rescues`` (number of this step's rescues in which the robot helped); where the scenario has
-    deadlines also ``lost`` (number of victims that were lost in this step).
+    deadlines also ``lost`` (number of victims that were lost in this step); and where victims
+    arrive by themselves ``turned_away`` (number of those that found no slot in this step).
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -209,13 +210,15 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
 
     def _infos(self, rescues: NDArray[np.void]) -> dict[str, Info]:
         names = self._env.reward_component_names
-        lost = {"lost": len(self._env.lost())} if self._env.scenario.has_deadlines else {}
+        gone = {"lost": len(self._env.lost())} if self._env.scenario.has_deadlines else {}
+        if self._env.scenario.has_arrivals:
+            gone["turned_away"] = int(self._env.turned_away()[0])
         helpers = [rescues[name] for name in rescues.dtype.names or () if name.startswith("helper")]
         return {
             agent: {
                 "reward_components": dict(zip(names, row, strict=True)),
                 "rescues": sum(int((column == i).sum()) for column in helpers),
-                **lost,
+                **gone,
             }
             for i, (agent, row) in enumerate(
                 zip(self.possible_agents, self._env.reward_components()[0].tolist(), strict=True)

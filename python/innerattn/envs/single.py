@@ -32,7 +32,8 @@ class RescueEnv(gymnasium.Env[Any, Any]):
 
     The reward is the sum of all robots' rewards. An info holds ``robot_rewards``, (R,) float32, and
     ``rescues``, the number of this step's rescues; where the scenario has deadlines also ``lost``,
-    the number of victims that were lost in it.
+    the number of victims that were lost in it; and where victims arrive by themselves
+    ``turned_away``, the number of those that found no slot in it.
 
     Args:
         scenario: the world, or the name of a preset.
@@ -114,6 +115,8 @@ class RescueEnv(gymnasium.Env[Any, Any]):
         info = {"robot_rewards": step.reward[0].copy(), "rescues": len(step.rescues)}
         if self._env.scenario.has_deadlines:
             info["lost"] = len(self._env.lost())
+        if self._env.scenario.has_arrivals:
+            info["turned_away"] = int(self._env.turned_away()[0])
         reward = float(team_rewards(step.reward)[0])
         return self._form.observed(step.obs[0]), reward, terminated, truncated, info
 

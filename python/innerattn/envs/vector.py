@@ -208,6 +208,8 @@ class RescueVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         }
         if self._env.scenario.has_deadlines:
             found["lost"] = np.bincount(self._env.lost()["env"], minlength=self.num_envs)
+        if self._env.scenario.has_arrivals:
+            found["turned_away"] = self._env.turned_away()
         if self._mode is AutoresetMode.NEXT_STEP:
             begun = self._env.step_counts() == 0  # they were reset and did not act
             return _masked(found, ~begun, self._copy)

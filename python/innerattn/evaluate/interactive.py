@@ -186,13 +186,13 @@ class InteractiveWorld:
     def add_victim(self, task: int, x: float, y: float) -> None:
         """Let a victim of a task appear in an empty slot; x and y [m]."""
         victims = self._env.victims()
-        empty = np.flatnonzero(~victims["present"][0])
-        if not len(empty):
+        slots = self.scenario.slots_of(task)
+        slot = next((slot for slot in slots if not victims["present"][0, slot]), None)
+        if slot is None:
             raise ValueError(
-                f"all {len(victims[0])} places for victims are taken in this world: move a victim, "
+                f"all {len(slots)} places for victims are taken in this world: move a victim, "
                 "or wait for a rescue"
             )
-        slot = empty[0]
         victims["present"][0, slot], victims["task"][0, slot] = True, task
         victims["x"][0, slot], victims["y"][0, slot] = x, y
         self._env.set_victims(victims)

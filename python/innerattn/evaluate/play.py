@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from contextlib import closing
-from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -18,7 +17,7 @@ from innerattn.config import Scenario
 from innerattn.config.streams import Purpose, stream_seed
 from innerattn.envs import BatchEnv
 from innerattn.policies import Policy, PolicyInput, WorldState
-from innerattn.records.record import FIELDS, LOST_DTYPE, Record, rescue_dtype
+from innerattn.records.record import FIELDS, LOST_DTYPE, Record, joined, rescue_dtype
 
 _WORLDS_AT_ONCE = 1024
 
@@ -81,7 +80,7 @@ def run_episodes(
             parts.append(_run_batch(policy, env, seed, start, record))
         if progress is not None:
             progress(count)
-    return _joined(parts)
+    return parts[0] if len(parts) == 1 else joined(parts, parts[0].steps)
 
 
 def _draw_seed(seed: int, first_episode: int) -> int:
@@ -102,6 +101,7 @@ def _run_batch(
     rewards_total = np.zeros((env.num_envs, env.num_robots, len(env.reward_component_names)))
     steps: dict[str, NDArray[Any]] = {}
     rescues, lost = [], []
+    turned_away = np.zeros(env.num_envs, np.int64) if env.scenario.has_arrivals else None
     state_needed = policy.needs_true_state or not set(record).isdisjoint(WorldState._fields)
     for step_index in range(total_steps):
         state = WorldState.of(env) if state_needed else None
@@ -124,6 +124,8 @@ def _run_batch(
             rescues.append(step.rescues[running[step.rescues["env"]]].copy())
         if env.scenario.has_deadlines and len(gone := env.lost()):
             lost.append(gone[running[gone["env"]]])
+        if turned_away is not None:
+            turned_away += env.turned_away() * running
         obs = step.obs
         running &= ~(step.terminated | step.truncated)
         if not running.any():
@@ -137,6 +139,7 @@ def _run_batch(
         lengths=lengths,
         rescues=_events(rescues, rescue_dtype(env.scenario), first_episode),
         lost=_events(lost, LOST_DTYPE, first_episode),
+        turned_away=turned_away,
         reward_names=tuple(env.reward_component_names),
         rewards_total=rewards_total,
         steps={name: steps[name] for name in FIELDS if name in steps},
@@ -168,18 +171,3 @@ def _events(
             events[name] = raw["env" if name == "episode" else name]
         events["episode"] += first_episode
     return events[np.argsort(events["episode"], kind="stable")]
-
-
-def _joined(parts: list[Record]) -> Record:
-    if len(parts) == 1:
-        return parts[0]
-    return replace(
-        parts[0],
-        lengths=np.concatenate([part.lengths for part in parts]),
-        rescues=np.concatenate([part.rescues for part in parts]),
-        lost=np.concatenate([part.lost for part in parts]),
-        rewards_total=np.concatenate([part.rewards_total for part in parts]),
-        steps={
-            name: np.concatenate([part.steps[name] for part in parts]) for name in parts[0].steps
-        },
-    )

@@ -6,15 +6,12 @@ Whatever is registered is computed in every evaluation, stored with it and shown
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import takewhile
 
-import numpy as np
-
-from innerattn.measures import deadlines, dispatch_quality, helpers, rescues, waiting
+from innerattn.measures import arrivals, deadlines, dispatch_quality, helpers, rescues, waiting
 from innerattn.measures.measure import Measure, Value
 from innerattn.measures.sharing import imbalance
-from innerattn.records.record import Record
+from innerattn.records.record import Record, joined
 
 MEASURES: dict[str, Measure] = {}
 """The registered measures by name, in the order of tables; `register` adds one."""
@@ -25,6 +22,7 @@ _BUILT_IN = (
     *dispatch_quality.MEASURES,
     *waiting.MEASURES,
     *deadlines.MEASURES,
+    *arrivals.MEASURES,
     *helpers.MEASURES,
 )
 
@@ -108,14 +106,7 @@ def _with_fields(parts: Sequence[Record], fields: tuple[str, ...]) -> Record | N
     having = list(takewhile(lambda part: all(name in part.steps for name in fields), parts))
     if not having:
         return None
-    return replace(
-        having[0],
-        lengths=np.concatenate([part.lengths for part in having]),
-        rescues=np.concatenate([part.rescues for part in having]),
-        lost=np.concatenate([part.lost for part in having]),
-        rewards_total=np.concatenate([part.rewards_total for part in having]),
-        steps={name: np.concatenate([part.steps[name] for part in having]) for name in fields},
-    )
+    return joined(having, fields)
 
 
 for _measure in _BUILT_IN:

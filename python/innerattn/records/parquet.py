@@ -31,9 +31,9 @@ SCHEMA_VERSION = 1
 
 RECORD_FILES = _EPISODES, _RESCUES = "episodes.parquet", "rescues.parquet"
 
-_SUMS = ("record", "episode", "steps", "rescues", "reward", "lost")
+_SUMS = ("record", "episode", "steps", "rescues", "reward", "lost", "turned_away")
 """Columns of ``episodes.parquet`` that records are made of; the others are labels and steps. The
-last one is there only where a scenario has deadlines."""
+last two are there only where a scenario has deadlines, and arrivals."""
 _OF_LOST = ("step", "slot", "victim", "task")
 _MOST_RECORDS = 1_000
 
@@ -43,8 +43,9 @@ def write_records(records: Sequence[Record], folder: Path) -> None:
 
     A row of the first holds policy, seed, episode, steps, rescues, reward sums by robot and
     component, lost victims where the scenario has deadlines (step, slot, victim and task of each),
-    and what was recorded step by step, flattened; shapes and the scenario stand in the file's
-    metadata. A row of the second holds one event; helpers are named.
+    how many found no slot where victims arrive, and what was recorded step by step, flattened;
+    shapes and the scenario stand in the file's metadata. A row of the second holds one event;
+    helpers are named.
 
     Raises:
         OSError: the files cannot be written; each is written whole or not at all.
@@ -134,6 +135,8 @@ def _episode_table(index: int, record: Record) -> pa.Table:
     }
     if record.scenario.has_deadlines:
         columns["lost"] = _lost_lists(record)
+    if record.turned_away is not None:
+        columns["turned_away"] = pa.array(record.turned_away)
     for name, values in record.steps.items():
         columns |= {column: _lists(part) for column, part in _parts(name, values)}
     return pa.table(columns)
@@ -284,6 +287,7 @@ def _record(
         lengths=lengths,
         rescues=_events(events, scenario, names),
         lost=_lost(rows, scenario, first_episode),
+        turned_away=_numbers(rows["turned_away"]) if scenario.has_arrivals else None,
         reward_names=reward_names,
         rewards_total=_arrays(rows["reward"]).reshape(len(rows), len(names), len(reward_names)),
         length=length,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -45,6 +46,8 @@ class Record(Shown):
             helper_k filled the task's need k, -1 beyond its last need; where needs are sums,
             the nearest helper comes first, and -1 is nobody.
         lost: (M,) structured int64: episode, step, slot, victim, task; victims that were lost.
+        turned_away: (E,) int64 victims that arrived when all slots of their task were taken; None
+            where victims come when others are gone.
         reward_names: C names of reward components.
         rewards_total: (E, R, C) float64 sum over the episode.
         length: which of an evaluation's two lengths of episodes this is.
@@ -64,6 +67,7 @@ class Record(Shown):
     rewards_total: NDArray[np.float64]
     length: Length = "standard"
     lost: NDArray[np.void] = field(default_factory=lambda: np.empty(0, LOST_DTYPE))
+    turned_away: NDArray[np.int64] | None = None
     steps: dict[str, NDArray[Any]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -87,3 +91,18 @@ class Record(Shown):
 def rescue_dtype(scenario: Scenario) -> np.dtype[np.void]:
     """The fields of `Record.rescues`: as many helpers as any victim can have."""
     return np.dtype([*_EVENT, *((f"helper_{k}", np.int64) for k in range(scenario.max_helpers))])
+
+
+def joined(parts: Sequence[Record], fields: Collection[str]) -> Record:
+    """One record of consecutive episodes; what was recorded step by step of ``fields`` alone."""
+    first = parts[0]
+    counts = [part.turned_away for part in parts if part.turned_away is not None]
+    return replace(
+        first,
+        lengths=np.concatenate([part.lengths for part in parts]),
+        rescues=np.concatenate([part.rescues for part in parts]),
+        lost=np.concatenate([part.lost for part in parts]),
+        turned_away=np.concatenate(counts) if counts else None,
+        rewards_total=np.concatenate([part.rewards_total for part in parts]),
+        steps={name: np.concatenate([part.steps[name] for part in parts]) for name in fields},
+    )

@@ -74,6 +74,8 @@ def refuse_impossible(record: Record) -> None:
         if (events["step"] < 0).any() or (events["step"] >= record.lengths[episodes]).any():
             raise ValueError(f"step of a {what}: must be one of its episode")
     _all_within("task of a loss", record.lost["task"], 0, len(scenario.tasks) - 1)
+    if record.turned_away is not None:
+        _all_within("turned away", record.turned_away, 0, _MOST_EPISODE)
     for name, values in {"reward": record.rewards_total, **record.steps}.items():
         for part in [values[field] for field in values.dtype.names or ()] or [values]:
             if not np.isfinite(part).all():

@@ -39,7 +39,11 @@ def _tasks(scenario: Scenario) -> Iterator[str]:
             some = " or ".join(able) if count == 1 else f"{count} of {', '.join(able)}"
             helpers.append(f"{need} ({some})")
         near = f"together within {scenario.rescue_radius_m:g} m"
-        yield f"{task.name}: {' and '.join(helpers)}, {near}{_times(task)}"
+        arrivals = ""
+        if scenario.situation == "poisson":
+            rate, most = task.arrival_rate_hz, scenario.max_victims
+            arrivals = f"; {rate:g} a second arrive, at most {most} wait at once"
+        yield f"{task.name}: {' and '.join(helpers)}, {near}{_times(task)}{arrivals}"
 
 
 def _times(task: Task) -> str:

@@ -154,6 +154,12 @@ impl Batch {
         Ok(rows.into_pyarray(py).call_method1("view", (event_dtype(py, 0)?,))?.unbind())
     }
 
+    fn turned_away<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
+        let mut counts = zeros(self.worlds.num_envs())?;
+        self.worlds.turned_away().for_each(|env| counts[env as usize] += 1);
+        Ok(counts.into_pyarray(py))
+    }
+
     fn reward_components(&self, py: Python) -> Py<PyArray3<f32>> {
         self.outputs.components(py)
     }
@@ -186,9 +192,8 @@ impl Batch {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyArray3<i64>>, Bound<'py, PyArray3<f32>>)> {
-        let slots = self.worlds.rules().scenario.num_victims();
-        let envs = self.worlds.num_envs();
         let rules = self.worlds.rules();
+        let (envs, slots) = (self.worlds.num_envs(), rules.scenario.num_victims());
         let (mut numbers, mut places) = (zeros(envs * slots * 6)?, zeros(envs * slots * 3)?);
         let rows = numbers.chunks_exact_mut(6).zip(places.chunks_exact_mut(3));
         let worlds = self.worlds.worlds();

@@ -149,6 +149,7 @@ impl Shard {
         self.failures.push((env, said(panic)));
         self.events.rescues.retain(|rescue| rescue.env as usize != env);
         self.events.losses.retain(|loss| loss.env as usize != env);
+        self.events.turned_away.retain(|one| *one as usize != env);
         self.workspace = Workspace::default();
         let world = &mut self.worlds[index];
         let again = AssertUnwindSafe(|| world.begin(rules, world.episode));

@@ -24,6 +24,9 @@ pub struct Task {
     /// Names of the tasks that come before it: its victims wait for theirs.
     #[serde(default)]
     pub after: Vec<String>,
+    /// How many of its victims arrive in a second in the poisson situation, on average.
+    #[serde(default)]
+    pub arrival_rate_hz: f64,
 }
 
 impl Task {
@@ -37,6 +40,7 @@ impl Task {
             service: Interrupted::Keep,
             deadline_s: None,
             after: vec![],
+            arrival_rate_hz: 0.0,
         }
     }
 }

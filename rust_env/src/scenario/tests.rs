@@ -241,6 +241,23 @@ fn a_deadline_is_a_number_or_a_pair() {
 }
 
 #[test]
+fn rates_of_arrival_are_for_one_situation_and_slots_are_few() {
+    let refused = |situation, rate, max_victims| {
+        let mut scenario = Scenario { situation, max_victims, ..Scenario::default() };
+        scenario.tasks[1].arrival_rate_hz = rate;
+        scenario.validate().err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    let of = |rest: &str| format!("scenario.tasks[1].arrival_rate_hz = {rest}");
+    assert_eq!(refused(Situation::Poisson, 2.5, 16), "");
+    assert_eq!(refused(Situation::Mixed, 0.0, 32), "");
+    assert_eq!(refused(Situation::Mixed, 0.1, 2), of("0.1: must be 0 but where situation = \"poisson\""));
+    assert!(refused(Situation::Poisson, -1.0, 2).starts_with(&of("-1: must be in 0..=100 1/s")));
+    assert!(refused(Situation::Poisson, f64::NAN, 2).starts_with(&of("NaN: must be")));
+    let slots = "scenario.max_victims = 17: must be at most 16: 2 tasks have 32 slots together";
+    assert_eq!(refused(Situation::Poisson, 1.0, 17), slots);
+}
+
+#[test]
 fn tasks_come_after_known_others_and_never_after_themselves() {
     let after = |first: &[&str], second: &[&str]| {
         refusal(|scenario| {

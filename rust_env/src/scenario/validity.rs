@@ -19,6 +19,7 @@ impl Scenario {
         self.validate_robots()?;
         self.validate_tasks()?;
         self.validate_order()?;
+        self.validate_arrivals()?;
         self.validate_obstacles()?;
         self.validate_faults()?;
         self.validate_sizes()?;

@@ -9,7 +9,7 @@ use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
-    Abilities, Actions, Deadline, Engine, Interrupted, Obstacle, Robot, Scenario, Shape,
+    Abilities, Actions, Deadline, Engine, Interrupted, Obstacle, Robot, Scenario, Shape, Situation,
 };
 use innerattn_env::tasks::{Loss, Rescue};
 
@@ -32,6 +32,7 @@ pub struct Table {
     pub truncated: Vec<bool>,
     pub rescues: Vec<Rescue>,
     pub losses: Vec<Loss>,
+    pub turned_away: Vec<u32>,
 }
 
 impl Table {
@@ -48,6 +49,7 @@ impl Table {
             truncated: vec![false; options.num_envs],
             rescues: vec![],
             losses: vec![],
+            turned_away: vec![],
             batch,
         };
         table.batch.reset(None, None, &mut table.obs);
@@ -65,6 +67,7 @@ impl Table {
         };
         self.rescues = self.batch.step(commands, buffers)?;
         self.losses = self.batch.losses().copied().collect();
+        self.turned_away = self.batch.turned_away().collect();
         Ok(())
     }
 
@@ -109,6 +112,8 @@ impl Table {
             bits.extend([loss.env - from as u32, loss.episode as u32, loss.step, loss.slot]);
             bits.extend([loss.victim, loss.task]);
         }
+        let turned_away = self.turned_away.iter().filter(|env| (from..to).contains(&(**env as usize)));
+        bits.extend(turned_away.map(|env| env - from as u32));
         bits
     }
 }
@@ -179,6 +184,14 @@ pub fn with_order(mut scenario: Scenario) -> Scenario {
     let first = scenario.tasks[0].name.clone();
     scenario.tasks[1..].iter_mut().for_each(|task| task.after = vec![first.clone()]);
     Scenario { rescue_radius_m: 0.4, ..scenario }
+}
+
+/// The same with victims that arrive at random, often more than there are slots.
+pub fn with_arrivals(mut scenario: Scenario) -> Scenario {
+    for (index, task) in scenario.tasks.iter_mut().enumerate() {
+        task.arrival_rate_hz = (1.0 + index as f64) / (4.0 * scenario.dt_s);
+    }
+    Scenario { situation: Situation::Poisson, rescue_radius_m: 0.4, ..scenario }
 }
 
 /// A disc at a random place, a box at a random place, and a box that stays.

@@ -3,6 +3,7 @@
 
 mod common;
 
+mod arrivals;
 mod contacts;
 mod containment;
 mod determinism;

@@ -1,0 +1,128 @@
+//! Victims that arrive at random: how many, in which slots, and that nothing the robots do moves them.
+
+use std::iter::zip;
+
+use innerattn_env::scenario::{Scenario, Situation};
+use innerattn_env::tasks::Victim;
+use proptest::prelude::*;
+
+use crate::common::{Table, chance, options, random_drive, with_arrivals, with_times};
+
+const STILL: [f32; 2] = [0.0, 0.0];
+
+/// Two tasks with these rates, 1/s, whose victims nobody rescues.
+fn hopeless(rates: [f64; 2], max_victims: usize) -> Scenario {
+    let mut scenario = Scenario { situation: Situation::Poisson, max_victims, ..Scenario::default() };
+    for (task, rate) in zip(&mut scenario.tasks, rates) {
+        task.arrival_rate_hz = rate;
+    }
+    Scenario { rescue_radius_m: 0.05, spawn_clearance_m: 0.3, episode_steps: 50, ..scenario }
+}
+
+/// Victims that arrived in each world's step, whether or not they found a slot.
+fn arrived(table: &Table, earlier: &[u32]) -> Vec<usize> {
+    let turned_away = |env: usize| table.turned_away.iter().filter(|one| **one as usize == env).count();
+    let worlds = zip(table.batch.worlds(), earlier).enumerate();
+    worlds.map(|(env, (world, earlier))| (world.appeared - earlier) as usize + turned_away(env)).collect()
+}
+
+fn appeared(table: &Table) -> Vec<u32> {
+    table.batch.worlds().map(|world| world.appeared).collect()
+}
+
+#[test]
+fn the_number_of_arrivals_in_a_time_is_poisson() {
+    let envs = 2000;
+    let mut table = Table::new(hopeless([0.4, 0.15], 2), options(envs, 7));
+    let mut counts = vec![0; envs];
+    for _ in 0..49 {
+        let earlier = appeared(&table);
+        table.step(&vec![STILL; envs * 4]);
+        zip(&mut counts, arrived(&table, &earlier)).for_each(|(count, one)| *count += one);
+    }
+    let expected = 0.55 * 4.9;
+    let mut chance = f64::exp(-expected);
+    let (mut chi_squared, mut rest) = (0.0, 1.0);
+    for number in 0..7 {
+        let found = counts.iter().filter(|count| **count == number).count() as f64;
+        let wanted = envs as f64 * chance;
+        chi_squared += (found - wanted).powi(2) / wanted;
+        rest -= chance;
+        chance *= expected / (number + 1) as f64;
+    }
+    let found = counts.iter().filter(|count| **count >= 7).count() as f64;
+    chi_squared += (found - envs as f64 * rest).powi(2) / (envs as f64 * rest);
+    assert!(chi_squared < 24.3, "{chi_squared}: seven degrees of freedom go beyond it once in a thousand");
+    let held = table.batch.worlds().all(|world| (0..2).all(|task| of_task(&world.victims, task) <= 2));
+    assert!(held && !table.turned_away.is_empty());
+}
+
+fn of_task(victims: &[Option<Victim>], task: u32) -> usize {
+    victims.iter().flatten().filter(|victim| victim.task == task).count()
+}
+
+#[test]
+fn nothing_arrives_at_a_rate_of_nought() {
+    let mut table = Table::new(hopeless([0.0, 0.0], 3), options(3, 1));
+    let width = table.batch.rules().layout.width();
+    let victims = 6 * 6; // columns: presence, three needs, two of the place
+    for _ in 0..120 {
+        table.step(&[[1.0, 0.0]; 12]);
+        assert!(table.batch.worlds().all(|world| world.victims == [None; 6] && world.appeared == 0));
+        assert!(table.obs.chunks(width).all(|row| row[width - victims..].iter().all(|one| *one == 0.0)));
+        assert!(table.reward.iter().all(|reward| *reward == 0.0) && table.turned_away.is_empty());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whoever is there stays as it is; who is new is in a slot of its task that was empty; who is turned away
+    /// finds all of them taken; and as many arrive as where the robots do something else.
+    #[test]
+    fn arrivals_take_empty_slots_of_their_task(seed in 0..10_000_u64, max_victims in 1..5_usize, timed: bool) {
+        const ENVS: usize = 4;
+        let mut scenario = with_arrivals(Scenario { max_victims, ..Scenario::default() });
+        if timed {
+            scenario = with_times(scenario);
+        }
+        let mut table = Table::new(scenario.clone(), options(ENVS, seed));
+        let mut other = Table::new(scenario, options(ENVS, seed));
+        let mut chance = chance(seed);
+        for _ in 0..60 {
+            let before: Vec<_> = table.batch.worlds().map(|world| world.victims.clone()).collect();
+            let earlier = [appeared(&table), appeared(&other)];
+            table.step(&(0..ENVS * 4).map(|_| random_drive(&mut chance)).collect::<Vec<_>>());
+            other.step(&[STILL; ENVS * 4]);
+            if table.truncated[0] {
+                prop_assert!(table.batch.worlds().all(|world| world.victims.iter().all(Option::is_none)));
+                continue;
+            }
+            prop_assert_eq!(arrived(&table, &earlier[0]), arrived(&other, &earlier[1]));
+            for (env, (world, victims)) in zip(table.batch.worlds(), &before).enumerate() {
+                let gone = |slot: usize| {
+                    table.rescues.iter().any(|one| (one.env as usize, one.slot as usize) == (env, slot))
+                        || table.losses.iter().any(|one| (one.env as usize, one.slot as usize) == (env, slot))
+                };
+                for (slot, (old, new)) in zip(victims, &world.victims).enumerate() {
+                    let stays = old.filter(|_| !gone(slot));
+                    match (stays, new) {
+                        (Some(old), new) => {
+                            let new = new.expect("it stays");
+                            prop_assert_eq!((old.id, old.task, old.position), (new.id, new.task, new.position));
+                        }
+                        (None, Some(new)) => {
+                            prop_assert_eq!(new.task as usize, slot / max_victims);
+                            prop_assert_eq!(new.appeared_step, world.step);
+                            prop_assert!(new.id >= earlier[0][env]);
+                        }
+                        (None, None) => {}
+                    }
+                }
+                if table.turned_away.contains(&(env as u32)) {
+                    prop_assert!((0..2).any(|task| of_task(&world.victims, task) == max_victims));
+                }
+            }
+        }
+    }
+}
