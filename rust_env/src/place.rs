@@ -164,14 +164,10 @@ impl Placing {
         Place { clear: place.clear || listed, ..place }
     }
 
-    /// Number of the first listed place that is too near to one of these solids.
+    /// Whether one of these solids is too near for a victim to be there.
     #[must_use]
-    pub fn blocked_place(&self, solids: &[Placed]) -> Option<usize> {
-        let Region::OneOf(places) = &self.victims else { return None };
-        let near = |at: &Vec2| {
-            solids.iter().any(|(solid, centre)| solid.distance(at - centre) < self.wall_clearance)
-        };
-        places.iter().position(near)
+    pub fn is_blocked(&self, at: Vec2, solids: &[Placed]) -> bool {
+        solids.iter().any(|(solid, centre)| solid.distance(at - centre) < self.wall_clearance)
     }
 }
 
@@ -254,8 +250,9 @@ mod tests {
         let near = placing.victim(&mut stream, &listed[1..], &[listed[0]].into_iter(), &[]);
         assert!(near.clear && listed[1..].contains(&near.at), "{near:?}");
         let disc = Solid::Disc(0.2);
-        assert_eq!(placing.blocked_place(&[(&disc, Vec2::new(0.75, -0.9))]), Some(2));
-        assert_eq!(placing.blocked_place(&[(&disc, Vec2::new(0.0, 0.0))]), None);
+        let blocked = |centre| listed.map(|at| placing.is_blocked(at, &[(&disc, centre)]));
+        assert_eq!(blocked(Vec2::new(0.75, -0.9)), [false, false, true]);
+        assert_eq!(blocked(Vec2::new(0.0, 0.0)), [false; 3]);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::observe::Layout;
 use crate::physics::Physics;
 use crate::reward::Weights;
 use crate::robot::{Body, bodies};
-use crate::scenario::Scenario;
+use crate::scenario::{Arrival, Scenario};
 use crate::spawn::{Crowded, Spawn};
 use crate::tasks::Needs;
 use crate::tasks::arrivals::Arrivals;
@@ -84,12 +84,15 @@ impl Rules {
             return Err(too_crowded(&scenario, crowded));
         }
         refuse_tasks_out_of_reach(&scenario, &team, &tasks)?;
-        if let Some(index) = spawn.blocked_place() {
-            return Err(Error::Scenario {
-                key: format!("scenario.victim_places_m[{index}]"),
-                value: format!("{:?}", scenario.victim_places_m[index]),
-                rule: "must be wall_clearance_m away from every obstacle that has a place".into(),
-            });
+        let arriving: Vec<[f64; 2]> = scenario.arrivals.iter().map(|arrival| arrival.position_m).collect();
+        for (places, one) in [(&scenario.victim_places_m, "victim_places_m"), (&arriving, "arrivals")] {
+            if let Some(index) = spawn.blocked_place(places) {
+                return Err(Error::Scenario {
+                    key: format!("scenario.{one}[{index}]"),
+                    value: format!("{:?}", places[index]),
+                    rule: "must be wall_clearance_m away from every obstacle that has a place".into(),
+                });
+            }
         }
         Ok(Self {
             physics: Physics::new(&scenario, &team, &solids),
@@ -135,10 +138,14 @@ fn refuse_tasks_out_of_reach(scenario: &Scenario, team: &[Body], tasks: &[Needs]
         }
         let far =
             |at: &[f64; 2]| !can_reach(needs, team, Vec2::new(at[0] as f32, at[1] as f32), radius, arena);
-        if let Some(index) = scenario.victim_places_m.iter().position(far) {
-            let at = scenario.victim_places_m[index];
+        let arrives_far = |one: &Arrival| one.task == task.name && far(&one.position_m);
+        let place = scenario.victim_places_m.iter().position(far);
+        let place = place.map(|index| ("victim_places_m", index, scenario.victim_places_m[index]));
+        let arrival = scenario.arrivals.iter().position(arrives_far);
+        let arrival = arrival.map(|index| ("arrivals", index, scenario.arrivals[index].position_m));
+        if let Some((one, index, at)) = place.or(arrival) {
             return Err(Error::Scenario {
-                key: format!("scenario.victim_places_m[{index}]"),
+                key: format!("scenario.{one}[{index}]"),
                 value: format!("{at:?}"),
                 rule: format!(
                     "is farther than rescue_radius_m from where helpers of task {} can be; walls keep them off",
@@ -193,7 +200,7 @@ fn processes(scenario: &Scenario) -> Vec<Process> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::{Obstacle, Shape};
+    use crate::scenario::{Obstacle, Shape, Situation};
 
     fn refusal(change: impl Fn(&mut Scenario)) -> String {
         let mut scenario = Scenario::default();
@@ -226,6 +233,17 @@ mod tests {
             refused.starts_with("scenario.victim_places_m[1] = [0.5, 0.5]: must be wall_clear"),
             "{refused}"
         );
+        let refused = refusal(|scenario| {
+            scenario.situation = Situation::Listed;
+            scenario.arrivals = vec![Arrival { at_s: 0.0, task: "task_1".into(), position_m: [0.5, 0.5] }];
+            scenario.obstacles = vec![Obstacle {
+                shape: Shape::Disc,
+                radius_m: Some(0.1),
+                half_extents_m: None,
+                position_m: Some([0.5, 0.65]),
+            }];
+        });
+        assert!(refused.starts_with("scenario.arrivals[0] = [0.5, 0.5]: must be wall_clear"), "{refused}");
         let disc = r#"{"shape": "disc", "radius_m": 0.6}"#;
         let text = format!(r#"{{"obstacles": [{disc}, {disc}, {disc}]}}"#);
         let refused = Rules::from_json(&text).err().map(|error| error.to_string()).unwrap_or_default();

@@ -14,6 +14,8 @@ use crate::error::{Error, Result};
 use crate::fault::Fault;
 
 pub use abilities::{Abilities, reaches};
+pub use arrivals::Arrival;
+pub(crate) use task::steps_of;
 pub use task::{Deadline, Interrupted, Task};
 
 /// Most robots in a team.
@@ -34,6 +36,8 @@ pub const MAX_NEEDS: usize = 8;
 pub const MAX_HELPERS: usize = MAX_ROBOTS;
 /// Least and largest amount of an ability or a need.
 pub const AMOUNTS: (f64, f64) = (1e-6, 1e6);
+/// Most victims in a list of arrivals.
+pub const MAX_ARRIVALS: usize = 1000;
 /// Largest rate at which victims of a task arrive, 1/s.
 pub const MAX_ARRIVAL_RATE_HZ: f64 = 100.0;
 /// Longest service or deadline of a victim, s; no episode takes longer.
@@ -61,6 +65,8 @@ pub enum Situation {
     Mixed,
     /// Victims of each task arrive at random, at its own rate; up to `max_victims` of each wait at once.
     Poisson,
+    /// Victims arrive as the list `arrivals` says; up to `max_victims` of each task wait at once.
+    Listed,
 }
 
 /// What a robot is told to do each step.
@@ -186,8 +192,10 @@ pub struct Scenario {
     pub robots: Vec<Robot>,
     /// The kinds of victims.
     pub tasks: Vec<Task>,
-    /// Most victims of a wave in the mixed situation, and of each task at once where they arrive at random.
+    /// Most victims of a wave in the mixed situation, and of each task at once where they arrive.
     pub max_victims: usize,
+    /// Which victims arrive in the listed situation.
+    pub arrivals: Vec<Arrival>,
     /// Solid things in the arena.
     pub obstacles: Vec<Obstacle>,
     /// Half the side of the square arena, m.
@@ -266,6 +274,7 @@ impl Default for Scenario {
             ],
             tasks: vec![task("task_1", ["food", "medicine"]), task("task_2", ["food", "information"])],
             max_victims: 2,
+            arrivals: vec![],
             obstacles: vec![],
             arena_half_width_m: 1.0,
             rescue_radius_m: 0.15,
@@ -318,14 +327,14 @@ impl Scenario {
     }
 
     /// Slots for victims: 1 in single, one per task in double, `max_victims` in mixed, `max_victims` per task
-    /// in poisson.
+    /// where they arrive.
     #[must_use]
     pub fn num_victims(&self) -> usize {
         match self.situation {
             Situation::Single => 1,
             Situation::Double => self.tasks.len(),
             Situation::Mixed => self.max_victims,
-            Situation::Poisson => self.tasks.len() * self.max_victims,
+            Situation::Poisson | Situation::Listed => self.tasks.len() * self.max_victims,
         }
     }
 

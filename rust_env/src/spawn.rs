@@ -9,6 +9,7 @@ use crate::rng::{Purpose, Stream};
 use crate::robot::Body;
 use crate::scenario::{Scenario, Situation};
 use crate::tasks::Victim;
+use crate::tasks::arrivals::Due;
 
 /// How often everything is drawn for one start. A scenario in which a draw fails more often than about once in
 /// twenty is refused, see [`Spawn::find_crowding`]; so 64 draws fail in none of 10^80 starts.
@@ -113,7 +114,7 @@ impl Spawn {
         match self.situation {
             Situation::Single | Situation::Double => slots.iter().any(Option::is_none),
             Situation::Mixed => slots.iter().all(Option::is_none),
-            Situation::Poisson => false, // they come by themselves, see `place_arrivals`
+            Situation::Poisson | Situation::Listed => false, // they come by themselves, see `place_arrivals`
         }
     }
 
@@ -139,7 +140,7 @@ impl Spawn {
         match self.situation {
             Situation::Single | Situation::Mixed => 0..=self.num_tasks - 1,
             Situation::Double => slot..=slot,
-            Situation::Poisson => slot / self.slots_per_task..=slot / self.slots_per_task,
+            Situation::Poisson | Situation::Listed => slot / self.slots_per_task..=slot / self.slots_per_task,
         }
     }
 
@@ -179,16 +180,16 @@ impl Spawn {
         let mut clear = true;
         let solids = self.placed(obstacles);
         let wanted = match self.situation {
-            Situation::Single | Situation::Double | Situation::Poisson => slots.len(),
             Situation::Mixed => 1 + stream.below(slots.len()),
+            _ => slots.len(),
         };
         for index in 0..wanted {
             if slots[index].is_some() {
                 continue;
             }
             let task = match self.situation {
-                Situation::Double | Situation::Poisson => *self.tasks_of_slot(index).start(),
                 Situation::Single | Situation::Mixed => stream.below(self.num_tasks),
+                _ => *self.tasks_of_slot(index).start(),
             };
             let others = slots.iter().flatten().map(|victim| victim.position);
             let place = self.placing.victim(stream, robots, &others, &solids);
@@ -199,13 +200,13 @@ impl Spawn {
         clear
     }
 
-    /// Lets victims of the tasks `due` appear at `step`, each in the first empty slot of its task, and counts
+    /// Lets the victims `due` appear at `step`, each in the first empty slot of its task, and counts
     /// them in `appeared`. Returns how many find none.
     #[allow(clippy::too_many_arguments)]
     pub fn place_arrivals(
         &self,
         stream: &mut Stream,
-        due: impl Iterator<Item = usize>,
+        due: impl Iterator<Item = Due>,
         step: u32,
         appeared: &mut u32,
         robots: &[Vec2],
@@ -214,26 +215,27 @@ impl Spawn {
     ) -> usize {
         let solids = self.placed(obstacles);
         let mut turned_away = 0;
-        for task in due {
+        for Due { task, place } in due {
             let mut own = task * self.slots_per_task..(task + 1) * self.slots_per_task;
             let Some(slot) = own.find(|slot| slots[*slot].is_none()) else {
                 turned_away += 1;
                 continue;
             };
             let others = slots.iter().flatten().map(|victim| victim.position);
-            let place = self.placing.victim(stream, robots, &others, &solids);
-            slots[slot] = Some(Victim::new(*appeared, task as u32, step, place.at));
+            let at = place.unwrap_or_else(|| self.placing.victim(stream, robots, &others, &solids).at);
+            slots[slot] = Some(Victim::new(*appeared, task as u32, step, at));
             *appeared += 1;
         }
         turned_away
     }
 
-    /// Number of the first listed place of victims that is too near to an obstacle with a given place.
+    /// Number of the first of these places that is too near to an obstacle with a given place for a victim.
     #[must_use]
-    pub fn blocked_place(&self) -> Option<usize> {
+    pub fn blocked_place(&self, wanted: &[[f64; 2]]) -> Option<usize> {
         let fixed = self.solids.iter().zip(&self.given);
         let placed: Vec<Placed> = fixed.filter_map(|(solid, at)| at.map(|at| (solid, at))).collect();
-        self.placing.blocked_place(&placed)
+        let near = |at: &[f64; 2]| self.placing.is_blocked(Vec2::new(at[0] as f32, at[1] as f32), &placed);
+        wanted.iter().position(near)
     }
 
     /// What does not fit into the arena in some of 64 trial episodes, if anything.
@@ -249,7 +251,9 @@ impl Spawn {
                 Some(Crowded::Obstacles)
             } else if !self.place_robots(&mut start, &obstacles, &mut robots) {
                 Some(Crowded::Robots)
-            } else if !self.place_victims(&mut victims, 0, &mut 0, &robots, &obstacles, &mut slots) {
+            } else if self.situation != Situation::Listed // whose places are given
+                && !self.place_victims(&mut victims, 0, &mut 0, &robots, &obstacles, &mut slots)
+            {
                 Some(Crowded::Victims)
             } else {
                 None

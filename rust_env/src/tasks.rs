@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::Vec2;
 use crate::matching::{bits, fillable};
 use crate::robot::Body;
-use crate::scenario::{MAX_HELPERS, MAX_NEEDS, Scenario, Task};
+use crate::scenario::{MAX_HELPERS, MAX_NEEDS, Scenario, Task, steps_of};
 use sums::Sums;
 
 /// Robots that help one victim, in the order of its needs, or nearest first where these are sums.
@@ -51,11 +51,6 @@ impl Victim {
     pub fn new(id: u32, task: u32, appeared_step: u32, position: Vec2) -> Self {
         Self { id, task, appeared_step, position, served_steps: 0, deadline_step: never() }
     }
-}
-
-/// Control steps until `seconds` have passed: the first whole number of periods that reaches them.
-fn steps_of(seconds: f64, dt_s: f64) -> u32 {
-    (seconds / dt_s * (1.0 - 1e-12)).ceil() as u32 // 0.3 / 0.1 is a little more than 3
 }
 
 /// A task's needs as ability numbers, in the order the scenario names them.

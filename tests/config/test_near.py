@@ -32,7 +32,7 @@ def test_nothing_is_said_where_nothing_is_near() -> None:
     ("fields", "end"),
     [
         ({"situaton": "mixed"}, "scenario.situaton: unknown key, did you mean situation?"),
-        ({"situation": "mxied"}, "'mixed' or 'poisson', did you mean 'mixed'?"),
+        ({"situation": "mxied"}, "'poisson' or 'listed', did you mean 'mixed'?"),
         (
             {"faults": [{"robot": "food_0", "kind": "blackot", "value": 1.0}]},
             "'lost_communication', did you mean 'blackout'?",

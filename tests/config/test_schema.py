@@ -10,7 +10,16 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from innerattn.config import Fault, Obstacle, Robot, Scenario, Task, load_run_config, write_toml
+from innerattn.config import (
+    Arrival,
+    Fault,
+    Obstacle,
+    Robot,
+    Scenario,
+    Task,
+    load_run_config,
+    write_toml,
+)
 from innerattn.config.files import PRESETS
 from innerattn.config.model import Told
 from innerattn.config.schema import COPIES, SCHEMAS, schema_text, write_copies
@@ -96,7 +105,9 @@ def test_ranges_are_those_that_the_compiled_module_checks(part: str, name: str) 
         key[end] for end in (("minItems", "maxItems") if of_list else ("minimum", "maximum"))
     )
     holder = scenario[part][0] if part else scenario
-    some = [*(holder[name] or [{"shape": "disc", "radius_m": 0.05}])][:1] if of_list else []
+    arrival = {"at_s": 1.0, "task": "task_1", "position_m": [0.5, 0.5]}
+    absent = arrival if name == "arrivals" else {"shape": "disc", "radius_m": 0.05}
+    some = [*(holder[name] or [absent])][:1] if of_list else []
     beyond = [high + 1, low - 1] if of_list or key["type"] == "integer" else [1.1 * high, low - 1.0]
     for value in beyond:
         if value < 0 and (of_list or key["type"] == "integer"):
@@ -119,7 +130,7 @@ def test_every_number_of_a_scenario_has_a_range() -> None:
         "onset_step",
         "value",
     }
-    for model in (Scenario, Robot, Task, Obstacle, Fault):
+    for model in (Scenario, Robot, Task, Arrival, Obstacle, Fault):
         for name, key in model.model_json_schema()["properties"].items():
             kinds = [
                 one for one in key.get("anyOf", [key]) if one.get("type") in ("number", "integer")

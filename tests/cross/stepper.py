@@ -83,6 +83,12 @@ class Stepper:
         low, high = given if isinstance(given, tuple) else (given, given)
         return self._periods(low), self._periods(high)
 
+    def due(self, task: int, step: int) -> list[tuple[float, float]]:
+        """Places of the victims of a task that a list lets arrive with the last of these steps."""
+        name = self.scenario.tasks[task].name
+        all_of = [one for one in self.scenario.arrivals if one.task == name]
+        return [one.position_m for one in all_of if self._periods(one.at_s) == step]
+
     def drive(self, actions: NDArray[Any]) -> Array:
         """Directions whose length is the share of full force, (E, R, 2)."""
         if self.scenario.actions == "discrete":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from innerattn.config import Obstacle, Robot, Scenario, Task
+from innerattn.config import Arrival, Obstacle, Robot, Scenario, Task
 
 SIZES = (1, 2, 3, 4, 4, 5, 8, 12, 20, 64)
 
@@ -117,6 +117,28 @@ def with_arrivals(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     )
     most = min(scenario.max_victims, 32 // len(tasks))
     return scenario.replace(situation="poisson", tasks=tasks, max_victims=most)
+
+
+def with_list(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, where victims arrive from a list, often several of a task at the same time."""
+    most = min(scenario.max_victims, 32 // len(scenario.tasks))
+    reach = scenario.arena_half_width_m - scenario.wall_clearance_m
+    listed, taken = [], dict[tuple[int, str], int]()
+    for _ in range(rng.integers(0, 60)):
+        name, step = scenario.tasks[rng.integers(len(scenario.tasks))].name, int(rng.integers(40))
+        taken[step, name] = taken.get((step, name), 0) + 1
+        if taken[step, name] <= most:
+            at_s = max(0.0, step - rng.choice((0.0, 0.4, 0.9))) * scenario.dt_s
+            # Beside the obstacle that has a place.
+            place = (
+                float(rng.uniform(-reach, reach)),
+                float(rng.choice((-1, 1)) * rng.uniform(0.21, reach)),
+            )
+            listed.append(Arrival(at_s=at_s if step else 0.0, task=name, position_m=place))
+    obstacles = tuple(one for one in scenario.obstacles if one.position_m is not None)
+    return scenario.replace(
+        situation="listed", max_victims=most, arrivals=tuple(listed), obstacles=obstacles
+    )
 
 
 def with_order(scenario: Scenario, rng: np.random.Generator) -> Scenario:

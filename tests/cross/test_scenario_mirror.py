@@ -8,19 +8,21 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from innerattn import _core
-from innerattn.config import Fault, Obstacle, Robot, Scenario, Task
+from innerattn.config import Arrival, Fault, Obstacle, Robot, Scenario, Task
 from innerattn.envs.batch import FAULT_KINDS
 
 ROBOT = {"name": "one", "kind": "any", "abilities": [], "max_speed_mps": 1.0, "mass_kg": 1.0}
 OBSTACLE = {"shape": "disc", "radius_m": 0.1}
 TASK = {"name": "task", "needs": ["food"]}
 FAULT = {"robot": "food_0", "kind": "motor_gain", "value": 0.5}
+ARRIVAL = {"at_s": 1.5, "task": "task_1", "position_m": [0.25, -0.5]}
 TEAM = Scenario().model_dump(mode="json")["robots"]
 NESTED = {
     "robots": (Robot, ROBOT),
     "tasks": (Task, TASK),
     "obstacles": (Obstacle, OBSTACLE),
     "faults": (Fault, FAULT),
+    "arrivals": (Arrival, ARRIVAL),
 }
 CHOICES = [
     (name, get_args(field.annotation))
@@ -35,7 +37,8 @@ def compiled(table: dict) -> dict:
 
 def within(key: str, item: dict) -> dict:
     """A scenario with `item` in the list `key`; the default team stays so that tasks are served."""
-    return {key: [*TEAM, item] if key == "robots" else [item]}
+    listed = {"situation": "listed"} if key == "arrivals" else {}
+    return {key: [*TEAM, item] if key == "robots" else [item], **listed}
 
 
 def test_defaults_agree_for_every_key_both_ways() -> None:
@@ -187,8 +190,9 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         "faults": [{**FAULT, "onset_step": 3, "onset_rate_hz": 0.5, "duration_steps": 7}],
         "observe_faults": True,
     }
-    # Friction needs one engine, and an area excludes a list of places.
-    assert changed.keys() == Scenario.model_fields.keys() - {"engine", "victim_places_m"}
+    # Friction needs one engine, an area excludes a list of places, and a rate one of arrivals.
+    others = {"engine", "victim_places_m", "arrivals"}
+    assert changed.keys() == Scenario.model_fields.keys() - others
     scenario = Scenario.model_validate(changed)
     default = Scenario()
     for key in changed:
@@ -198,6 +202,9 @@ def test_every_value_survives_the_way_there_and_back() -> None:
     listed = {**changed, "max_victims": 1, "victim_places_m": [[0.5, 0.25], [-1.5, 0.0]]}
     assert compiled(listed) == Scenario.model_validate(listed).model_dump(mode="json")
     assert compiled(listed)["victim_places_m"] == listed["victim_places_m"]
+    arriving = {"situation": "listed", "arrivals": [ARRIVAL, {**ARRIVAL, "task": "task_2"}]}
+    assert compiled(arriving) == Scenario.model_validate(arriving).model_dump(mode="json")
+    assert compiled(arriving)["arrivals"] == arriving["arrivals"]
 
 
 def test_models_are_all_mirrored() -> None:

@@ -5,7 +5,14 @@ from collections import Counter
 import numpy as np
 import pytest
 from stepper import State, Stepper
-from teams import random_scenario, with_amounts, with_arrivals, with_order, with_times
+from teams import (
+    random_scenario,
+    with_amounts,
+    with_arrivals,
+    with_list,
+    with_order,
+    with_times,
+)
 
 from innerattn.config import Scenario, Task
 from innerattn.envs import BatchEnv
@@ -78,7 +85,7 @@ def check_victims(
     assert (new["present"][~empty] == stays[~empty]).all()
     fresh = new["present"] & ~stays
     if scenario.has_arrivals:
-        check_arrivals(env, new, stays)
+        check_arrivals(env, new, stays, env.turned_away())
     elif scenario.situation == "mixed":
         size = new["present"][empty].sum(1)
         assert (size >= 1).all()
@@ -90,9 +97,11 @@ def check_victims(
     assert np.isin(new["task"][new["present"]], np.arange(len(scenario.tasks))).all()
     envs = np.nonzero(fresh)[0]
     assert (new["appeared_step"][fresh] == env.step_counts()[envs]).all()
-    # Numbers go on from the last one given, in order of slots.
+    # Numbers go on from the last one given, in order of slots, or of a list.
     order = np.cumsum(fresh, axis=1)[fresh] - 1
-    assert (new["id"][fresh] == given[envs] + order).all()
+    ids = new["id"][fresh]
+    ids = ids[np.lexsort((ids, envs))] if scenario.arrivals else ids
+    assert (ids == given[envs] + order).all()
     if scenario.has_deadlines:
         plain = Stepper(scenario)
         for victim in new[fresh]:
@@ -102,24 +111,35 @@ def check_victims(
     at = after.places[fresh]
     assert (abs(at) <= scenario.arena_half_width_m - scenario.wall_clearance_m + EXACT).all()
     apart = np.linalg.norm(after.positions[envs] - at[:, None], axis=-1)
-    assert (apart >= scenario.spawn_clearance_m - EXACT).all()
+    assert (apart >= scenario.spawn_clearance_m - EXACT).all() or scenario.arrivals
     return int(fresh.sum())
 
 
-def check_arrivals(env: BatchEnv, victims: np.ndarray, stays: np.ndarray) -> None:
-    """Checks the slots (E, V) of those that arrived, and of those that found none."""
-    scenario = env.scenario
+def check_arrivals(
+    env: BatchEnv, victims: np.ndarray, stays: np.ndarray, turned_away: np.ndarray
+) -> None:
+    """Checks the slots (E, V) of those that arrived, and how many (E,) found none."""
+    scenario, plain_world = env.scenario, Stepper(env.scenario)
     there, full = victims["present"], np.zeros(len(victims), dtype=bool)
+    without = np.zeros(len(victims), dtype=int)
     for task, plain in enumerate(scenario.tasks):
         own = slice(task * scenario.max_victims, (task + 1) * scenario.max_victims)
         assert (victims["task"][:, own][there[:, own]] == task).all()
-        full |= there[:, own].all(1) & (plain.arrival_rate_hz > 0)
+        listed = any(one.task == plain.name for one in scenario.arrivals)
+        full |= there[:, own].all(1) & (plain.arrival_rate_hz > 0 or listed)
         fresh = there[:, own] & ~stays[:, own]
-        assert not fresh.any() or plain.arrival_rate_hz
+        assert not fresh.any() or plain.arrival_rate_hz > 0 or listed
         # They take the first of the empty slots.
         empty = np.cumsum(~stays[:, own], axis=1) * ~stays[:, own]
         assert (fresh == ((empty > 0) & (empty <= fresh.sum(1)[:, None]))).all()
-    assert full[env.turned_away() > 0].all()
+        for world, step in enumerate(env.step_counts() if listed else ()):
+            due, new = plain_world.due(task, step), victims[world, own][fresh[world]]
+            assert len(new) == min(len(due), int((empty[world] > 0).sum()))
+            places = np.stack([new["x"], new["y"]], -1)
+            np.testing.assert_array_equal(places, np.reshape(due, (-1, 2))[: len(new)].astype("f4"))
+            without[world] += len(due) - len(new)
+    assert full[turned_away > 0].all()
+    assert scenario.situation != "listed" or (turned_away == without).all()
 
 
 def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = False) -> Counter[str]:
@@ -136,6 +156,9 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
     env.reset()
     healthy = env.fault_state()
     given = env.victims()["present"].sum(1)
+    if scenario.has_arrivals:
+        start = env.victims()
+        check_arrivals(env, start, np.zeros(start.shape, bool), np.zeros(num_envs, int))
     rescued = np.zeros(num_envs, dtype=int)
     for _ in range(-(-transitions // num_envs)):
         if faulty:
@@ -207,7 +230,8 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         rewards["contact"] = contact
         wanted = np.stack([rewards[name] for name in env.reward_component_names], axis=-1)
         # Sums of float32 distances are as exact as the sums are large.
-        size = 1.0 + plain.total_distance(before, before.positions).max()
+        sums = [plain.total_distance(one, one.positions) for one in (before, after)]
+        size = 1.0 + np.max(sums)
         assert_close(parts, wanted, "reward components", scale=size)
         assert_close(result.reward, wanted.sum(-1), "reward", scale=size + scenario.rescue_reward)
 
@@ -308,7 +332,8 @@ def test_worlds_in_which_victims_arrive_are_as_the_plain_stepper_says(chunk: int
     total: Counter[str] = Counter()
     rng = np.random.default_rng(500 + chunk)
     while total["transitions"] < 12_000:
-        scenario = with_arrivals(random_scenario(rng), rng)
+        arriving = (with_arrivals, with_list)[rng.integers(2)]
+        scenario = arriving(random_scenario(rng), rng)
         if rng.random() < 0.5:
             scenario = with_times(with_order(scenario, rng), rng)
         some = min(1000, 20_000 // len(scenario.robots))

@@ -111,6 +111,20 @@ def test_a_victim_is_added_where_there_is_room() -> None:
         found.add_victim(0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize("situation", ["poisson", "listed"])
+def test_a_victim_is_added_in_a_slot_of_its_task(situation: str) -> None:
+    found = world(Scenario.preset("mixed").replace(situation=situation, max_victims=2))
+    for _ in range(2):
+        found.add_victim(1, 0.1, 0.2)
+    assert found.moment().victims["present"].tolist() == [False, False, True, True]
+    with pytest.raises(ValueError, match="all 2 places for victims are taken"):
+        found.add_victim(1, 0.0, 0.0)
+    found.add_victim(0, 0.0, 0.0)
+    assert found.moment().victims["present"].tolist() == [True, False, True, True]
+    with pytest.raises(ValueError, match="places for victims are taken"):
+        found.add_victim(2, 0.0, 0.0)
+
+
 Attempt = Callable[[InteractiveWorld], None]
 REFUSED: list[tuple[str, Attempt]] = [
     (r"robot = 4: must be in 0\.\.=3", lambda w: w.move_robot(4, 0, 0)),

@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from innerattn.config import Scenario
+from innerattn.config import Arrival, Scenario
 from innerattn.config.streams import stream_seed
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
@@ -21,6 +21,15 @@ WORLDS = PLAIN.replace(
     situation="poisson",
     tasks=tuple(task.replace(arrival_rate_hz=1.5) for task in PLAIN.tasks),
     end_when_rescued=2,
+)
+
+LISTED = PLAIN.replace(
+    situation="listed",
+    arrivals=(
+        Arrival(at_s=0.0, task="task_2", position_m=(0.5, 0.5)),
+        Arrival(at_s=0.6, task="task_1", position_m=(-0.5, 0.25)),
+        Arrival(at_s=0.25, task="task_1", position_m=(0.0, -0.5)),
+    ),
 )
 
 
@@ -38,6 +47,23 @@ def test_counts_are_those_of_the_worlds() -> None:
     assert [*parts[0].turned_away, *parts[1].turned_away] == counts
     assert measures_of(*parts)["turned_away"] == sum(counts) > 10
     assert len({*parts[0].lengths}) > 1
+
+
+@pytest.mark.parametrize("situation", ["poisson", "listed"])
+def test_waiting_is_from_arrival_to_rescue(situation: str) -> None:
+    worlds = WORLDS if situation == "poisson" else LISTED
+    record = run_episodes(scripted_policy("greedy", worlds), worlds, 60, 8, record=("victims",))
+    waited, victims = [], record.steps["victims"]
+    for rescue in record.rescues:
+        row = victims[rescue["episode"], :, rescue["slot"]]
+        there = row["present"] & (row["id"] == rescue["victim"])
+        arrived = int(np.flatnonzero(there)[0])  # seen at the start of the step after
+        waited.append((int(rescue["step"]) + 1 - arrived) * 0.1)
+        if situation == "listed":
+            assert arrived in (0, 3, 6)
+    assert len(waited) > 40
+    found = measures_of(record)["time_to_rescue_s"]
+    assert found.mean == pytest.approx(np.mean(waited))
 
 
 def test_other_worlds_turn_nobody_away() -> None:

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from innerattn.config import Scenario
+from innerattn.config import Arrival, Scenario
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.errors import ConfigError
 from innerattn.report.scenario_words import _WHAT, scenario_words
@@ -99,6 +99,11 @@ def test_how_many_arrive() -> None:
     assert first.endswith("within 0.15 m; 0.25 a second arrive, at most 3 wait at once")
     assert second.endswith("within 0.15 m; 0 a second arrive, at most 3 wait at once")
     assert "arrive" not in scenario_words(plain)
+    arrival = Arrival(at_s=1.0, task="task_2", position_m=(0.5, 0.5))
+    listed = plain.replace(situation="listed", arrivals=(arrival,))
+    first, second = scenario_words(listed).splitlines()[:2]
+    assert first.endswith("; 0 arrive, at most 2 wait at once")
+    assert second.endswith("; 1 arrive, at most 2 wait at once")
 
 
 def test_what_a_task_waits_for() -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         NetworkConfig,
         TrainConfig,
     )
-    from innerattn.config.task import Task
+    from innerattn.config.task import Arrival, Task
     from innerattn.config.td import TDConfig
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "SCENARIOS",
     "Algorithm",
     "AlgorithmConfig",
+    "Arrival",
     "EvaluateConfig",
     "Fault",
     "ImitationConfig",
@@ -54,6 +55,7 @@ __getattr__ = lazy_names(
     {
         "Algorithm": "algorithm",
         "AlgorithmConfig": "algorithm",
+        "Arrival": "task",
         "BUDGETS": "run",
         "EvaluateConfig": "sections",
         "Fault": "scenario",

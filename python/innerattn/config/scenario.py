@@ -18,7 +18,7 @@ from innerattn.config.amounts import Amounts, list_or_table
 from innerattn.config.files import preset_names, preset_table, toml_table
 from innerattn.config.model import ADDED_LATER, Model, Told, config_error
 from innerattn.config.near import did_you_mean
-from innerattn.config.task import Task
+from innerattn.config.task import Arrival, Task
 from innerattn.errors import ConfigError
 from innerattn.shown import Shown
 
@@ -168,11 +168,11 @@ class Scenario(Model, Shown):
 
     place: ClassVar[str] = "scenario"
 
-    situation: Literal["single", "double", "mixed", "poisson"] = Field(
+    situation: Literal["single", "double", "mixed", "poisson", "listed"] = Field(
         "mixed",
         description="single: one victim at a time; double: one of each task, always; "
         "mixed: waves of 1 to max_victims victims of random tasks; poisson: victims of each task "
-        "arrive at random, at the task's arrival_rate_hz",
+        "arrive at random, at the task's arrival_rate_hz; listed: victims arrive as arrivals says",
     )
     robots: Annotated[tuple[Robot, ...], Told(1, 64)] = Field(
         default_factory=_default_team, description="the team"
@@ -181,7 +181,10 @@ class Scenario(Model, Shown):
         default_factory=_default_tasks, description="kinds of victim"
     )
     max_victims: Annotated[Count, Told(1, 32)] = Field(
-        2, description="most victims of a wave in mixed, and of each task at once in poisson"
+        2, description="most victims of a wave in mixed, and of each task at once where they arrive"
+    )
+    arrivals: Annotated[tuple[Arrival, ...], ADDED_LATER, Told(0, 1_000)] = Field(
+        (), description="which victims arrive in listed, and when"
     )
     obstacles: Annotated[tuple[Obstacle, ...], Told(0, 64)] = Field(
         (), description="fixed bodies in the way"
@@ -356,4 +359,9 @@ class Scenario(Model, Shown):
     @property
     def has_arrivals(self) -> bool:
         """Whether victims arrive whatever becomes of others, so that some may find no slot."""
-        return self.situation == "poisson"
+        return self.situation in ("poisson", "listed")
+
+    @property
+    def only_places_m(self) -> tuple[tuple[float, float], ...]:
+        """The only places at which victims appear [m]; none: any."""
+        return self.victim_places_m or tuple(one.position_m for one in self.arrivals)

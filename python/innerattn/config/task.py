@@ -1,4 +1,4 @@
-"""The tasks of a rescue world: kinds of victims."""
+"""The tasks of a rescue world: kinds of victims, and when these arrive."""
 
 from __future__ import annotations
 
@@ -11,6 +11,16 @@ from innerattn.config.amounts import Amounts, list_or_table
 from innerattn.config.model import ADDED_LATER, Model, Told
 
 _Seconds = Annotated[float, Told(0.001, 1e6)]
+
+
+class Arrival(Model):
+    """A victim that arrives at a given time."""
+
+    at_s: Annotated[float, Told(0.0, 1e6)] = Field(
+        description="when it arrives, after the start of an episode [s]"
+    )
+    task: str = Field(description="name of its task")
+    position_m: tuple[float, float] = Field(description="where it is, inside wall_clearance_m [m]")
 
 
 class Task(Model):

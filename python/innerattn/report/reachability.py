@@ -30,10 +30,10 @@ def closed_off(scenario: Scenario) -> Iterator[str]:
     for need in needs:
         able = [robot for robot in scenario.robots if need in robot.abilities]
         near = np.any([_near(scenario, robot) for robot in able], axis=0)
-        for x, y in scenario.victim_places_m:
+        for x, y in scenario.only_places_m:
             if not near[_cell(scenario, x, y)]:
                 yield f"place ({x:g}, {y:g}): obstacles keep every robot with {need} away from it"
-        if not scenario.victim_places_m:
+        if not scenario.only_places_m:
             area = _area(scenario)
             share = float((area & ~near).sum() / max(1, area.sum()))
             if share > _LEAST_SHARE:

@@ -25,7 +25,7 @@ def scenario_map(scenario: Scenario) -> str:
         (_column(at[0], half), _row(at[1], half)): letter
         for letter, at in zip(_letters(), _starts(scenario), strict=False)
     }
-    places = {(_column(x, half), _row(y, half)) for x, y in scenario.victim_places_m}
+    places = {(_column(x, half), _row(y, half)) for x, y in scenario.only_places_m}
     for row in range(_ROWS):
         y = half * (1.0 - 2.0 * (row + 0.5) / _ROWS)
         cells = []
@@ -49,7 +49,7 @@ def _legend(scenario: Scenario) -> Iterator[str]:
     for letter, robot in zip(_letters(), placed, strict=False):
         offers = ", ".join(in_words(robot.abilities)) or "no ability"
         yield f"{letter}  {robot.name} starts here ({offers})"
-    if scenario.victim_places_m:
+    if scenario.only_places_m:
         yield f"{_PLACE}  a victim may appear here"
     else:
         yield f"{_AREA}  victims appear here"
@@ -93,7 +93,7 @@ def _covers(obstacle: Obstacle, x: float, y: float) -> bool:
 
 
 def _may_appear(scenario: Scenario, x: float, y: float) -> bool:
-    if scenario.victim_places_m:
+    if scenario.only_places_m:
         return False
     reach = scenario.arena_half_width_m - scenario.wall_clearance_m
     left, bottom, right, top = scenario.victim_area_m or (-reach, -reach, reach, reach)

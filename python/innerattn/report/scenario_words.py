@@ -40,9 +40,11 @@ def _tasks(scenario: Scenario) -> Iterator[str]:
             helpers.append(f"{need} ({some})")
         near = f"together within {scenario.rescue_radius_m:g} m"
         arrivals = ""
-        if scenario.situation == "poisson":
-            rate, most = task.arrival_rate_hz, scenario.max_victims
-            arrivals = f"; {rate:g} a second arrive, at most {most} wait at once"
+        if scenario.has_arrivals:
+            number = str(sum(one.task == task.name for one in scenario.arrivals))
+            if scenario.situation == "poisson":
+                number = f"{task.arrival_rate_hz:g} a second"
+            arrivals = f"; {number} arrive, at most {scenario.max_victims} wait at once"
         yield f"{task.name}: {' and '.join(helpers)}, {near}{_times(task)}{arrivals}"
 
 

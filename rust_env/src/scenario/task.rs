@@ -76,3 +76,8 @@ impl Deadline {
         }
     }
 }
+
+/// Control steps until `seconds` have passed: the first whole number of periods that reaches them.
+pub(crate) fn steps_of(seconds: f64, dt_s: f64) -> u32 {
+    (seconds / dt_s * (1.0 - 1e-12)).ceil() as u32 // 0.3 / 0.1 is a little more than 3
+}

@@ -258,6 +258,35 @@ fn rates_of_arrival_are_for_one_situation_and_slots_are_few() {
 }
 
 #[test]
+fn a_list_of_arrivals_names_tasks_times_and_places() {
+    let refused = |change: &dyn Fn(&mut Scenario)| {
+        let one = Arrival { at_s: 1.5, task: "task_2".into(), position_m: [0.5, -0.9] };
+        let arrivals = vec![Arrival { at_s: 1.41, ..one.clone() }, one.clone(), one];
+        let mut scenario = Scenario { situation: Situation::Listed, arrivals, ..Scenario::default() };
+        scenario.max_victims = 3;
+        change(&mut scenario);
+        scenario.validate().err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    assert_eq!(refused(&|_| ()), "");
+    assert_eq!(refused(&|scenario| scenario.arrivals.clear()), "");
+    let number = "scenario.arrivals (their number) = 3: must be 0 but where situation = \"listed\"";
+    assert_eq!(refused(&|scenario| scenario.situation = Situation::Poisson), number);
+    let times = refused(&|scenario| scenario.arrivals[1].at_s = -0.1);
+    assert_eq!(times, "scenario.arrivals[1].at_s = -0.1: must be in 0..=1000000 s");
+    let place = refused(&|scenario| scenario.arrivals[2].position_m[1] = 0.95);
+    assert_eq!(place, "scenario.arrivals[2].position_m[1] = 0.95: must be in -0.9..=0.9 m");
+    let task = refused(&|scenario| scenario.arrivals[0].task = "fire".into());
+    assert_eq!(task, "scenario.arrivals[0].task = \"fire\": no such task; the scenario has task_1, task_2");
+    let many =
+        "scenario.arrivals[2].at_s = 1.5: 3 of task \"task_2\" in one control step; at most max_victims = 2";
+    assert_eq!(refused(&|scenario| scenario.max_victims = 2), many);
+    let obstacle =
+        Obstacle { shape: Shape::Disc, radius_m: Some(0.1), half_extents_m: None, position_m: None };
+    let somewhere = refused(&|scenario| scenario.obstacles = vec![obstacle.clone()]);
+    assert!(somewhere.starts_with("scenario.obstacles[0].position_m = none: must be given"), "{somewhere}");
+}
+
+#[test]
 fn tasks_come_after_known_others_and_never_after_themselves() {
     let after = |first: &[&str], second: &[&str]| {
         refusal(|scenario| {

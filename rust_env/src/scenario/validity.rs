@@ -19,12 +19,12 @@ impl Scenario {
         self.validate_robots()?;
         self.validate_tasks()?;
         self.validate_order()?;
-        self.validate_arrivals()?;
         self.validate_obstacles()?;
         self.validate_faults()?;
         self.validate_sizes()?;
         self.validate_starts()?;
-        self.validate_victim_places()
+        self.validate_victim_places()?;
+        self.validate_arrivals()
     }
 
     fn validate_numbers(&self) -> Result<()> {

@@ -2,17 +2,30 @@
 
 use std::iter::repeat_n;
 
+use super::steps_of;
+use crate::geometry::Vec2;
 use crate::rng::{Purpose, Stream};
-use crate::scenario::{Scenario, Situation};
+use crate::scenario::{Arrival, Scenario, Situation};
 
 /// Words of the stream for each task and step.
 const WORDS: u64 = 2;
 
+/// A victim that arrives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Due {
+    /// Index of its task.
+    pub task: usize,
+    /// Where it is, m; a random place if absent.
+    pub place: Option<Vec2>,
+}
+
 /// The arrivals of a scenario.
 #[derive(Debug, Clone)]
 pub struct Arrivals {
-    /// By task, how many arrive in a control step on average.
+    /// By task, how many arrive at random in a control step on average; none from a list.
     expected: Vec<f64>,
+    /// Those of a list in order of time, with the steps done when they arrive.
+    listed: Vec<(u32, Due)>,
 }
 
 impl Arrivals {
@@ -20,17 +33,40 @@ impl Arrivals {
     #[must_use]
     pub(crate) fn new(scenario: &Scenario) -> Option<Self> {
         let expected = scenario.tasks.iter().map(|task| task.arrival_rate_hz * scenario.dt_s).collect();
-        (scenario.situation == Situation::Poisson).then_some(Self { expected })
+        match scenario.situation {
+            Situation::Poisson => Some(Self { expected, listed: vec![] }),
+            Situation::Listed => Some(Self { expected: vec![], listed: listed(scenario) }),
+            Situation::Single | Situation::Double | Situation::Mixed => None,
+        }
     }
 
-    /// The task of each victim that arrives with the last of `step` steps of an episode. The stream of
-    /// arrivals has two words for each step and task, so this is the same whenever it is asked for.
-    pub fn due(&self, step: u32, seed: u64, world: u64, episode: u64) -> impl Iterator<Item = usize> {
+    /// The victims that arrive with the last of `step` steps of an episode. The stream of arrivals has two
+    /// words for each step and task, so this is the same whenever it is asked for.
+    pub fn due(&self, step: u32, seed: u64, world: u64, episode: u64) -> impl Iterator<Item = Due> {
         let words = WORDS * u64::from(step) * self.expected.len() as u64;
         let mut stream = Stream::new(seed, world, episode, Purpose::Arrivals).resume(words);
-        let some = self.expected.iter().enumerate().filter(move |_| step > 0); // no time has passed
-        some.flat_map(move |(task, expected)| repeat_n(task, poisson(*expected, stream.fine_unit())))
+        let random = self.expected.iter().enumerate().filter(move |_| step > 0); // no time has passed
+        let random = random.flat_map(move |(task, expected)| {
+            repeat_n(Due { task, place: None }, poisson(*expected, stream.fine_unit()))
+        });
+        let earlier = self.listed.partition_point(|(then, _)| *then < step);
+        let listed = self.listed[earlier..].iter().take_while(move |(then, _)| *then == step);
+        random.chain(listed.map(|(_, due)| *due))
     }
+}
+
+/// The arrivals of a scenario's list, in order of time.
+fn listed(scenario: &Scenario) -> Vec<(u32, Due)> {
+    let number = |name: &str| scenario.tasks.iter().position(|task| task.name == name).unwrap_or_default();
+    let reach = (scenario.arena_half_width_m - scenario.wall_clearance_m) as f32;
+    let of = |arrival: &Arrival| {
+        let place = arrival.position_m.map(|value| (value as f32).clamp(-reach, reach));
+        let due = Due { task: number(&arrival.task), place: Some(place.into()) };
+        (steps_of(arrival.at_s, scenario.dt_s), due)
+    };
+    let mut listed: Vec<(u32, Due)> = scenario.arrivals.iter().map(of).collect();
+    listed.sort_by_key(|(step, _)| *step); // those of one step keep their order
+    listed
 }
 
 /// The number of which a `share` of all draws are no larger, from a Poisson distribution.
@@ -75,7 +111,7 @@ mod tests {
     fn arrivals_are_poisson_at_the_rate_of_each_task() {
         let arrivals = arrivals([4.0, 0.5]);
         let counts = |task: usize| -> Vec<f64> {
-            let in_step = |step| arrivals.due(step, 1, 2, 3).filter(|one| *one == task).count() as f64;
+            let in_step = |step| arrivals.due(step, 1, 2, 3).filter(|one| one.task == task).count() as f64;
             (1..=40_000).map(in_step).collect()
         };
         let both = [counts(0), counts(1)];
@@ -100,8 +136,31 @@ mod tests {
         assert_eq!((1..999).map(|step| arrivals([0.0, 0.0]).due(step, 1, 2, 3).count()).sum::<usize>(), 0);
         let (busy, one) = (arrivals([9.0, 2.0]), arrivals([0.0, 2.0]));
         for step in 1..999 {
-            let second = |of: &Arrivals| of.due(step, 1, 2, 3).filter(|task| *task == 1).count();
+            let second = |of: &Arrivals| of.due(step, 1, 2, 3).filter(|one| one.task == 1).count();
             assert_eq!(second(&busy), second(&one), "another task moves it");
         }
+    }
+
+    #[test]
+    fn a_list_is_due_at_its_times_in_order() {
+        let mut scenario = Scenario { situation: Situation::Listed, ..Scenario::default() };
+        let arrival = |at_s, task: &str, x| Arrival { at_s, task: task.into(), position_m: [x, 0.5] };
+        scenario.arrivals = vec![
+            arrival(0.31, "task_2", 0.1),
+            arrival(0.0, "task_2", 0.2),
+            arrival(0.3, "task_1", 0.3),
+            arrival(0.4, "task_1", 0.4),
+        ];
+        let arrivals = Arrivals::new(&scenario).expect("arrivals");
+        let due = |step| -> Vec<(usize, f32)> {
+            let found = arrivals.due(step, 1, 2, 3);
+            found.map(|due| (due.task, due.place.expect("its place").x)).collect()
+        };
+        let all: Vec<_> = (0..9).map(due).collect();
+        let empty = vec![];
+        assert_eq!(all[0], [(1, 0.2)]);
+        assert_eq!(all[3], [(0, 0.3)]);
+        assert_eq!(all[4], [(1, 0.1), (0, 0.4)], "the first step that reaches the time, in the list's order");
+        assert!([1, 2, 5, 6, 7, 8].iter().all(|step| all[*step] == empty));
     }
 }

@@ -1,8 +1,8 @@
-//! Victims that arrive at random: how many, in which slots, and that nothing the robots do moves them.
+//! Victims that arrive at random or from a list: how many, in which slots, and that nothing the robots do moves them.
 
 use std::iter::zip;
 
-use innerattn_env::scenario::{Scenario, Situation};
+use innerattn_env::scenario::{Arrival, Scenario, Situation};
 use innerattn_env::tasks::Victim;
 use proptest::prelude::*;
 
@@ -71,6 +71,48 @@ fn nothing_arrives_at_a_rate_of_nought() {
         assert!(table.batch.worlds().all(|world| world.victims == [None; 6] && world.appeared == 0));
         assert!(table.obs.chunks(width).all(|row| row[width - victims..].iter().all(|one| *one == 0.0)));
         assert!(table.reward.iter().all(|reward| *reward == 0.0) && table.turned_away.is_empty());
+    }
+}
+
+fn arrival(at_s: f64, task: &str, position_m: [f64; 2]) -> Arrival {
+    Arrival { at_s, task: task.into(), position_m }
+}
+
+#[test]
+fn a_list_arrives_step_by_step_where_it_says() {
+    let arrivals = vec![
+        arrival(0.5, "task_2", [0.75, -0.5]),
+        arrival(0.0, "task_1", [0.5, 0.25]),
+        arrival(0.42, "task_2", [0.9, 0.9]),
+        arrival(0.8, "task_2", [-0.25, 0.5]),
+        arrival(99.0, "task_1", [0.0, 0.0]),
+    ];
+    let scenario = Scenario {
+        situation: Situation::Listed,
+        arrivals,
+        rescue_radius_m: 0.05,
+        episode_steps: 10,
+        ..Scenario::default()
+    };
+    let mut table = Table::new(scenario, options(2, 3));
+    for _ in 0..3 {
+        for step in 0..10 {
+            let wanted = [
+                Some((0, 0, 0, [0.5, 0.25])),
+                None,
+                Some((1, 1, 5, [0.75, -0.5])).filter(|_| step >= 5),
+                Some((2, 1, 5, [0.9, 0.9])).filter(|_| step >= 5),
+            ];
+            for world in table.batch.worlds() {
+                let seen =
+                    |one: &Victim| (one.id, one.task, one.appeared_step, [one.position.x, one.position.y]);
+                let found: Vec<_> = world.victims.iter().map(|one| one.as_ref().map(seen)).collect();
+                assert_eq!((world.step, found.as_slice()), (step, wanted.as_slice()));
+            }
+            table.step(&[STILL; 8]);
+            let turned_away: &[u32] = if step == 7 { &[0, 1] } else { &[] };
+            assert_eq!(table.turned_away, turned_away, "with the end of step {step}");
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
-    Abilities, Actions, Deadline, Engine, Interrupted, Obstacle, Robot, Scenario, Shape, Situation,
+    Abilities, Actions, Arrival, Deadline, Engine, Interrupted, Obstacle, Robot, Scenario, Shape, Situation,
 };
 use innerattn_env::tasks::{Loss, Rescue};
 
@@ -192,6 +192,17 @@ pub fn with_arrivals(mut scenario: Scenario) -> Scenario {
         task.arrival_rate_hz = (1.0 + index as f64) / (4.0 * scenario.dt_s);
     }
     Scenario { situation: Situation::Poisson, rescue_radius_m: 0.4, ..scenario }
+}
+
+/// The same with victims that arrive from a list, often more than there are slots.
+pub fn with_list(scenario: Scenario) -> Scenario {
+    let arrival = |number: usize| Arrival {
+        at_s: (number / 2) as f64 * scenario.dt_s,
+        task: scenario.tasks[number % scenario.tasks.len()].name.clone(),
+        position_m: [0.0, 0.3 - 0.01 * number as f64],
+    };
+    let arrivals = (0..30).map(arrival).collect();
+    Scenario { situation: Situation::Listed, arrivals, rescue_radius_m: 0.4, ..scenario }
 }
 
 /// A disc at a random place, a box at a random place, and a box that stays.

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use crate::common::{
     Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_amounts,
-    with_arrivals, with_order, with_times,
+    with_arrivals, with_list, with_order, with_times,
 };
 
 const ENVS: usize = 6;
@@ -29,6 +29,7 @@ fn scenarios() -> Vec<Scenario> {
         with_amounts(tight.clone()),
         with_order(tight.clone()),
         with_arrivals(tight.clone()),
+        with_list(tight.clone()),
         with_times(tight),
     ]
 }

@@ -82,6 +82,19 @@ def test_rows_of_worlds_with_services_deadlines_and_order(tmp_path: Path) -> Non
         team.row("food_0", readings)
 
 
+def test_rows_of_worlds_in_which_victims_arrive(tmp_path: Path) -> None:
+    tasks = [{**task, "arrival_rate_hz": 1.0} for task in TASKS]
+    changes = {"scenario.tasks": tasks, "scenario.situation": "poisson"}
+    team = Exported(made_export(tmp_path, "td-inner", **changes)[1], backend="numpy")
+    env = worlds(team, 16, 1)
+    obs = played(env, 6, 0)
+    assert 0 < env.victims()["present"].sum() < 40
+    for world in range(16):
+        for index, robot in enumerate(ROBOTS):
+            row = team.row(robot, readings_of(team, robot, env, world))
+            np.testing.assert_array_equal(row, obs[world, index])
+
+
 def test_rows_of_worlds_with_amounts(tmp_path: Path) -> None:
     robots = [robot.model_dump() for robot in Scenario().robots]
     robots[1]["abilities"], robots[3]["abilities"] = {"food": 2.5}, {"medicine": 0.3, "food": 0.2}

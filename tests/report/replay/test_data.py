@@ -89,6 +89,20 @@ def test_services_and_losses_are_those_of_the_record() -> None:
         assert record.steps["victims"][e, start, slot]["deadline_step"] == deadline >= end
 
 
+def test_victims_that_arrive_are_there_from_then_on() -> None:
+    plain = Scenario.preset("mixed")
+    tasks = tuple(task.replace(arrival_rate_hz=0.5) for task in plain.tasks)
+    worlds = plain.replace(situation="poisson", tasks=tasks)
+    record = run_episodes(scripted_policy("hungarian", worlds), worlds, 6, 5, record=FIELDS)
+    (run,) = (document := replay_document([record], ["one"]))["runs"]
+    present = np.zeros(record.steps["victims"].shape, bool)
+    for e, _, _, start, end, _, _, slot, _ in unpacked(document, run["victims"]).tolist():
+        assert start > 0
+        present[e, start:end, slot] = True
+    np.testing.assert_array_equal(present, record.steps["victims"]["present"])
+    assert len({*present.sum((1, 2)).tolist()}) > 1
+
+
 def test_who_waits_is_that_of_the_record() -> None:
     plain = Scenario.preset("mixed")
     worlds = plain.replace(tasks=(plain.tasks[0].replace(after=("task_2",)), plain.tasks[1]))
