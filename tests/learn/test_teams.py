@@ -41,6 +41,7 @@ def rollout(one: TeamLearner, seed: int = 0) -> tuple[TeamRollout, Relations]:
         steps.rewards.append(torch.rand(WORLDS))
         steps.terminated.append(torch.rand(WORLDS) < 0.1)
         steps.ended.append(steps.terminated[-1] | (torch.rand(WORLDS) < 0.2))
+        steps.following.append(torch.randn(WORLDS) * (steps.ended[-1] & ~steps.terminated[-1]))
     return steps, worlds(99)
 
 
@@ -99,7 +100,7 @@ def test_targets_are_those_of_plain_loops() -> None:
         later = 0.0
         for step in reversed(range(STEPS)):
             ended, over = bool(steps.ended[step][world]), bool(steps.terminated[step][world])
-            following = values[step][world] if ended else values[step + 1][world]
+            following = float(steps.following[step][world]) if ended else values[step + 1][world]
             error = float(steps.rewards[step][world]) - values[step][world]
             error += 0.0 if over else 0.9 * following
             later = error + (0.0 if ended else 0.9 * 0.7 * later)

@@ -33,6 +33,7 @@ class TeamRollout:
         rewards: (B,) the team's.
         terminated: (B,) bool.
         ended: (B,) bool, terminated or truncated.
+        following: (B,) where a time limit ended an episode, the value of its last state; else 0.
     """
 
     seen: list[Relations] = field(default_factory=list)
@@ -42,6 +43,7 @@ class TeamRollout:
     rewards: list[Tensor] = field(default_factory=list)
     terminated: list[Tensor] = field(default_factory=list)
     ended: list[Tensor] = field(default_factory=list)
+    following: list[Tensor] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -206,9 +208,7 @@ class TeamLearner:
         values = torch.stack([self.values(seen) for seen in (*rollout.seen, after)])
         reward, ended = torch.stack(rollout.rewards), torch.stack(rollout.ended)
         terminated = torch.stack(rollout.terminated)
-        # Where a time limit ended an episode, the value before its last step stands for the one
-        # after it: the relations of that state are not worked out.
-        following = torch.where(ended, values[:-1], values[1:])
+        following = torch.where(ended, torch.stack(rollout.following), values[1:])
         advantage = generalised_advantage(
             reward.unsqueeze(1),
             values[:-1].unsqueeze(1),

@@ -1,6 +1,8 @@
 """Relations of teams against plain loops over robots and victims."""
 
 import math
+from collections.abc import Callable, Iterable
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -11,8 +13,9 @@ from random_teams import Size, random_tables
 
 from innerattn.config import Scenario
 from innerattn.nn.teams import TeamTables, relate
+from innerattn.nn.teams.coalitions import NEVER_S
 from innerattn.nn.teams.frames import frame_of, turn, turn_back_choices
-from innerattn.nn.teams.relations import NEAREST, NEVER_S
+from innerattn.nn.teams.relations import NEAREST
 from innerattn.policies.scripted.steering import Steering
 
 SIZES = st.builds(
@@ -22,7 +25,16 @@ SIZES = st.builds(
     victims=st.integers(1, 4),
     abilities=st.integers(1, 3),
 )
-COLUMN = {"time": 1, "met": 5, "spare": 7, "rank": 14, "rival": 17, "last": 18, "nearer": 20}
+COLUMN = {
+    "time": 1,
+    "met": 5,
+    "spare": 7,
+    "spare_mine": 8,
+    "rank": 14,
+    "rival": 17,
+    "last": 18,
+    "nearer": 20,
+}
 
 
 def arrival_time(tables: TeamTables, world: int, robot: int, victim: int) -> float:
@@ -37,52 +49,57 @@ def arrival_time(tables: TeamTables, world: int, robot: int, victim: int) -> flo
     return min(gap / speed + max(lag * (1.0 - towards / speed), 0.0), 8.0)
 
 
+def most_filled(robots: list[set[int]], needs: list[int]) -> int:
+    """So many needs different robots can fill, by trying all ways to give each robot one."""
+    reached = {(0,) * len(needs)}
+    for can in robots:
+        for given_out in list(reached):
+            for k in can:
+                if given_out[k] < needs[k]:
+                    reached.add((*given_out[:k], given_out[k] + 1, *given_out[k + 1 :]))
+    return max(sum(given_out) for given_out in reached)
+
+
 def by_hand(tables: TeamTables, world: int, victim: int) -> dict[int, dict[str, float]]:
     """What the columns of each robot that can help a victim should say."""
     robots = range(tables.positions.shape[1])
-    needs = tables.needs[world, victim].tolist()
+    needs = [int(count) for count in tables.needs[world, victim]]
     able = tables.abilities[world].tolist()
     times = [arrival_time(tables, world, robot, victim) for robot in robots]
-    mine = {i: [k for k, count in enumerate(needs) if count and able[i][k]] for i in robots}
+    mine = {i: {k for k, count in enumerate(needs) if count and able[i][k]} for i in robots}
     waiting = [v for v in range(tables.places.shape[1]) if tables.is_victim[world, v]]
 
-    def nth_of_others(k: int, count: int, without: int | None) -> float:
-        """When the count-th robot with an ability is there, one robot left out."""
-        if count < 1:
-            return 0.0
-        found = sorted(times[j] for j in robots if j != without and k in mine[j])
-        return found[count - 1] if count <= len(found) else NEVER_S
+    def filled(until: float, *, without: int | None = None, beside: int | None = None) -> int:
+        there = [mine[j] for j in robots if times[j] <= until and j not in (without, beside)]
+        return most_filled([*there, *([mine[beside]] if beside is not None else [])], needs)
 
+    def first(holds: Callable[[float], bool]) -> float:
+        return next((t for t in sorted([0.0, *times]) if holds(t)), NEVER_S)
+
+    def slack(sorts: Iterable[int]) -> int:
+        able_to = [i for i in robots if mine[i] & set(sorts)]
+        return len(able_to) - sum(needs[k] for k in sorts)
+
+    wanted = [k for k, count in enumerate(needs) if count]
+    sets = [one for size in range(len(wanted)) for one in combinations(wanted, size + 1)]
     found = {}
     for i in robots:
         if not mine[i]:
             continue
-        rival = min(nth_of_others(k, int(needs[k]), i) for k in mine[i])
-        last = max(
-            nth_of_others(k, int(needs[k]) - 1, i)
-            if k in mine[i]
-            else nth_of_others(k, int(needs[k]), None)
-            for k, count in enumerate(needs)
-            if count
-        )
+        rival = first(lambda t, i=i: filled(t, without=i) == filled(t, beside=i))
+        last = first(lambda t, i=i: filled(t, beside=i) == sum(needs))
         useful = [
             v
             for v in waiting
             if any(n and a for n, a in zip(tables.needs[world, v], able[i], strict=True))
         ]
         order = sorted(useful, key=lambda v: (arrival_time(tables, world, i, v), v))
-        alike = [j for j in robots if j != i and set(mine[i]) & set(mine[j])]
-        met = sum(
-            min(count, sum(times[j] == 0.0 and k in mine[j] for j in robots))
-            for k, count in enumerate(needs)
-        )
-        spare = min(
-            sum(k in mine[j] for j in robots) - count for k, count in enumerate(needs) if count
-        )
+        alike = [j for j in robots if j != i and mine[i] & mine[j]]
         found[i] = {
             "time": times[i] / 2.0,
-            "met": met / 3.0,
-            "spare": min(max(spare, -1.0), 4.0) / 3.0,
+            "met": most_filled([mine[j] for j in robots if times[j] == 0.0], needs) / 3.0,
+            "spare": min(max(min(slack(one) for one in sets), -1), 4) / 3.0,
+            "spare_mine": min(max(min(slack(o) for o in sets if mine[i] & set(o)), -1), 4) / 3.0,
             "rank": order.index(victim) / 2.0,
             "rival": min(max(rival - times[i], -3.0), 3.0),
             "last": min(last, 4.0),
@@ -114,6 +131,35 @@ def test_columns_are_those_of_plain_loops(size: Size, seed: int) -> None:
 
 
 @given(size=SIZES, seed=st.integers(0, 10_000))
+def test_columns_of_victims_are_those_of_plain_loops(size: Size, seed: int) -> None:
+    tables = random_tables(size, seed)
+    seen = relate(tables)
+    for number, (world, victim) in enumerate(tables.is_victim.nonzero().tolist()):
+        needs = [int(count) for count in tables.needs[world, victim]]
+        arrivals = sorted(
+            (
+                arrival_time(tables, world, i, victim),
+                {k for k, count in enumerate(needs) if count and able[k]},
+            )
+            for i, able in enumerate(tables.abilities[world].tolist())
+        )
+
+        for column, filled in ((0, sum(needs)), (2, 1)):
+            times = [0.0] + [moment for moment, _ in arrivals]
+            prefixes = [[mine for _, mine in arrivals[:k]] for k in range(len(times))]
+            expected = next(
+                (
+                    t
+                    for t, p in zip(times, prefixes, strict=True)
+                    if most_filled(p, needs) >= filled
+                ),
+                NEVER_S,
+            )
+            found = float(seen.victims[number, column])
+            assert found == pytest.approx(min(expected, 5.0), abs=2e-5)
+
+
+@given(size=SIZES, seed=st.integers(0, 10_000))
 def test_rivals_and_partners_are_those_of_plain_loops(size: Size, seed: int) -> None:
     tables = random_tables(size, seed)
     seen = relate(tables)
@@ -125,10 +171,8 @@ def test_rivals_and_partners_are_those_of_plain_loops(size: Size, seed: int) -> 
         ]
         for i, mine in enumerate(fills):
             for j, other in enumerate(fills):
-                shared = mine & other
-                rival = i != j and bool(shared)
-                twice = any(needs[k] > 1 for k in shared)
-                partner = i != j and bool(mine) and bool(other) and (not shared or twice)
+                rival = i != j and bool(mine & other)
+                partner = i != j and most_filled([mine, other], [int(n) for n in needs]) == 2
                 assert bool(seen.rivals[number, i, j]) == rival
                 assert bool(seen.partners[number, i, j]) == partner
 

@@ -9,7 +9,9 @@ import torch
 from innerattn.config import Scenario
 from innerattn.config.family import Family
 from innerattn.envs import BatchEnv
+from innerattn.nn.teams import joined_tables, relate
 from innerattn.policies import PolicyInput, WorldState, scripted_policy
+from innerattn.train.teams.sheet import TeamSheet
 from innerattn.train.teams.worlds import TeamWorlds
 
 BASE = Scenario(episode_steps=12, engine="discs")
@@ -33,7 +35,7 @@ def played(worlds: TeamWorlds, steps: int) -> list[torch.Tensor]:
     found = []
     for _ in range(steps):
         outcome = worlds.step(worlds.wanted(), 0.3)
-        found += [*outcome, *worlds.relations()]
+        found += [*outcome[:4], *(outcome.cut_seen or ()), *worlds.relations()]
     return found
 
 
@@ -51,10 +53,10 @@ def test_each_team_is_as_if_it_were_alone() -> None:
         scripts = [scripted_policy("hungarian", env.scenario) for env in envs]
         for env in alone:
             env.reset()
-        rescues = 0
+        rescues = cuts = 0
         for _ in range(15):  # past the end of an episode
             outcome = worlds.step(worlds.wanted(), 0.5)
-            rewards, ended = [], []
+            rewards, ended, last = [], [], []
             for env, script in zip(alone, scripts, strict=True):
                 step = env.step(script.act(PolicyInput(env.observe(), WorldState.of(env))))
                 names = env.reward_component_names
@@ -62,10 +64,23 @@ def test_each_team_is_as_if_it_were_alone() -> None:
                 rewards.append(parts.sum(1) - 0.5 * parts[:, names.index("progress")])
                 rescues += len(step.rescues)
                 ended.append(torch.from_numpy(step.truncated | step.terminated))
+                cut = step.truncated & ~step.terminated
+                if cut.any():
+                    sheet = TeamSheet(env.scenario, env.observation_names())
+                    last.append(sheet.tables(torch.from_numpy(step.final_obs[cut])))
             torch.testing.assert_close(outcome.rewards, torch.cat(rewards), atol=1e-6, rtol=1e-6)
             assert torch.equal(outcome.ended, torch.cat(ended))
+            assert (outcome.cut_seen is None) == (not last)
+            if outcome.cut_seen is not None:
+                assert torch.equal(
+                    outcome.cut, (outcome.ended & ~outcome.terminated).nonzero()[:, 0]
+                )
+                for one, other in zip(outcome.cut_seen, relate(joined_tables(last)), strict=True):
+                    assert torch.equal(one, other)
+                cuts += 1
         tally = worlds.take_tally()
         assert tally.all_rescues == rescues > 0
+        assert cuts == 1
         assert tally.episodes == 3 * 4  # of 12 steps
 
 

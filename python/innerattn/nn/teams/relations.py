@@ -10,15 +10,13 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
-from torch.nn import functional
 
+from innerattn.nn.teams.coalitions import NEVER_S, coalitions
 from innerattn.nn.teams.frames import frame_of, turn
 from innerattn.nn.teams.tables import TeamTables
 
 NEAREST = 3
 """Victims that a robot looks at, by its own arrival time."""
-NEVER_S = 1e3
-"""Arrival time of nobody [s]."""
 _LONGEST_S = 8.0
 """Beyond this, arrival times tell no more."""
 PAIR_WIDTH, PAIR_TURNING_WIDTH, HOME_WIDTH, VICTIM_WIDTH, ROBOT_WIDTH, WORLD_WIDTH = (
@@ -67,18 +65,6 @@ class Relations(NamedTuple):
     worlds: Tensor
 
 
-class _Needs(NamedTuple):
-    """The M victims' needs, and what each of R robots means to them."""
-
-    times: Tensor  # (M, R)
-    useful: Tensor  # (M, R) bool
-    fills: Tensor  # (M, R, K) which need a robot can fill
-    spare: Tensor  # (M, K) able robots minus needed ones; large where none is needed
-    due: Tensor  # (M, K) when the last of the nearest robots could be there for each need
-    rival: Tensor  # (M, R) when my need would be filled without me
-    last: Tensor  # (M, R) when the last of the others could be there
-
-
 @torch.no_grad()
 def relate(tables: TeamTables) -> Relations:
     """The relations in B worlds; what comes of them does not depend on any order or name."""
@@ -94,13 +80,17 @@ def relate(tables: TeamTables) -> Relations:
     times = gap / speed + (lag * (1.0 - towards / speed)).clamp(min=0.0) * (gap > 0.0)
     times = times.clamp(max=_LONGEST_S)
     needed = tables.needs[world, slot]
-    needs = _look_at_needs(times, needed, tables.abilities[world] * tables.is_robot[world, :, None])
-    rivals, partners = _rivals_and_partners(needs.fills, needs.useful, needed)
+    able = tables.abilities[world] * tables.is_robot[world, :, None]
+    fills = able * (needed > 0.0)[:, None]
+    useful = fills.any(-1)
+    inside = (distance <= radius) & useful
+    teams = coalitions(times, inside, needed, fills)
+    rivals, partners = _rivals_and_partners(fills, useful, needed)
 
     # Each robot's victims, by its own arrival time.
     place = (world[:, None] * size + torch.arange(size)) * slots + slot[:, None]  # (M, R)
     own = torch.full((envs * size * slots,), NEVER_S)
-    own[place] = torch.where(needs.useful, times, NEVER_S)
+    own[place] = torch.where(useful, times, NEVER_S)
     own = own.view(envs * size, slots)
     order = own.argsort(stable=True, dim=1)
     rank = torch.empty_like(order).scatter_(1, order, torch.arange(slots).expand_as(order))
@@ -108,21 +98,18 @@ def relate(tables: TeamTables) -> Relations:
     soonest = own.amin(1).view(envs, size)
     choices = (own < NEVER_S).sum(1).view(envs, size)
 
-    inside = (distance <= radius) & needs.useful
-    met = (needs.fills * inside[..., None]).sum(1).minimum(needed).sum(-1, keepdim=True)
     count, waiting = needed.sum(-1, keepdim=True), tables.is_victim.sum(1)[world].unsqueeze(1)
     nearer = ((times[:, None] < times[:, :, None]) & rivals).sum(-1)
-    spare_mine = torch.where(needs.fills > 0.0, needs.spare[:, None], 5.0).amin(-1)
     columns = [
         distance,
         times / 2.0,
         towards,
         inside,
         count / 3.0,
-        met / 3.0,
-        needs.fills.sum(-1) / 2.0,
-        needs.spare.amin(-1, keepdim=True).clamp(-1.0, 4.0) / 3.0,
-        spare_mine.clamp(-1.0, 4.0) / 3.0,
+        teams.met[:, None] / 3.0,
+        fills.sum(-1) / 2.0,
+        teams.spare[:, None].clamp(-1.0, 4.0) / 3.0,
+        teams.spare_mine.clamp(-1.0, 4.0) / 3.0,
         speed,
         tables.bodies[world, :, 2].clamp(max=3.0),
         half,
@@ -131,15 +118,15 @@ def relate(tables: TeamTables) -> Relations:
         ranks / 2.0,
         (times - soonest[world]).clamp(0.0, 4.0),
         choices[world] / 3.0,
-        (needs.rival - times).clamp(-3.0, 3.0),
-        needs.last.clamp(max=4.0),
-        (needs.last - times).clamp(-3.0, 3.0),
+        (teams.without - times).clamp(-3.0, 3.0),
+        teams.others.clamp(max=4.0),
+        (teams.others - times).clamp(-3.0, 3.0),
         nearer / 3.0,
         rivals.sum(-1) / 3.0,
         partners.sum(-1) / 3.0,
     ]
     rows = torch.stack([column.expand_as(times).float() for column in columns], -1)
-    cells = (needs.useful & (ranks < NEAREST)).view(-1).nonzero().squeeze(1)
+    cells = (useful & (ranks < NEAREST)).view(-1).nonzero().squeeze(1)
     victim, robot = cells // size, cells % size
     of_all = world[victim] * size + robot
 
@@ -158,11 +145,12 @@ def relate(tables: TeamTables) -> Relations:
     scarcity = _scarcity(tables).view(-1, 2)
     homes, home_frames, team = _robots(tables, robot_cells, soonest, choices, mate, scarcity)
     victims = [
-        needs.due.amax(-1).clamp(max=5.0),
-        (needs.due.amax(-1) >= NEVER_S).float(),
-        needs.due.masked_fill(needed <= 0.0, NEVER_S).amin(-1).clamp(max=5.0),
-        *(column.squeeze(1) / 3.0 for column in (count, met)),
-        needs.spare.amin(-1).clamp(-1.0, 4.0) / 3.0,
+        teams.complete.clamp(max=5.0),
+        (teams.complete >= NEVER_S).float(),
+        teams.first.clamp(max=5.0),
+        count.squeeze(1) / 3.0,
+        teams.met / 3.0,
+        teams.spare.clamp(-1.0, 4.0) / 3.0,
         waiting.squeeze(1) / 4.0,
         half.squeeze(1),
     ]
@@ -186,41 +174,15 @@ def relate(tables: TeamTables) -> Relations:
     )
 
 
-def _look_at_needs(times: Tensor, needed: Tensor, able: Tensor) -> _Needs:
-    """What robots (M, R) with abilities (M, R, K) mean to victims with needs (M, K)."""
-    wanted = needed > 0.0
-    fills = able * wanted[:, None]
-    can = fills > 0.0
-    spare = torch.where(wanted, fills.sum(1) - needed, 5.0)
-    by_need = torch.where(can, times[..., None], NEVER_S).transpose(1, 2).sort(-1).values
-    # The c-th nearest stands at c: nobody is needed at 0, and beyond the last there is nobody.
-    nth = functional.pad(functional.pad(by_need, (1, 0)), (0, 2), value=NEVER_S)
-    count = needed.long().clamp(max=times.shape[1] + 1)
-    due, after = (nth.gather(2, c[..., None]).squeeze(-1) for c in (count, count + 1))
-    before = nth.gather(2, (count - 1).clamp(min=0)[..., None]).squeeze(-1)
-    mine = times[..., None]
-    among = can & (mine <= due[:, None])
-    without_me = torch.where(among, after[:, None], due[:, None])
-    others = torch.where(can & (mine < due[:, None]), due[:, None], before[:, None])
-    others = torch.where(can, others, due[:, None])
-    return _Needs(
-        times=times,
-        useful=can.any(-1),
-        fills=fills,
-        spare=spare,
-        due=due,
-        rival=torch.where(can, without_me, NEVER_S).amin(-1),
-        last=others.amax(-1),
-    )
-
-
 def _rivals_and_partners(fills: Tensor, useful: Tensor, needed: Tensor) -> tuple[Tensor, Tensor]:
     """(M, R, R) bool: who could take whose part; who completes whom."""
     others = ~torch.eye(fills.shape[1], dtype=torch.bool)
     alike = (fills @ fills.transpose(1, 2)) > 0.0
-    twice = ((fills * (needed > 1.0)[:, None]) @ fills.transpose(1, 2)) > 0.0
+    # Two robots fill two needs where the needs that either can fill are two or more.
+    units = fills * needed[:, None]
+    either = units.sum(-1)[:, :, None] + units.sum(-1)[:, None] - units @ fills.transpose(1, 2)
     both = useful[:, :, None] & useful[:, None] & others
-    return alike & others, both & (~alike | twice)
+    return alike & others, both & (either > 1.0)
 
 
 def _nearest_teammate(tables: TeamTables) -> Tensor:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import torch
 from torch import Tensor
 
 from innerattn.config import RunConfig, Scenario
@@ -159,6 +160,10 @@ class TeamTraining(Training):
             rollout.rewards.append(outcome.rewards)
             rollout.terminated.append(outcome.terminated)
             rollout.ended.append(outcome.ended)
+            following = torch.zeros_like(outcome.rewards)
+            if outcome.cut_seen is not None:
+                following[outcome.cut] = self._learner.values(outcome.cut_seen)
+            rollout.following.append(following)
             seen = self._worlds.relations()
         self._rollout, self._after = rollout, seen
 

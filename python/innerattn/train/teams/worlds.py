@@ -27,11 +27,15 @@ class Outcome(NamedTuple):
         rewards: (B,) float32 the team's reward, with a weight of the part for coming nearer.
         terminated: (B,) bool.
         ended: (B,) bool, terminated or truncated.
+        cut: (C,) int64, worlds that a time limit ended.
+        cut_seen: the last state of those; None where there are none.
     """
 
     rewards: Tensor
     terminated: Tensor
     ended: Tensor
+    cut: Tensor
+    cut_seen: Relations | None
 
 
 class _Group:
@@ -116,7 +120,7 @@ class TeamWorlds:
             actions: (N,) int64, world by world.
             progress_weight: of the reward for coming nearer.
         """
-        parts, at = [], 0
+        parts, at, last = [], 0, []
         for one in self._worlds:
             size = self._count * one.env.num_robots
             taken = actions[at : at + size].view(self._count, -1).numpy()
@@ -130,8 +134,18 @@ class TeamWorlds:
             over, rescues = int(ended.sum()), int(one.open_rescues[ended].sum())
             self._counts += (over, rescues, over, len(step.rescues))
             one.open_rescues[ended] = 0
-            parts.append((whole_reward, step.terminated, ended))
-        return Outcome(*(torch.from_numpy(np.concatenate(one)) for one in zip(*parts, strict=True)))
+            cut = step.truncated & ~step.terminated
+            parts.append((whole_reward, step.terminated, ended, cut))
+            if cut.any():
+                last.append(one.sheet.tables(as_tensor(step.final_obs[cut])))
+        rewards, terminated, ended, cut = map(np.concatenate, zip(*parts, strict=True))
+        return Outcome(
+            rewards=torch.from_numpy(rewards),
+            terminated=torch.from_numpy(terminated),
+            ended=torch.from_numpy(ended),
+            cut=torch.from_numpy(cut.nonzero()[0]),
+            cut_seen=relate(joined_tables(last)) if last else None,
+        )
 
     def take_tally(self) -> Tally:
         """Counts since the last call."""
