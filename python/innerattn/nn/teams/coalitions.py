@@ -52,54 +52,53 @@ def coalitions(times: Tensor, inside: Tensor, needed: Tensor, fills: Tensor) -> 
         fills: (M, R, K), 1 where a robot can fill a need, else 0.
     """
     sets, units = _sets_of_needs(needed)
-    useful = (torch.einsum("mrk,msk->mrs", fills, sets) > 0.0).float()
+    useful = (torch.einsum("mrk,smk->smr", fills, sets) > 0.0).float()
     count = needed.sum(-1)
-    elsewhere = count[:, None] - units  # (M, S)
+    elsewhere = count - units  # (S, M)
     order = times.argsort(dim=1, stable=True)
-    arrived = useful.gather(1, order[..., None].expand_as(useful)).cumsum(1)
-    room = functional.pad(arrived, (0, 0, 1, 0)) + elsewhere[:, None]  # (M, 1 + R, S)
+    arrived = useful.gather(2, order.expand_as(useful)).cumsum(2)
+    room = functional.pad(arrived, (1, 0)) + elsewhere[..., None]  # (S, M, 1 + R)
     moments = functional.pad(times.gather(1, order), (1, 0))
+    place = torch.empty_like(order).scatter_(
+        1, order, torch.arange(order.shape[1]).expand_as(order)
+    )
+    here = (place[..., None] < torch.arange(order.shape[1] + 1)).float()  # (M, R, 1 + R)
+    away = 1.0 - here
+    with_me = without_me = torch.full_like(here, torch.inf)
+    for mine, around in zip(useful[..., None], room[:, :, None], strict=True):
+        with_me = torch.minimum(with_me, torch.addcmul(around, mine, away))
+        without_me = torch.minimum(without_me, torch.addcmul(around, mine, here, value=-1))
+    filled = room.amin(0)
+    gap = torch.where(units > 0.0, useful.sum(2) - units, 5.0)
+    gap_mine = torch.where(useful > 0.0, gap[..., None], 5.0)
+    met = (torch.einsum("mr,smr->sm", inside.float(), useful) + elsewhere).amin(0)
 
     def since(holds: Tensor) -> Tensor:
         when = moments.view(len(holds), *(1,) * (holds.dim() - 2), holds.shape[-1])
         return torch.where(holds, when, NEVER_S).amin(-1)
 
-    filled = room.amin(-1)
-    place = torch.empty_like(order).scatter_(
-        1, order, torch.arange(order.shape[1]).expand_as(order)
-    )
-    here = place[..., None] < torch.arange(order.shape[1] + 1)  # (M, R, 1 + R)
-    mine, around = useful[:, :, None], room[:, None]
-    with_me = (around + mine * ~here[..., None]).amin(-1)
-    without_me = (around - mine * here[..., None]).amin(-1)
-    gap = torch.where(units > 0.0, useful.sum(1) - units, 5.0)
-    gap_mine = torch.where(mine.squeeze(2) > 0.0, gap[:, None], 5.0)
-    met = (torch.einsum("mr,mrs->ms", inside.float(), useful) + elsewhere).amin(-1)
     return Coalitions(
         first=since(filled >= 1.0),
         complete=since(filled >= count[:, None]),
         without=since(with_me == without_me),
         others=since(with_me >= count[:, None, None]),
         met=met,
-        spare=gap.amin(-1),
-        spare_mine=gap_mine.amin(-1),
+        spare=gap.amin(0),
+        spare_mine=gap_mine.amin(0),
     )
 
 
 def _sets_of_needs(needed: Tensor) -> tuple[Tensor, Tensor]:
-    """Sets of needs (M, S, K), 1 where a need belongs to it, and the robots they need (M, S)."""
+    """Sets of needs (S, M, K), 1 where a need belongs to it, and the robots they need (S, M)."""
     wanted = (needed > 0.0).float()
     sorts = wanted.argsort(dim=1, descending=True, stable=True)
     most = int(wanted.sum(1).amax()) if len(wanted) else 0
     if most <= _MOST_EXACT:
-        numbers = torch.arange(2**most)
-        chosen = (numbers[:, None] >> torch.arange(most) & 1).float()  # (S, sorts)
+        chosen = (torch.arange(2**most)[:, None] >> torch.arange(most) & 1).float()  # (S, sorts)
     else:
-        none, all_of_them = torch.zeros(1, most), torch.ones(1, most)
-        chosen = torch.cat([none, torch.eye(most), all_of_them])
-    sets = torch.zeros(len(needed), len(chosen), needed.shape[1])
-    sets.scatter_(
-        2, sorts[:, None, :most].expand(-1, len(chosen), -1), chosen.expand(len(needed), -1, -1)
-    )
-    sets = sets * wanted[:, None]
-    return sets, torch.einsum("msk,mk->ms", sets, needed)
+        chosen = torch.cat([torch.zeros(1, most), torch.eye(most), torch.ones(1, most)])
+    sizes = (len(chosen), len(needed), most)
+    sets = torch.zeros(*sizes[:2], needed.shape[1])
+    sets.scatter_(2, sorts[:, :most].expand(sizes), chosen[:, None].expand(sizes))
+    sets = sets * wanted
+    return sets, torch.einsum("smk,mk->sm", sets, needed)
