@@ -115,10 +115,7 @@ def test_columns_are_those_of_plain_loops(size: Size, seed: int) -> None:
 
 @given(seed=st.integers(0, 10_000))
 def test_columns_of_many_sorts_of_needs(seed: int) -> None:
-    """Exact for robots with one ability each."""
-    tables = random_tables(Size(worlds=3, robots=8, victims=2, abilities=6), seed)
-    one_each = torch.eye(6)[torch.arange(8) % 6].expand(3, -1, -1)
-    check_columns(tables._replace(abilities=one_each))
+    check_columns(random_tables(Size(worlds=2, robots=5, victims=1, abilities=6), seed))
 
 
 def check_columns(tables: TeamTables) -> None:

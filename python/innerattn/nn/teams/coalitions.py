@@ -15,9 +15,6 @@ from torch.nn import functional
 
 NEVER_S = 1e3
 """Arrival time of nobody [s]."""
-_MOST_EXACT = 4
-"""Sorts of needs of a victim up to which all sets of needs are looked at; of more, each sort alone
-and all together."""
 
 
 class Coalitions(NamedTuple):
@@ -93,10 +90,7 @@ def _sets_of_needs(needed: Tensor) -> tuple[Tensor, Tensor]:
     wanted = (needed > 0.0).float()
     sorts = wanted.argsort(dim=1, descending=True, stable=True)
     most = int(wanted.sum(1).amax()) if len(wanted) else 0
-    if most <= _MOST_EXACT:
-        chosen = (torch.arange(2**most)[:, None] >> torch.arange(most) & 1).float()  # (S, sorts)
-    else:
-        chosen = torch.cat([torch.zeros(1, most), torch.eye(most), torch.ones(1, most)])
+    chosen = (torch.arange(2**most)[:, None] >> torch.arange(most) & 1).float()  # (S, sorts)
     sizes = (len(chosen), len(needed), most)
     sets = torch.zeros(*sizes[:2], needed.shape[1])
     sets.scatter_(2, sorts[:, :most].expand(sizes), chosen[:, None].expand(sizes))
