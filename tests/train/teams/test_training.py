@@ -158,6 +158,10 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
         ({"train.potential": "greedy"}, "train.potential: method 'team-inner' cannot follow it"),
         ({"train.on_divergence": "skip"}, "train.on_divergence: method 'team-inner' cannot"),
         ({"scenario.actions": "continuous"}, "learns 'discrete' actions only"),
+        (
+            {"scenario.faults": [{"robot": "food_0", "kind": "blackout", "value": 0.5}]},
+            "scenario.faults: method 'team-inner' cannot be trained with 'blackout'",
+        ),
         ({"train.env_steps": 0}, "train.env_steps = 0: must be at least 1 without a warm start"),
     ],
 )

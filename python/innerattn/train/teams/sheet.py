@@ -14,7 +14,7 @@ from innerattn.errors import ConfigError
 from innerattn.nn.teams import TeamTables
 from innerattn.policies.scripted.steering import Steering
 
-_SENSES = {
+SENSES = {
     "position_noise",
     "velocity_noise",
     "frozen_sensor",
@@ -42,7 +42,7 @@ class TeamSheet:
         if scenario.actions != "discrete":
             raise ConfigError("scenario.actions = 'continuous': must be 'discrete' for any team")
         self.num_robots = len(scenario.robots)
-        self.each_sees = any(fault.kind in _SENSES for fault in scenario.faults)
+        self.each_sees = any(fault.kind in SENSES for fault in scenario.faults)
         steering = Steering(scenario)
         push = [robot.drive_force_n / robot.mass_kg * scenario.dt_s for robot in scenario.robots]
         bodies = np.stack([steering.speed, steering.lag, push], -1)

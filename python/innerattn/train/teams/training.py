@@ -19,6 +19,7 @@ from innerattn.train.checkpoint_info import Stage
 from innerattn.train.collect import Tally
 from innerattn.train.metrics import Interval
 from innerattn.train.teams.learner import build_team_learner, team_section
+from innerattn.train.teams.sheet import SENSES
 from innerattn.train.teams.worlds import TeamWorlds
 from innerattn.train.training import Training
 
@@ -199,6 +200,12 @@ def _refuse_what_is_not_followed(config: RunConfig, team: TeamConfig) -> None:
     for key, is_fine in refused.items():
         if not is_fine:
             raise ConfigError(f"{key}: method {train.method!r} cannot follow it; leave it out")
+    for fault in config.training_scenario.faults:
+        if fault.kind in SENSES:
+            raise ConfigError(
+                f"scenario.faults: method {train.method!r} cannot be trained with {fault.kind!r}, "
+                "with which robots see different things; it acts with it"
+            )
     if config.scenario.actions != "discrete":
         raise ConfigError(
             f"scenario.actions = 'continuous': method {train.method!r} needs 'discrete'"
