@@ -1,7 +1,7 @@
 """Worlds of several teams as one batch."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 import numpy as np
 import torch
@@ -98,6 +98,35 @@ def test_equal_seeds_give_equal_teams_and_worlds() -> None:
         for a, b in zip(one, other, strict=True)
     )
     assert runs[0][1] != runs[2][1]
+
+
+def test_losses_are_counted_where_victims_can_be_lost() -> None:
+    plain = Scenario.preset("double").replace(engine="discs")
+    mortal = plain.replace(tasks=tuple(task.replace(deadline_s=1.0) for task in plain.tasks))
+    tallies = []
+    for scenario in (mortal, plain):
+        worlds = TeamWorlds(
+            lambda _, scenario=scenario: scenario,  # type: ignore[misc]
+            seed=1,
+            groups=2,
+            worlds_per_group=4,
+            script=None,
+        )
+        twins = [BatchEnv(scenario, 4, seed=world_seed(k), num_threads=1) for k in (0, 1)]
+        still = np.zeros((4, 4), np.int64)
+        lost = 0
+        with closing(worlds):
+            for twin in twins:
+                twin.reset()
+            for _ in range(30):
+                worlds.step(torch.zeros(32, dtype=torch.int64), 1.0)
+                for twin in twins:
+                    twin.step(still)
+                    lost += len(twin.lost())
+            tallies.append((worlds.take_tally().all_lost, lost))
+            assert worlds.take_tally().all_lost == (0 if scenario is mortal else None)
+    assert tallies[0][0] == tallies[0][1] > 0
+    assert tallies[1][0] is None
 
 
 def test_redrawing_replaces_so_many_teams() -> None:

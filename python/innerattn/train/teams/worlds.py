@@ -89,7 +89,7 @@ class TeamWorlds:
         self._scenario, self._seed, self._script = draw, seed, script
         self._count, self._stagger = worlds_per_group, stagger_starts
         self._drawn = self._redrawn = 0
-        self._counts = np.zeros(4, np.int64)  # as `Tally`
+        self._counts = np.zeros(5, np.int64)  # as `Tally`
         self._progress = BatchEnv.reward_component_names.index("progress")
         self._worlds = [self._draw() for _ in range(groups)]
 
@@ -132,7 +132,8 @@ class TeamWorlds:
             ended = step.terminated | step.truncated
             np.add.at(one.open_rescues, step.rescues["env"], 1)
             over, rescues = int(ended.sum()), int(one.open_rescues[ended].sum())
-            self._counts += (over, rescues, over, len(step.rescues))
+            lost = len(one.env.lost()) if one.env.scenario.has_deadlines else 0
+            self._counts += (over, rescues, over, len(step.rescues), lost)
             one.open_rescues[ended] = 0
             cut = step.truncated & ~step.terminated
             parts.append((whole_reward, step.terminated, ended, cut))
@@ -149,9 +150,10 @@ class TeamWorlds:
 
     def take_tally(self) -> Tally:
         """Counts since the last call."""
-        found = Tally(*self._counts.tolist())
-        self._counts[[0, 1, 3]] = 0
-        return found
+        counts = self._counts.tolist()
+        self._counts[[0, 1, 3, 4]] = 0
+        mortal = any(one.env.scenario.has_deadlines for one in self._worlds)
+        return Tally(*counts) if mortal else Tally(*counts[:4])
 
     def resume_state(self) -> dict[str, Tensor]:
         """Which teams there are, and their worlds; see `Resumable`."""
@@ -173,7 +175,7 @@ class TeamWorlds:
         open_rescues = take_within(
             state, "open_rescues", torch.int64, 0, _MOST, count, self._count
         ).numpy()
-        self._counts = take_within(state, "tally", torch.int64, 0, _MOST, 4).numpy().copy()
+        self._counts = take_within(state, "tally", torch.int64, 0, _MOST, 5).numpy().copy()
         lengths = take_within(state, "lengths", torch.int64, 0, _MOST, count).tolist()
         images = take(state, "worlds", torch.uint8, None).numpy()
         if sum(lengths) != len(images):
