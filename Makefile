@@ -48,9 +48,9 @@ test-asan: setup ## the pool, snapshots, fuzzed inputs and arrays lent to Python
 test-gpu: setup ## training on a GPU (CUDA): beside the CPU, stopped and gone on with, by the command
 	INNERATTN_TEST_DEVICE=cuda pytest -m 'not slow' tests/train/test_gpu.py tests/train/test_resume.py tests/train/test_divergence.py tests/train/test_weights.py
 
-test-slow: setup test-pool ## the long checks: ten million env-steps of contacts, compilers at their slowest
+test-slow: setup test-pool ## the long checks: ten million env-steps of contacts, compilers at their slowest, 300 examples of each property
 	INNERATTN_SLOW=1 cargo test --quiet --test worlds containment
-	pytest -m slow
+	INNERATTN_EXAMPLES=300 pytest -m 'slow or hypothesis'
 
 examples: setup ## train a little with each outside library, in an environment of its own; EXAMPLES='NAME ...' takes some of them
 	python examples/run_all.py $(EXAMPLES)

@@ -1,5 +1,6 @@
 """Finished runs for tests of more than one room: trained by the command itself, or made up."""
 
+import os
 import shutil
 import signal
 import sys
@@ -24,7 +25,12 @@ from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.studies.work import work
 
 # A slow machine fails no property.
-settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "untimed",
+    deadline=None,
+    max_examples=int(os.environ.get("INNERATTN_EXAMPLES", "25")),
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile("untimed")
 
 

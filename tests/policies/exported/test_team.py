@@ -86,7 +86,7 @@ def test_drawn_actions_follow_the_probabilities_and_the_seed(plain_export: Path)
     assert [team.decide("food_0", row).action for _ in range(50)] == first[:50]
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 2**32))
 def test_a_velocity_command_is_what_the_world_does(plain_export: Path, seed: int) -> None:
     team = Exported(plain_export, backend="numpy")
