@@ -10,12 +10,14 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import torch
 from torch import Tensor, nn
+from torch.optim.adam import adam
 
 Aux = TypeVar("Aux")
 Gradients = dict[str, Tensor]
 """Gradients by name of the parameter."""
 Forward = Callable[..., Any]
 """A network's forward pass."""
+BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # torch's defaults, those of the paper on Adam
 
 
 class Network:
@@ -118,14 +120,6 @@ class AdamStepper(Network):
         }
         self.mean, self.square = torch.zeros_like(self.flat), torch.zeros_like(self.flat)
         self.segments = self._found_segments()
-        self._parts = [nn.Parameter(self.flat[segment.part]) for segment in self.segments]
-        self._adam = torch.optim.Adam(self._parts, weight_decay=weight_decay, fused=True)
-        for segment, part in zip(self.segments, self._parts, strict=True):
-            self._adam.state[part] = {
-                "step": segment.step,
-                "exp_avg": self.mean[segment.part],
-                "exp_avg_sq": self.square[segment.part],
-            }
 
     def _found_segments(self) -> list[Segment]:
         segments: list[Segment] = []
@@ -174,11 +168,24 @@ class AdamStepper(Network):
         """Do one step of Adam; see `Stepper.step`. Each parameter keeps its gradient as `grad`."""
         for name, parameter in self.trained.items():
             parameter.grad = gradients[name]
-        for segment, part in zip(self.segments, self._parts, strict=True):
-            part.grad = joined(gradients, segment)
-        for group in self._adam.param_groups:
-            group["lr"] = float(learning_rate)
-        self._adam.step()
+        # What `torch.optim.Adam.step` calls. The class itself would load torch's compiler, which
+        # takes as long as torch.
+        adam(
+            [self.flat[segment.part] for segment in self.segments],
+            [joined(gradients, segment) for segment in self.segments],
+            [self.mean[segment.part] for segment in self.segments],
+            [self.square[segment.part] for segment in self.segments],
+            [],
+            [segment.step for segment in self.segments],
+            fused=True,
+            amsgrad=False,
+            beta1=BETA_1,
+            beta2=BETA_2,
+            lr=float(learning_rate),
+            weight_decay=self.weight_decay,
+            eps=EPSILON,
+            maximize=False,
+        )
 
 
 def joined(gradients: Gradients, segment: Segment) -> Tensor:

@@ -22,7 +22,17 @@ import torch
 from torch import Tensor, nn
 from torch.func import functional_call, grad
 
-from innerattn.learn.adam import AdamStepper, Aux, Forward, Gradients, Network, joined
+from innerattn.learn.adam import (
+    BETA_1,
+    BETA_2,
+    EPSILON,
+    AdamStepper,
+    Aux,
+    Forward,
+    Gradients,
+    Network,
+    joined,
+)
 from innerattn.nn.attention import (
     Attended,
     InnerAttention,
@@ -30,8 +40,6 @@ from innerattn.nn.attention import (
     visible_teammates,
 )
 from innerattn.nn.partner import OracleAttention
-
-_BETA_1, _BETA_2, _EPSILON = 0.9, 0.999, 1e-8  # torch's defaults, those of the paper on Adam
 
 
 class CompilerError(RuntimeError):
@@ -93,12 +101,12 @@ class TracedStepper(TracedNetwork):
             value = self.flat[segment.part]
             gradient = joined(gradients, segment) + self._weight_decay * value
             step = segment.step.add_(1.0)
-            mean = self._mean[segment.part].lerp_(gradient, 1.0 - _BETA_1)
-            square = self._square[segment.part].lerp_(gradient.square(), 1.0 - _BETA_2)
+            mean = self._mean[segment.part].lerp_(gradient, 1.0 - BETA_1)
+            square = self._square[segment.part].lerp_(gradient.square(), 1.0 - BETA_2)
             # The corrections for the start: few numbers, so float64 costs nothing.
-            mean_share = (1.0 - _BETA_1 ** step.double()).to(value.dtype)
-            square_share = (1.0 - _BETA_2 ** step.double()).sqrt().to(value.dtype)
-            denominator = square.sqrt() / square_share + _EPSILON
+            mean_share = (1.0 - BETA_1 ** step.double()).to(value.dtype)
+            square_share = (1.0 - BETA_2 ** step.double()).sqrt().to(value.dtype)
+            denominator = square.sqrt() / square_share + EPSILON
             value.sub_(learning_rate / mean_share * mean / denominator)
 
 
