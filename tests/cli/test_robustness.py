@@ -10,23 +10,34 @@ import tomli_w
 
 from innerattn.cli.main import main
 
-FEW = ["--episodes", "4", "--episode-steps", "40", "--faults", "motor_gain, lost_communication"]
+FEW = ["--episodes", "4", "--episode-steps", "26", "--faults", "motor_gain, lost_communication"]
 
 
-def test_the_document_alone_on_standard_output(
-    run_dir: Path, capsys: pytest.CaptureFixture[str]
+def test_the_document_alone_on_standard_output_and_a_page_about_the_run(
+    run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["robustness", str(run_dir), *FEW, "--json", "-"]) == 0
+    page = tmp_path / "page.html"
+    options = [str(run_dir), *FEW, "--report", str(page), "--json", "-"]
+    assert main(["robustness", *options]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["schema_version"] == 1
     names = [policy["policy"] for policy in found["policies"]]
     assert names == [run_dir.name, "greedy", "hungarian", "oracle"]
     assert found["policies"][0]["method"] == "td-inner"
-    assert (found["episodes"], found["episode_steps"]) == (4, 40)
-    assert found["policies"][0]["by_kind"].keys() == {"motor_gain", "lost_communication", "all"}
+    assert (found["episodes"], found["episode_steps"]) == (4, 26)
+    by_kind = found["policies"][0]["by_kind"]
+    assert by_kind.keys() == {"motor_gain", "lost_communication", "all"}
     assert found["bounds"][run_dir.name]["violations"] == 0
     kinds = found["attention"][run_dir.name]["kinds"]
     assert [kind["kind"] for kind in kinds] == ["motor_gain", "lost_communication"]
+    text, both = page.read_text("utf-8"), by_kind["all"]
+    assert "Retention under faults" in text
+    if both is not None:
+        assert f"{both['mean']:.2f} [{both['low']:.2f}, {both['high']:.2f}]" in text
+    twice = tmp_path / "copy"
+    shutil.copytree(run_dir, twice)
+    assert main(["robustness", str(run_dir), str(twice), "--report", str(page)]) == 1
+    assert "must be one run of each seed" in capsys.readouterr().err
 
 
 def test_tables_a_file_and_a_picture(
@@ -62,24 +73,6 @@ def test_tables_a_file_and_a_picture(
     assert "B: bounds on attention" in shown
     assert files["--plot"].read_bytes().startswith(b"\x89PNG")
     assert {path: path.stat().st_mtime_ns for path in run_dir.rglob("*")} == before
-
-
-def test_a_page_about_the_run(
-    run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    page, document = tmp_path / "page.html", tmp_path / "found.json"
-    options = [str(run_dir), *FEW, "--report", str(page), "--json", str(document)]
-    assert main(["robustness", *options]) == 0
-    found = json.loads(document.read_text())["policies"][0]["by_kind"]["all"]
-    text = page.read_text("utf-8")
-    assert "Retention under faults" in text
-    if found is not None:
-        assert f"{found['mean']:.2f} [{found['low']:.2f}, {found['high']:.2f}]" in text
-    capsys.readouterr()
-    twice = tmp_path / "copy"
-    shutil.copytree(run_dir, twice)
-    assert main(["robustness", str(run_dir), str(twice), "--report", str(page)]) == 1
-    assert "must be one run of each seed" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
