@@ -176,6 +176,7 @@ def test_the_command_of_a_card_trains_a_team_of_the_package(
     assert asked[0].train == config.train
 
 
+@pytest.mark.slow
 def test_a_team_with_a_file_of_another_is_exported_again(plain_team: Path, tmp_path: Path) -> None:
     run, folder = plain_team / "run", shutil.copytree(plain_team / "export", tmp_path / "export")
     shutil.copy(newest_weights(run), folder / "weights.safetensors")
