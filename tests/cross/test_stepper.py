@@ -21,6 +21,8 @@ EXACT = 1e-6
 CHUNKS = 8
 LEAST = 104_000
 """Transitions of all chunks together, half of which are for `make test-slow`."""
+THIRDS = [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))]
+"""Chunks of 12,000 transitions; two of three are for `make test-slow`."""
 
 
 def state_of(env: BatchEnv) -> State:
@@ -281,7 +283,7 @@ def test_worlds_are_as_the_plain_stepper_says(chunk: int) -> None:
         assert total[what] > 50, (what, total)
 
 
-@pytest.mark.parametrize("chunk", range(3))
+@pytest.mark.parametrize("chunk", THIRDS)
 def test_worlds_with_services_and_deadlines_are_as_the_plain_stepper_says(chunk: int) -> None:
     total: Counter[str] = Counter()
     rng = np.random.default_rng(200 + chunk)
@@ -295,7 +297,7 @@ def test_worlds_with_services_and_deadlines_are_as_the_plain_stepper_says(chunk:
         assert total[what] > 50, (what, total)
 
 
-@pytest.mark.parametrize("chunk", range(3))
+@pytest.mark.parametrize("chunk", THIRDS)
 def test_worlds_with_amounts_are_as_the_plain_stepper_says(chunk: int) -> None:
     total: Counter[str] = Counter()
     rng = np.random.default_rng(300 + chunk)
@@ -311,7 +313,7 @@ def test_worlds_with_amounts_are_as_the_plain_stepper_says(chunk: int) -> None:
         assert total[what] > least, (what, total)
 
 
-@pytest.mark.parametrize("chunk", range(3))
+@pytest.mark.parametrize("chunk", THIRDS)
 def test_worlds_with_an_order_of_tasks_are_as_the_plain_stepper_says(chunk: int) -> None:
     total: Counter[str] = Counter()
     rng = np.random.default_rng(400 + chunk)
@@ -327,7 +329,7 @@ def test_worlds_with_an_order_of_tasks_are_as_the_plain_stepper_says(chunk: int)
         assert total[what] > 50, (what, total)
 
 
-@pytest.mark.parametrize("chunk", range(3))
+@pytest.mark.parametrize("chunk", THIRDS)
 def test_worlds_in_which_victims_arrive_are_as_the_plain_stepper_says(chunk: int) -> None:
     total: Counter[str] = Counter()
     rng = np.random.default_rng(500 + chunk)
