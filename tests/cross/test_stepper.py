@@ -1,6 +1,7 @@
 """The compiled worlds against the plain stepper, transition by transition."""
 
 from collections import Counter
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -283,65 +284,62 @@ def test_worlds_are_as_the_plain_stepper_says(chunk: int) -> None:
         assert total[what] > 50, (what, total)
 
 
-@pytest.mark.parametrize("chunk", THIRDS)
-def test_worlds_with_services_and_deadlines_are_as_the_plain_stepper_says(chunk: int) -> None:
+def compare_some(rng: np.random.Generator, changed: Callable[[Scenario], Scenario]) -> Counter[str]:
+    """12,000 transitions of random scenarios, each ``changed``; counts what was seen."""
     total: Counter[str] = Counter()
-    rng = np.random.default_rng(200 + chunk)
     while total["transitions"] < 12_000:
-        scenario = with_times(random_scenario(rng), rng)
+        scenario = changed(random_scenario(rng))
         some = min(1000, 20_000 // len(scenario.robots))
         seed = int(rng.integers(2**32))
         total += compare(scenario, seed, some, faulty=seed % 3 == 0)
     assert total["unsure"] < 0.02 * total["transitions"]
+    return total
+
+
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_with_services_and_deadlines_are_as_the_plain_stepper_says(chunk: int) -> None:
+    rng = np.random.default_rng(200 + chunk)
+    total = compare_some(rng, lambda scenario: with_times(scenario, rng))
     for what in ("rescues", "appeared", "served", "lost"):
         assert total[what] > 50, (what, total)
 
 
 @pytest.mark.parametrize("chunk", THIRDS)
 def test_worlds_with_amounts_are_as_the_plain_stepper_says(chunk: int) -> None:
-    total: Counter[str] = Counter()
     rng = np.random.default_rng(300 + chunk)
-    while total["transitions"] < 12_000:
-        scenario = with_amounts(random_scenario(rng), rng)
-        if rng.random() < 0.3:
-            scenario = with_times(scenario, rng)
-        some = min(1000, 20_000 // len(scenario.robots))
-        seed = int(rng.integers(2**32))
-        total += compare(scenario, seed, some, faulty=seed % 3 == 0)
-    assert total["unsure"] < 0.02 * total["transitions"]
+
+    def changed(scenario: Scenario) -> Scenario:
+        scenario = with_amounts(scenario, rng)
+        return with_times(scenario, rng) if rng.random() < 0.3 else scenario
+
+    total = compare_some(rng, changed)
     for what, least in (("rescues", 50), ("appeared", 50), ("served", 0)):
         assert total[what] > least, (what, total)
 
 
 @pytest.mark.parametrize("chunk", THIRDS)
 def test_worlds_with_an_order_of_tasks_are_as_the_plain_stepper_says(chunk: int) -> None:
-    total: Counter[str] = Counter()
     rng = np.random.default_rng(400 + chunk)
-    while total["transitions"] < 12_000:
-        scenario = with_order(random_scenario(rng), rng)
-        if rng.random() < 0.5:
-            scenario = with_times(scenario, rng)
-        some = min(1000, 20_000 // len(scenario.robots))
-        seed = int(rng.integers(2**32))
-        total += compare(scenario, seed, some, faulty=seed % 3 == 0)
-    assert total["unsure"] < 0.02 * total["transitions"]
+
+    def changed(scenario: Scenario) -> Scenario:
+        scenario = with_order(scenario, rng)
+        return with_times(scenario, rng) if rng.random() < 0.5 else scenario
+
+    total = compare_some(rng, changed)
     for what in ("rescues", "appeared", "waiting", "went on"):
         assert total[what] > 50, (what, total)
 
 
 @pytest.mark.parametrize("chunk", THIRDS)
 def test_worlds_in_which_victims_arrive_are_as_the_plain_stepper_says(chunk: int) -> None:
-    total: Counter[str] = Counter()
     rng = np.random.default_rng(500 + chunk)
-    while total["transitions"] < 12_000:
+
+    def changed(scenario: Scenario) -> Scenario:
         arriving = (with_arrivals, with_list)[rng.integers(2)]
-        scenario = arriving(random_scenario(rng), rng)
-        if rng.random() < 0.5:
-            scenario = with_times(with_order(scenario, rng), rng)
-        some = min(1000, 20_000 // len(scenario.robots))
-        seed = int(rng.integers(2**32))
-        total += compare(scenario, seed, some, faulty=seed % 3 == 0)
-    assert total["unsure"] < 0.02 * total["transitions"]
+        scenario = arriving(scenario, rng)
+        return with_times(with_order(scenario, rng), rng) if rng.random() < 0.5 else scenario
+
+    total = compare_some(rng, changed)
     for what in ("rescues", "appeared", "turned away", "lost"):
         assert total[what] > 50, (what, total)
 
