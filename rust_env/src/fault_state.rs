@@ -168,7 +168,7 @@ impl FaultState {
 
     /// What is wrong with the senses of `robot`.
     #[must_use]
-    pub fn senses(&self, robot: usize, now: Moment) -> Senses<'_> {
+    pub fn senses(&self, robot: usize, now: Moment, absent: u64) -> Senses<'_> {
         let levels = self.levels(robot);
         let (far, fast) = (levels[Kind::PositionNoise as usize], levels[Kind::VelocityNoise as usize]);
         let mut senses = Senses {
@@ -176,6 +176,7 @@ impl FaultState {
             velocity_error: Vec2::zeros(),
             deaf: self.is_struck(Kind::LostCommunication, robot),
             unavailable: self.unavailable(),
+            absent,
             levels: &self.levels,
         };
         if far > 0.0 || fast > 0.0 {

@@ -37,6 +37,8 @@ pub struct Senses<'a> {
     pub deaf: bool,
     /// Robots that are not available, as bits.
     pub unavailable: u64,
+    /// Robots that have left the arena, as bits: nobody sees them, and they see nothing.
+    pub absent: u64,
     /// The faults in effect, one for each robot; none while all are healthy.
     pub levels: &'a [Levels],
 }
@@ -180,11 +182,14 @@ impl Layout {
     pub fn write_through(&self, scene: Scene, own: usize, senses: &Senses, row: &mut [f32]) {
         row.copy_from_slice(&self.fixed[own * self.width()..][..self.width()]);
         self.write_row(scene, own, senses.position_error, senses.velocity_error, row);
+        if senses.absent >> own & 1 == 1 {
+            return row.fill(0.0);
+        }
         let (robots, _) = row.split_at_mut(self.robots * self.robot_width());
         let others = (0..self.robots).filter(|other| *other != own);
         let order = std::iter::once(own).chain(others);
         for (block, robot) in robots.chunks_exact_mut(self.robot_width()).zip(order) {
-            if senses.deaf && robot != own {
+            if senses.deaf && robot != own || senses.absent >> robot & 1 == 1 {
                 block.fill(0.0);
                 continue;
             }

@@ -11,14 +11,16 @@ use crate::scenario::{Engine as Choice, Scenario};
 
 /// What moves robots through a control period.
 trait Engine: Send + Sync {
-    /// Moves the robots through one control period, in place. `obstacles` are the solids' centres.
-    /// Returns which robots were pushed by a contact, as bits.
+    /// Moves the robots through one control period, in place. `obstacles` are the solids' centres; robots that
+    /// are `absent` (as bits) touch nothing and have no velocity. Returns which robots were pushed by a contact,
+    /// as bits.
     fn advance(
         &self,
         workspace: &mut Workspace,
         positions: &mut [Vec2],
         velocities: &mut [Vec2],
         obstacles: &[Vec2],
+        absent: u64,
     ) -> u64;
 
     /// Worlds whose steps take long enough to be worth another thread.
@@ -45,16 +47,18 @@ impl Physics {
         })
     }
 
-    /// Moves the robots through one control period, in place. `obstacles` are the solids' centres.
-    /// Returns which robots were pushed by a contact, as bits.
+    /// Moves the robots through one control period, in place. `obstacles` are the solids' centres; robots that
+    /// are `absent` (as bits) touch nothing and have no velocity. Returns which robots were pushed by a contact,
+    /// as bits.
     pub fn advance(
         &self,
         workspace: &mut Workspace,
         positions: &mut [Vec2],
         velocities: &mut [Vec2],
         obstacles: &[Vec2],
+        absent: u64,
     ) -> u64 {
-        self.0.advance(workspace, positions, velocities, obstacles)
+        self.0.advance(workspace, positions, velocities, obstacles, absent)
     }
 
     /// Worlds whose steps take long enough to be worth another thread.
@@ -83,13 +87,23 @@ impl Shapes {
     }
 
     /// Time until anything would touch if all moved straight on, s; infinite if nothing ever would.
-    fn first_touch(&self, touch: Touch, positions: &[Vec2], velocities: &[Vec2], obstacles: &[Vec2]) -> f32 {
+    fn first_touch(
+        &self,
+        touch: Touch,
+        positions: &[Vec2],
+        velocities: &[Vec2],
+        obstacles: &[Vec2],
+        absent: u64,
+    ) -> f32 {
         let mut first = f32::INFINITY;
         for (index, (at, velocity)) in positions.iter().zip(velocities).enumerate() {
+            if is_in(absent, index) {
+                continue;
+            }
             let radius = self.radii[index];
             first = first.min(touch.walls(at.x, velocity.x, self.arena - radius));
             first = first.min(touch.walls(at.y, velocity.y, self.arena - radius));
-            for other in 0..index {
+            for other in (0..index).filter(|other| !is_in(absent, *other)) {
                 let reach = radius + self.radii[other];
                 first = first.min(touch.discs(positions[other] - at, velocities[other] - velocity, reach));
             }
@@ -109,10 +123,11 @@ impl Shapes {
         positions: &mut [Vec2],
         velocities: &mut [Vec2],
         obstacles: &[Vec2],
+        absent: u64,
     ) {
-        let mut held = 0_u64;
+        let mut held = absent;
         loop {
-            let sunk = self.sunk(most, positions, obstacles) & !held;
+            let sunk = self.sunk(most, positions, obstacles, absent) & !held;
             if sunk == 0 {
                 return;
             }
@@ -126,11 +141,14 @@ impl Shapes {
 
     /// The robots that overlap another robot or an obstacle by more than `most` of the smaller of the two,
     /// as bits.
-    fn sunk(&self, most: f32, positions: &[Vec2], obstacles: &[Vec2]) -> u64 {
+    fn sunk(&self, most: f32, positions: &[Vec2], obstacles: &[Vec2], absent: u64) -> u64 {
         let mut sunk = 0_u64;
-        for (index, at) in positions.iter().enumerate() {
+        for (index, at) in positions.iter().enumerate().filter(|(index, _)| !is_in(absent, *index)) {
             let radius = self.radii[index];
             for (other, place) in positions[..index].iter().enumerate() {
+                if is_in(absent, other) {
+                    continue;
+                }
                 let reach = radius + self.radii[other] - most * radius.min(self.radii[other]);
                 if (place - at).norm_squared() < reach * reach {
                     sunk |= 1 << index | 1 << other;
@@ -145,6 +163,11 @@ impl Shapes {
         }
         sunk
     }
+}
+
+/// Whether a robot is one of those given as bits.
+fn is_in(robots: u64, robot: usize) -> bool {
+    robots >> robot & 1 == 1
 }
 
 /// Moves all straight on for `time`, s.

@@ -21,6 +21,8 @@ pub enum Purpose {
     Deadlines = 5,
     /// How many victims arrive in a control step.
     Arrivals = 6,
+    /// Where robots come back.
+    Returns = 7,
 }
 
 /// A stream of random numbers whose state is its key and the count of words drawn.

@@ -112,6 +112,16 @@ pub enum VictimOrder {
     Slot,
 }
 
+/// What becomes of a robot while it is not available.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Unavailable {
+    /// It stays in the arena as a body that does not drive.
+    Stay,
+    /// It leaves the arena, and comes back at a random place.
+    Leave,
+}
+
 /// The contact solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -249,6 +259,8 @@ pub struct Scenario {
     pub faults: Vec<Fault>,
     /// Whether observations have columns for the faults in effect.
     pub observe_faults: bool,
+    /// What becomes of robots while they are not available.
+    pub unavailable_robots: Unavailable,
 }
 
 impl Default for Scenario {
@@ -301,6 +313,7 @@ impl Default for Scenario {
             victim_order: VictimOrder::Relevant,
             faults: vec![],
             observe_faults: false,
+            unavailable_robots: Unavailable::Stay,
         }
     }
 }

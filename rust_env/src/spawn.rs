@@ -99,6 +99,23 @@ impl Spawn {
         clear
     }
 
+    /// Writes the place at which a robot comes back, clear of all others but those `absent` (as bits). If there
+    /// is no such place, it is the one with the most room.
+    pub fn place_back(
+        &self,
+        stream: &mut Stream,
+        robot: usize,
+        absent: u64,
+        obstacles: &[Vec2],
+        robots: &mut [Vec2],
+    ) {
+        let there = |index: &usize| *index != robot && absent >> index & 1 == 0;
+        let others: Vec<(&Body, Vec2)> =
+            (0..robots.len()).filter(there).map(|index| (&self.team[index], robots[index])).collect();
+        let solids = self.placed(obstacles);
+        robots[robot] = self.placing.robot(stream, &self.team[robot], None, &others, &solids).at;
+    }
+
     /// Writes the places of obstacles and robots when an episode starts. Where one finds no clear place,
     /// because of where those before it are, all are drawn again. Returns whether nothing overlaps.
     pub fn place_start(&self, stream: &mut Stream, obstacles: &mut [Vec2], robots: &mut [Vec2]) -> bool {

@@ -13,7 +13,8 @@ use crate::reward::{self, Happened, total_distance};
 use crate::rng::{Purpose, Stream};
 use crate::robot::Commands;
 use crate::rules::Rules;
-use crate::scenario::{MAX_ROBOTS, Shaping};
+use crate::place::DRAWS;
+use crate::scenario::{MAX_ROBOTS, Shaping, Unavailable};
 use crate::tasks::{Events, Loss, Rescue, Victim};
 
 /// Whether and how an episode ended with a step.
@@ -118,28 +119,30 @@ impl World {
         self.velocities.fill(Vec2::zeros());
         let mut stream = Stream::new(self.seed, self.stream, episode, Purpose::Start);
         rules.spawn.place_start(&mut stream, &mut self.obstacles, &mut self.positions);
-        self.fill_slots(rules);
+        self.fill_slots(rules, 0);
         let now = self.now();
         self.faults.begin(rules, now);
         self.freeze(rules);
     }
 
-    /// Lets the victims appear that the situation wants now, or that arrive. Returns how many of these found
-    /// all slots of their task taken.
-    fn fill_slots(&mut self, rules: &Rules) -> usize {
+    /// Lets the victims appear that the situation wants now, or that arrive, away from all robots but those
+    /// `absent`. Returns how many of these found all slots of their task taken.
+    fn fill_slots(&mut self, rules: &Rules, absent: u64) -> usize {
         let Self { seed, stream, episode, step, positions, obstacles, victims, .. } = self;
         let arrivals = rules.arrivals.iter();
         let mut due = arrivals.flat_map(|one| one.due(*step, *seed, *stream, *episode)).peekable();
         if !rules.spawn.wants_victims(victims) && due.peek().is_none() {
             return 0;
         }
+        let there = positions.iter().enumerate().filter(|(robot, _)| absent >> robot & 1 == 0);
+        let robots: Vec<Vec2> = there.map(|(_, at)| *at).collect();
         let mut words = Stream::new(*seed, *stream, *episode, Purpose::Victims).resume(self.victim_words);
         let (appeared, mut turned_away) = (&mut self.appeared, 0);
         if rules.arrivals.is_some() {
             turned_away =
-                rules.spawn.place_arrivals(&mut words, due, *step, appeared, positions, obstacles, victims);
+                rules.spawn.place_arrivals(&mut words, due, *step, appeared, &robots, obstacles, victims);
         } else {
-            rules.spawn.place_victims(&mut words, *step, appeared, positions, obstacles, victims);
+            rules.spawn.place_victims(&mut words, *step, appeared, &robots, obstacles, victims);
         }
         self.victim_words = words.words();
         self.set_deadlines(rules);
@@ -169,7 +172,7 @@ impl World {
     ) -> Ending {
         let shaping = rules.weights.shaping;
         let distance_before = if shaping == Shaping::None { 0.0 } else { self.distance(rules) };
-        let away = self.faults.unavailable();
+        let (away, absent) = (self.faults.unavailable(), self.absent(rules));
         let mut effort = [0.0; MAX_ROBOTS];
         let damping = rules.scenario.damping as f32;
         for (robot, body) in rules.team.iter().enumerate() {
@@ -179,7 +182,7 @@ impl World {
             self.velocities[robot] = body.driven(self.velocities[robot], drive, damping, cap);
         }
         let touched =
-            rules.physics.advance(workspace, &mut self.positions, &mut self.velocities, &self.obstacles);
+            rules.physics.advance(workspace, &mut self.positions, &mut self.velocities, &self.obstacles, absent);
         let mut distance_after = if shaping == Shaping::Progress { self.distance(rules) } else { 0.0 };
 
         let earlier = (events.rescues.len(), events.losses.len());
@@ -189,10 +192,11 @@ impl World {
         }
         self.step += 1;
         self.fresh = false;
-        let turned_away = self.fill_slots(rules);
+        let turned_away = self.fill_slots(rules, absent);
         events.turned_away.extend(repeat_n(env as u32, turned_away));
         let now = self.now();
         self.faults.update(rules, now);
+        self.come_and_go(rules, absent);
         self.freeze(rules);
         let ending = Ending {
             terminated: rules.scenario.end_when_rescued.is_some_and(|goal| self.rescued >= goal),
@@ -288,9 +292,37 @@ impl World {
 
     /// Puts `levels` (one for each robot) in place of the scenario's faults until the episode ends.
     pub fn set_faults(&mut self, rules: &Rules, levels: &[Levels]) {
-        let now = self.now();
+        let (now, absent) = (self.now(), self.absent(rules));
         self.faults.set(levels, now);
+        self.come_and_go(rules, absent);
         self.freeze(rules);
+    }
+
+    /// Robots that have left the arena, as bits.
+    #[must_use]
+    pub fn absent(&self, rules: &Rules) -> u64 {
+        match rules.scenario.unavailable_robots {
+            Unavailable::Stay => 0,
+            Unavailable::Leave => self.faults.unavailable(),
+        }
+    }
+
+    /// Stops the robots that leave, and places those that come back: each one's draws depend on the step and
+    /// on the robot alone.
+    fn come_and_go(&mut self, rules: &Rules, before: u64) {
+        let absent = self.absent(rules);
+        let robots = self.positions.len();
+        for robot in (0..robots).filter(|robot| (before | absent) >> robot & 1 == 1) {
+            self.velocities[robot] = Vec2::zeros();
+        }
+        let mut elsewhere = before | absent;
+        for robot in (0..robots).filter(|robot| (before & !absent) >> robot & 1 == 1) {
+            let row = u64::from(self.step) * robots as u64 + robot as u64;
+            let stream = Stream::new(self.seed, self.stream, self.episode, Purpose::Returns);
+            let mut stream = stream.resume(row * 2 * DRAWS as u64);
+            rules.spawn.place_back(&mut stream, robot, elsewhere, &self.obstacles, &mut self.positions);
+            elsewhere &= !(1 << robot);
+        }
     }
 
     /// Keeps what robots with frozen sensors see.
@@ -305,7 +337,7 @@ impl World {
     /// What the robots' sensors take in now, of all robots (R × D).
     fn sense(&self, rules: &Rules, rows: &mut [f32]) {
         for (robot, row) in rows.chunks_exact_mut(rules.layout.width()).enumerate() {
-            let senses = self.faults.senses(robot, self.now());
+            let senses = self.faults.senses(robot, self.now(), self.absent(rules));
             rules.layout.write_through(self.scene(rules), robot, &senses, row);
         }
     }

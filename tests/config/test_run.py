@@ -243,7 +243,7 @@ def test_what_a_run_depends_on(method: str, warm_start: str, unused: set[str]) -
 
 
 ADDED_SINCE = {
-    "scenario": ("victim_area_m", "victim_places_m", "lost_cost", "arrivals"),
+    "scenario": ("victim_area_m", "victim_places_m", "lost_cost", "arrivals", "unavailable_robots"),
     "network": ("swapped_robots", "shared_gradients", "joint_critic", "symmetry"),
     "train": (
         *("episode_steps", "engine", "stagger_starts", "schedule"),

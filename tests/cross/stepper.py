@@ -71,6 +71,11 @@ class Stepper:
         everyone = range(len(robots))
         self.others = np.array([[j for j in everyone if j != i] for i in everyone], dtype=int)
 
+    def there(self, state: State) -> Bools:
+        """Robots in the arena, (E, R)."""
+        leave = self.scenario.unavailable_robots == "leave"
+        return state.available if leave else np.ones_like(state.available)
+
     def _periods(self, seconds: float) -> int:
         periods = round(seconds / self.scenario.dt_s)
         return periods if periods * self.scenario.dt_s > seconds - 1e-9 else periods + 1
@@ -117,15 +122,18 @@ class Stepper:
         dt, at = self.scenario.dt_s, state.positions
         end = at + velocities * dt
         wall = self.scenario.arena_half_width_m - self.radii
-        near = (np.maximum(abs(at), abs(end)).max(-1) > wall - 1e-4).any(-1)
+        there = self.there(state)
+        near = ((np.maximum(abs(at), abs(end)).max(-1) > wall - 1e-4) & there).any(-1)
         apart = at[:, :, None] - at[:, None]
         closing = (velocities[:, :, None] - velocities[:, None]) * dt
         reach = self.radii[:, None] + self.radii + 1e-4 - 10 * np.eye(len(self.radii))
-        near |= (closest(apart, closing) < reach).any((-1, -2))
+        both = there[:, :, None] & there[:, None]
+        near |= ((closest(apart, closing) < reach) & both).any((-1, -2))
         for index, obstacle in enumerate(self.scenario.obstacles):
             size = obstacle.radius_m or np.hypot(*(obstacle.half_extents_m or (0.0, 0.0)))
             apart = at - state.obstacles[:, None, index]
-            near |= (closest(apart, velocities * dt) < self.radii + size + 0.05).any(-1)
+            close = closest(apart, velocities * dt) < self.radii + size + 0.05
+            near |= (close & there).any(-1)
         return np.asarray(near)
 
     def distances(self, state: State, positions: Array) -> Array:
@@ -279,17 +287,19 @@ class Stepper:
         if self.scenario.observe_faults:
             shown = [kind for kind in state.faults.dtype.names or () if kind != "unavailable"]
             flags += [state.faults[kind][..., None] for kind in shown]
-        known = np.concatenate(flags, axis=-1)
+        there = self.there(state)[..., None]
+        known = np.concatenate(flags, axis=-1) * there
         dark = (state.faults["blackout"] == 1)[..., None]
         deaf = (state.faults["lost_communication"] == 1)[..., None]
         motion = np.concatenate([state.positions, state.velocities], axis=-1)
         blocks = [np.where(dark, 0.0, motion), known]
         if robots > 1:
-            relative = motion[:, self.others] - motion[:, :, None]
+            relative = (motion[:, self.others] - motion[:, :, None]) * there[:, self.others]
             teammates = np.concatenate([relative, known[:, self.others]], axis=-1)
             blocks.append(np.where(dark | deaf, 0.0, teammates.reshape(envs, robots, -1)))
         victims, unsure = self._victims_seen(state)
-        return np.concatenate([*blocks, np.where(dark, 0.0, victims)], axis=-1), unsure
+        rows = np.concatenate([*blocks, np.where(dark, 0.0, victims)], axis=-1)
+        return rows * there, unsure & there[..., 0]
 
     def _victims_seen(self, state: State) -> tuple[Array, Bools]:
         envs, robots = state.positions.shape[:2]

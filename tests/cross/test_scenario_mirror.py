@@ -75,7 +75,8 @@ def test_required_keys_are_required_by_both(key: str) -> None:
 
 def test_choices_are_found() -> None:
     assert {name for name, _ in CHOICES} == {
-        *("situation", "engine", "actions", "rescue_credit", "shaping", "victim_order")
+        *("situation", "engine", "actions", "rescue_credit", "shaping", "victim_order"),
+        "unavailable_robots",
     }
 
 
@@ -189,6 +190,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         "victim_order": "slot",
         "faults": [{**FAULT, "onset_step": 3, "onset_rate_hz": 0.5, "duration_steps": 7}],
         "observe_faults": True,
+        "unavailable_robots": "leave",
     }
     # Friction needs one engine, an area excludes a list of places, and a rate one of arrivals.
     others = {"engine", "victim_places_m", "arrivals"}

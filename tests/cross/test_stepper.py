@@ -114,6 +114,7 @@ def check_victims(
     at = after.places[fresh]
     assert (abs(at) <= scenario.arena_half_width_m - scenario.wall_clearance_m + EXACT).all()
     apart = np.linalg.norm(after.positions[envs] - at[:, None], axis=-1)
+    apart = np.where(Stepper(scenario).there(before)[envs], apart, np.inf)
     assert (apart >= scenario.spawn_clearance_m - EXACT).all() or scenario.arrivals
     return int(fresh.sum())
 
@@ -255,6 +256,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         seen["unsure"] += int(unsure.sum())
         seen["terminated"] += int(terminated.sum())
         seen["unavailable"] += int((~before.available).sum())
+        seen["left"] += int((~plain.there(before)).sum())
         over = result.terminated | result.truncated
         if over.any():
             env.reset(mask=over)
@@ -275,12 +277,13 @@ def test_worlds_are_as_the_plain_stepper_says(chunk: int) -> None:
         scenario = random_scenario(rng)
         some = min(LEAST // CHUNKS // 10, 20_000 // len(scenario.robots))
         seed = int(rng.integers(2**32))
-        scenario = scenario.replace(observe_faults=seed % 2 == 0)
+        unavailable = "leave" if seed // 3 % 2 else "stay"
+        scenario = scenario.replace(observe_faults=seed % 2 == 0, unavailable_robots=unavailable)
         total += compare(scenario, seed, some, faulty=seed % 3 == 0)
     # What was compared must have been worth comparing.
     assert total["free"] > 0.5 * total["transitions"]
     assert total["unsure"] < 0.02 * total["transitions"]
-    for what in ("touched", "rescues", "appeared", "together", "unavailable"):
+    for what in ("touched", "rescues", "appeared", "together", "unavailable", "left"):
         assert total[what] > 50, (what, total)
 
 

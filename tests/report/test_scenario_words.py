@@ -50,6 +50,15 @@ def test_amounts_have_words() -> None:
     assert "hardly" not in scenario_words(alone), "one robot is enough"
 
 
+def test_robots_that_leave_have_words() -> None:
+    faults = [{"robot": "food_0", "kind": "unavailable", "value": 1.0, "onset_step": 9}]
+    made = Scenario().replace(faults=faults, unavailable_robots="leave")
+    assert scenario_words(made).splitlines()[-2:] == [
+        "food_0: is out in 100 % of the steps from step 9 on",
+        "Robots that are out are not in the arena.",
+    ]
+
+
 def test_what_is_doubtful() -> None:
     scenario = Scenario.model_validate(
         {

@@ -266,6 +266,10 @@ class Scenario(Model, Shown):
     observe_faults: bool = Field(
         False, description="let robots see the faults in effect, their own and their teammates'"
     )
+    unavailable_robots: Annotated[Literal["stay", "leave"], ADDED_LATER] = Field(
+        "stay",
+        description="unavailable robots; stay: they stand in the arena; leave: they are not in it",
+    )
 
     _rules: _core.Rules = PrivateAttr()
 
@@ -355,6 +359,11 @@ class Scenario(Model, Shown):
     def has_order(self) -> bool:
         """Whether some victims have to wait for others."""
         return any(task.after for task in self.tasks)
+
+    @property
+    def robots_leave(self) -> bool:
+        """Whether unavailable robots are not in the arena."""
+        return self.unavailable_robots == "leave"
 
     @property
     def has_arrivals(self) -> bool:

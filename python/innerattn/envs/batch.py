@@ -280,6 +280,44 @@ class BatchEnv(Shown):
             levels[..., column] = field
         self._core.set_faults(levels, mask)
 
+    def present(self) -> NDArray[np.bool_]:
+        """Which robots are in the arena, (E, R) bool.
+
+        All are, but for unavailable ones where the scenario's `unavailable_robots` is "leave".
+        """
+        if not self.scenario.robots_leave:
+            return np.ones((self.num_envs, self.num_robots), np.bool_)
+        return np.asarray(self.fault_state()["unavailable"] < 1.0)
+
+    def set_present(self, present: ArrayLike, mask: ArrayLike | None = None) -> None:
+        """Let robots leave the arena and come back, from now to the end of the present episodes.
+
+        A robot that comes back appears at a random place, clear of robots and obstacles. What
+        else is wrong with robots stays as it is now; the scenario's faults neither come nor go any
+        more in these episodes, as after `set_faults`.
+
+        Args:
+            present: (E, R) bool, who is to be in the arena.
+            mask: (E,) bool, the worlds to change; all if None.
+
+        Raises:
+            TypeError: ``present`` or ``mask`` is not bool.
+            ValueError: wrong shape, or the scenario's `unavailable_robots` is not "leave". Nothing
+                has changed then.
+        """
+        if not self.scenario.robots_leave:
+            raise ValueError(
+                "scenario.unavailable_robots = 'stay': must be 'leave' for robots to leave"
+            )
+        wanted, shape = np.asarray(present), (self.num_envs, self.num_robots)
+        if wanted.dtype != np.bool_:
+            raise TypeError(f"present has dtype {wanted.dtype}: must be bool")
+        if wanted.shape != shape:
+            raise ValueError(f"present has shape {wanted.shape}: must be {shape}")
+        faults = self.fault_state()
+        faults["unavailable"] = ~wanted
+        self.set_faults(faults, mask)
+
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
         """Put the robots somewhere else, for studies of motion; rules and victims are left alone.
 

@@ -5,6 +5,7 @@ It steps a single world through `BatchEnv`; for training at speed use `BatchEnv`
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -61,7 +62,9 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
     """One rescue world; made by `parallel_env`.
 
     Agents are the robots' names. All of them live until the episode ends, by truncation after
-    `episode_steps` or by termination where the scenario asks for it, and leave together.
+    `episode_steps` or by termination where the scenario asks for it, and leave together. Where the
+    scenario's `unavailable_robots` is "leave", `agents` holds the robots in the arena alone: one
+    that leaves is truncated, and one that comes joins.
 
     Observations are (D,) float32, columns named by `BatchEnv.observation_names`. Rewards are
     floats. An info holds ``reward_components`` (name to float; they add up to the reward) and
@@ -94,7 +97,7 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         )
         self.possible_agents = list(self._env.robot_names)
         self.agents: list[str] = []
-        self._started = False
+        self._started, self._over = False, True
         self.np_random = np.random.default_rng(first_seed)
         """For wrappers that draw at random, such as SuperSuit's; the world does not use it."""
         self.observation_spaces = robot_observation_spaces(scenario)
@@ -121,10 +124,10 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         obs = self._env.reset(seed)
         if seed is not None:
             self.np_random = np.random.default_rng(seed)
-        self._started = True
-        self.agents = self.possible_agents.copy()
+        self._started, self._over = True, False
+        self.agents = self._present()
         self._screen.follow(self._env)
-        return self._by_agent(obs[0]), {agent: {} for agent in self.agents}
+        return self._by_agent(obs[0], self.agents), {agent: {} for agent in self.agents}
 
     def step(
         self, actions: dict[str, Action]
@@ -139,24 +142,27 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         agents = self.agents
         if not isinstance(actions, dict):
             raise TypeError(f"actions is a {type(actions).__name__}: must be a dict by agent")
-        if not agents:
+        if self._over:
             raise ResetNeeded("no episode is going on: call reset() before step()")
         if actions.keys() != set(agents):
             wrong = sorted(actions.keys() ^ set(agents))
             raise ValueError(f"actions must be of the live agents {agents}; differs in {wrong}")
-        step = self._env.step(
-            np.stack([[self.checked_action(agent, actions[agent]) for agent in agents]])
-        )
+        given = {agent: self.checked_action(agent, actions[agent]) for agent in agents}
+        continuous = self.scenario.actions == "continuous"
+        still = np.zeros(2, np.float32) if continuous else np.int64(0)  # of those who have left
+        step = self._env.step(np.stack([[given.get(one, still) for one in self.possible_agents]]))
         self._screen.follow(self._env)
         terminated, truncated = bool(step.terminated[0]), bool(step.truncated[0])
-        if terminated or truncated:
-            self.agents = []
+        there = self._present()
+        seen = [one for one in self.possible_agents if one in agents or one in there]
+        self._over = terminated or truncated
+        self.agents = [] if self._over else there
         return (
-            self._by_agent(step.obs[0]),
-            dict(zip(agents, step.reward[0].tolist(), strict=True)),
-            dict.fromkeys(agents, terminated),
-            dict.fromkeys(agents, truncated),
-            self._infos(step.rescues),
+            self._by_agent(step.obs[0], seen),
+            self._of(step.reward[0].tolist(), seen),
+            dict.fromkeys(seen, terminated),
+            {one: truncated or one not in there for one in seen},
+            self._infos(step.rescues, seen),
         )
 
     def checked_action(self, agent: str, action: Action) -> NDArray[Any]:
@@ -205,22 +211,31 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         if not self._started:
             raise ResetNeeded(f"no episode has started: call reset() before {what}()")
 
-    def _by_agent(self, rows: NDArray[np.float32]) -> dict[str, Obs]:
-        return {agent: rows[i].copy() for i, agent in enumerate(self.possible_agents)}
+    def _present(self) -> list[str]:
+        """The robots in the arena."""
+        present = self._env.present()[0].tolist()
+        return [one for one, is_in in zip(self.possible_agents, present, strict=True) if is_in]
 
-    def _infos(self, rescues: NDArray[np.void]) -> dict[str, Info]:
+    def _of(self, values: Sequence[Any], agents: Sequence[str]) -> dict[str, Any]:
+        """The values of some agents, from those of all robots."""
+        every = dict(zip(self.possible_agents, values, strict=True))
+        return {agent: every[agent] for agent in agents}
+
+    def _by_agent(self, rows: NDArray[np.float32], agents: Sequence[str]) -> dict[str, Obs]:
+        return self._of([row.copy() for row in rows], agents)
+
+    def _infos(self, rescues: NDArray[np.void], agents: Sequence[str]) -> dict[str, Info]:
         names = self._env.reward_component_names
         gone = {"lost": len(self._env.lost())} if self._env.scenario.has_deadlines else {}
         if self._env.scenario.has_arrivals:
             gone["turned_away"] = int(self._env.turned_away()[0])
         helpers = [rescues[name] for name in rescues.dtype.names or () if name.startswith("helper")]
-        return {
-            agent: {
+        found = [
+            {
                 "reward_components": dict(zip(names, row, strict=True)),
                 "rescues": sum(int((column == i).sum()) for column in helpers),
                 **gone,
             }
-            for i, (agent, row) in enumerate(
-                zip(self.possible_agents, self._env.reward_components()[0].tolist(), strict=True)
-            )
-        }
+            for i, row in enumerate(self._env.reward_components()[0].tolist())
+        ]
+        return self._of(found, agents)

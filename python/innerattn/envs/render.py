@@ -38,7 +38,7 @@ def draw_world(
 
     Args:
         scenario: the world's description.
-        positions: (R, 2) robots' centres [m].
+        positions: (R, 2) robots' centres [m]; NaN of robots that are not there.
         velocities: (R, 2) robots' velocities [m/s].
         victims: (V,) structured; fields ``present``, ``task``, ``x``, ``y`` [m] are used.
         obstacles: (O, 2) obstacles' centres [m].
@@ -57,6 +57,11 @@ def draw_world(
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels_rgba = canvas.buffer_rgba()  # type: ignore[no-untyped-call]
     return np.asarray(pixels_rgba, np.uint8)[..., :3].copy()
+
+
+def positions_of(positions: NDArray[np.float32], present: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Positions (R, 2) of the robots that are ``present`` (R,), and NaN of the others."""
+    return np.where(present[:, None], positions, np.float32(np.nan))
 
 
 def paint_figure(
@@ -158,6 +163,8 @@ def _paint_robots(
         axes.add_patch(
             Circle((float(x), float(y)), robot.radius_m, facecolor=colour, edgecolor="k", zorder=3)
         )
+        if np.isnan(x):
+            continue
         axes.annotate(
             robot.name,
             (float(x), float(y) + robot.radius_m),

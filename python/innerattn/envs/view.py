@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config.scenario import Scenario
-from innerattn.envs.render import draw_world, paint_figure
+from innerattn.envs.render import draw_world, paint_figure, positions_of
 from innerattn.envs.window import Window
 from innerattn.errors import ConfigError, MissingLibraryError
 
@@ -89,7 +89,7 @@ class Screen:
         if self.mode is None:
             return None
         drawn = (
-            env.positions()[world],
+            positions_of(env.positions()[world], env.present()[world]),
             env.velocities()[world],
             env.victims()[world],
             env.obstacles()[world],

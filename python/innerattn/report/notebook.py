@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from innerattn.config import Scenario
 from innerattn.config.amounts import in_words
 from innerattn.envs import BatchEnv
-from innerattn.envs.render import draw_world
+from innerattn.envs.render import draw_world, positions_of
 from innerattn.evaluate import Evaluation
 from innerattn.experiments.run import FinishedRun
 from innerattn.records.record import Record
@@ -82,7 +82,7 @@ def _picture(env: BatchEnv, title: str) -> str:
     try:
         pixels = draw_world(
             env.scenario,
-            env.positions()[0],
+            positions_of(env.positions()[0], env.present()[0]),
             env.velocities()[0],
             env.victims()[0],
             env.obstacles()[0],

@@ -23,7 +23,9 @@ _WHAT = {
 
 def scenario_words(scenario: Scenario) -> str:
     """Sentences, a line each: tasks and who can do them, what is doubtful, and the faults."""
-    return "\n".join([*_tasks(scenario), *_doubts(scenario), *map(_fault, scenario.faults)])
+    faults = map(_fault, scenario.faults)
+    gone = ["Robots that are out are not in the arena."] if scenario.robots_leave else []
+    return "\n".join([*_tasks(scenario), *_doubts(scenario), *faults, *gone])
 
 
 def _tasks(scenario: Scenario) -> Iterator[str]:

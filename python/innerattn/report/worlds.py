@@ -18,6 +18,7 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
         "has_services": scenario.has_services,
         "has_deadlines": scenario.has_deadlines,
         "has_order": scenario.has_order,
+        "robots_leave": scenario.robots_leave,
         "tasks": [
             {"name": task.name, "needs": list(task.needs), "amounts": task.sums}
             for task in scenario.tasks

@@ -5,7 +5,7 @@
 //! once, by the least impulses that do it: the inelastic law of Moreau, solved by Gauss-Seidel sweeps.
 //! What rapier tends to as its substeps grow short is computed here without any.
 
-use super::{Engine, Shapes, Workspace, fly};
+use super::{Engine, Shapes, Workspace, fly, is_in};
 use crate::geometry::{Solid, Touch, Vec2};
 use crate::robot::Body;
 use crate::scenario::Scenario;
@@ -64,11 +64,11 @@ impl Discs {
     }
 
     /// All that touch now, whether they approach or not: what is pushed may be pushed into a third.
-    fn find(&self, positions: &[Vec2], obstacles: &[Vec2], contacts: &mut Vec<Contact>) {
+    fn find(&self, positions: &[Vec2], obstacles: &[Vec2], absent: u64, contacts: &mut Vec<Contact>) {
         let near = TOUCHING * self.shapes.arena.max(1.0);
         contacts.clear();
         let mut add = |robot, other, normal| contacts.push(Contact { robot, other, normal, impulse: 0.0 });
-        for (index, at) in positions.iter().enumerate() {
+        for (index, at) in positions.iter().enumerate().filter(|(index, _)| !is_in(absent, *index)) {
             let radius = self.shapes.radii[index];
             for axis in 0..2 {
                 if at[axis].abs() + radius >= self.shapes.arena - near {
@@ -78,6 +78,9 @@ impl Discs {
                 }
             }
             for (other, place) in positions[..index].iter().enumerate() {
+                if is_in(absent, other) {
+                    continue;
+                }
                 let apart = place - at;
                 let reach = radius + self.shapes.radii[other] + near;
                 if apart.norm_squared() <= reach * reach {
@@ -121,11 +124,12 @@ impl Discs {
     }
 
     /// Pushes apart what overlaps, the lighter farther; walls and obstacles give way to nobody.
-    fn separate(&self, positions: &mut [Vec2], obstacles: &[Vec2]) {
+    fn separate(&self, positions: &mut [Vec2], obstacles: &[Vec2], absent: u64) {
+        let present = |index: &usize| !is_in(absent, *index);
         for _ in 0..SEPARATING_SWEEPS {
             let mut overlapped = false;
-            for index in 0..positions.len() {
-                for other in 0..index {
+            for index in (0..positions.len()).filter(present) {
+                for other in (0..index).filter(present) {
                     let apart = positions[other] - positions[index];
                     let reach = self.shapes.radii[index] + self.shapes.radii[other];
                     if apart.norm_squared() >= reach * reach {
@@ -140,7 +144,10 @@ impl Discs {
                     positions[other] += normal * (share * others);
                 }
             }
-            for (at, radius) in positions.iter_mut().zip(&self.shapes.radii) {
+            for (index, (at, radius)) in positions.iter_mut().zip(&self.shapes.radii).enumerate() {
+                if is_in(absent, index) {
+                    continue;
+                }
                 for (solid, centre) in self.shapes.solids.iter().zip(obstacles) {
                     let (distance, outward) = solid.nearest(*at - centre);
                     if distance < *radius {
@@ -165,6 +172,7 @@ impl Engine for Discs {
         positions: &mut [Vec2],
         velocities: &mut [Vec2],
         obstacles: &[Vec2],
+        absent: u64,
     ) -> u64 {
         let Scratch { contacts, before } = &mut workspace.discs;
         before.clear();
@@ -175,13 +183,13 @@ impl Engine for Discs {
         // are enough. Numbers that are none might go on for ever.
         let bound = self.most_instants + positions.len();
         for instant in 0..=bound {
-            let first = self.shapes.first_touch(self.touch, positions, velocities, obstacles);
+            let first = self.shapes.first_touch(self.touch, positions, velocities, obstacles, absent);
             if first >= left {
                 break;
             }
             fly(positions, velocities, first);
             left -= first;
-            self.find(positions, obstacles, contacts);
+            self.find(positions, obstacles, absent, contacts);
             touched |= self.resolve(contacts, velocities);
             if instant == bound {
                 velocities.fill(Vec2::zeros());
@@ -194,8 +202,8 @@ impl Engine for Discs {
             }
         }
         fly(positions, velocities, left);
-        self.separate(positions, obstacles);
-        self.shapes.hold(MOST_OVERLAP, before, positions, velocities, obstacles);
+        self.separate(positions, obstacles, absent);
+        self.shapes.hold(MOST_OVERLAP, before, positions, velocities, obstacles, absent);
         touched
     }
 

@@ -10,7 +10,7 @@ use rapier2d::prelude::{
     RigidBodyHandle, RigidBodySet, SoftBodySet, Vector,
 };
 
-use super::{Engine, Shapes, Workspace, fly};
+use super::{Engine, Shapes, Workspace, fly, is_in};
 use crate::geometry::{Solid, Touch, Vec2};
 use crate::robot::Body;
 use crate::scenario::Scenario;
@@ -146,8 +146,10 @@ impl Rapier {
         world
     }
 
-    fn place(&self, world: &mut EngineWorld, positions: &[Vec2], velocities: &[Vec2]) {
-        for (handle, (at, velocity)) in self.robots.iter().zip(positions.iter().zip(velocities)) {
+    /// Puts all but those `absent` into their places: these stay where the prepared world has them, apart.
+    fn place(&self, world: &mut EngineWorld, positions: &[Vec2], velocities: &[Vec2], absent: u64) {
+        let moving = self.robots.iter().zip(positions.iter().zip(velocities)).enumerate();
+        for (_, (handle, (at, velocity))) in moving.filter(|(index, _)| !is_in(absent, *index)) {
             let body = &mut world.bodies[*handle];
             body.set_translation(Vector::new(at.x, at.y), false);
             body.set_linvel(Vector::new(velocity.x, velocity.y), false);
@@ -184,6 +186,7 @@ impl Engine for Rapier {
         positions: &mut [Vec2],
         velocities: &mut [Vec2],
         obstacles: &[Vec2],
+        absent: u64,
     ) -> u64 {
         let substep = self.parameters.dt;
         let mut contact: Option<EngineWorld> = None;
@@ -192,7 +195,7 @@ impl Engine for Rapier {
         while done < self.substeps {
             let left = self.substeps - done;
             let horizon = if done == 0 { self.dt } else { left as f32 * substep };
-            let first = self.shapes.first_touch(TOUCH, positions, velocities, obstacles);
+            let first = self.shapes.first_touch(TOUCH, positions, velocities, obstacles, absent);
             if first >= horizon {
                 fly(positions, velocities, horizon);
                 break;
@@ -200,14 +203,14 @@ impl Engine for Rapier {
             let free = ((first / substep) as u32).min(left - 1);
             fly(positions, velocities, free as f32 * substep);
             let world = contact.get_or_insert_with(|| self.start(obstacles));
-            self.place(world, positions, velocities);
+            self.place(world, positions, velocities, absent);
             let scratch = &mut workspace.rapier;
             scratch.step(world, &self.parameters);
             scratch.before.clear();
             scratch.before.extend_from_slice(positions);
             touched |= self.read(world, positions, velocities);
             self.keep_inside(positions, velocities);
-            self.shapes.hold(MOST_OVERLAP, &scratch.before, positions, velocities, obstacles);
+            self.shapes.hold(MOST_OVERLAP, &scratch.before, positions, velocities, obstacles, absent);
             done += free + 1;
         }
         touched

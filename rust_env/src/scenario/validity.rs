@@ -6,10 +6,10 @@ use super::check::{broken, counts, named, within};
 use super::{
     AMOUNTS, Abilities, Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_MASS_RATIO_RAPIER, MAX_NEEDS,
     MAX_OBSTACLES, MAX_PLACES, MAX_ROBOTS, MAX_TIME_S, MAX_TRAVEL_RADII, MAX_VICTIMS, Robot, START_GAP_M,
-    Scenario, Shape, Task,
+    Scenario, Shape, Task, Unavailable,
 };
 use crate::error::Result;
-use crate::fault::{Fault, Spec};
+use crate::fault::{Fault, Kind, Spec};
 use crate::matching::fillable;
 
 impl Scenario {
@@ -199,6 +199,11 @@ impl Scenario {
         }
         let Spec { name, range: (low, high), unit, .. } = fault.kind.spec();
         within(&key(&format!("value ({name})")), fault.value, *low, *high, unit)?;
+        let leaves = self.unavailable_robots == Unavailable::Leave && fault.kind == Kind::Unavailable;
+        if leaves && 0.0 < fault.value && fault.value < 1.0 {
+            let rule = "must be 0 or 1 where unavailable_robots = \"leave\"";
+            return broken(&key("value (unavailable)"), &fault.value, rule);
+        }
         if fault.onset_step >= self.episode_steps {
             let steps = self.episode_steps;
             let rule = format!("must be before the end of the episode of {steps} control steps");

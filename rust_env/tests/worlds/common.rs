@@ -10,6 +10,7 @@ use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
     Abilities, Actions, Arrival, Deadline, Engine, Interrupted, Obstacle, Robot, Scenario, Shape, Situation,
+    Unavailable,
 };
 use innerattn_env::tasks::{Loss, Rescue};
 
@@ -203,6 +204,17 @@ pub fn with_list(scenario: Scenario) -> Scenario {
     };
     let arrivals = (0..30).map(arrival).collect();
     Scenario { situation: Situation::Listed, arrivals, rescue_radius_m: 0.4, ..scenario }
+}
+
+/// The same with robots that leave while they are not available.
+pub fn with_leaving(scenario: Scenario) -> Scenario {
+    let leaves = |robot: &Robot| Fault {
+        onset_rate_hz: Some(0.5),
+        duration_steps: Some(7),
+        ..fault(&robot.name, Kind::Unavailable, 1.0)
+    };
+    let faults = scenario.robots.iter().map(leaves).collect();
+    Scenario { faults, unavailable_robots: Unavailable::Leave, ..scenario }
 }
 
 /// A disc at a random place, a box at a random place, and a box that stays.

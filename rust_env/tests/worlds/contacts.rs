@@ -34,7 +34,7 @@ impl Scene {
 
     /// Moves all through one period; returns who touched something, as bits.
     fn advance(&mut self) -> u64 {
-        self.rules.physics.advance(&mut self.workspace, &mut self.positions, &mut self.velocities, &[])
+        self.rules.physics.advance(&mut self.workspace, &mut self.positions, &mut self.velocities, &[], 0)
     }
 
     fn momentum(&self) -> Vec2 {

@@ -82,7 +82,7 @@ struct Moved {
 
 fn moved(physics: &Physics, workspace: &mut Workspace, world: &World, velocities: &[Vec2]) -> Moved {
     let (mut positions, mut velocities) = (world.positions.clone(), velocities.to_vec());
-    let touched = physics.advance(workspace, &mut positions, &mut velocities, &world.obstacles);
+    let touched = physics.advance(workspace, &mut positions, &mut velocities, &world.obstacles, 0);
     Moved { positions, velocities, touched }
 }
 

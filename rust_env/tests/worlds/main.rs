@@ -13,6 +13,7 @@ mod extending;
 mod extremes;
 mod faults;
 mod fuzz;
+mod leaving;
 mod order;
 mod snapshot;
 mod speed;

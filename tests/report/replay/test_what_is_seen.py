@@ -107,6 +107,42 @@ def test_of_sixteen_robots_the_strongest_arrows_are_drawn(browser: Browser, tmp_
         assert len(page.evaluate(ARROWS)) > len(drawn)
 
 
+# The robots whose disc is drawn, and whether any trail comes from where none was.
+DRAWN = """(step) => {
+  const scene = replay.scenes[0], found = [];
+  const { context } = scene, arc = context.arc;
+  scene.drawRobot = function (robot) {
+    context.arc = (x, ...rest) => {
+      if (!Number.isNaN(x)) found.push(robot.index);
+      arc.call(context, x, ...rest);
+    };
+    scene.constructor.prototype.drawRobot.call(this, robot);
+    delete context.arc;
+  };
+  scene.draw(0, step, { ...replay.look, robot: -1, trails: true, all: true }, replay.paint);
+  delete scene.drawRobot;
+  return [...new Set(found)];
+}"""
+
+
+def test_robots_that_left_are_not_drawn(browser: Browser, tmp_path: Path) -> None:
+    faults = [
+        {"robot": "medical_0", "kind": "unavailable", "value": 1.0, "duration_steps": 3},
+        {"robot": "food_1", "kind": "unavailable", "value": 1.0, "onset_step": 5},
+    ]
+    scenario = Scenario.preset("mixed").replace(faults=faults, unavailable_robots="leave")
+    record = watched(scenario, episodes=1)
+    with visit(browser, written(tmp_path, {"a": record})) as seen:
+        page = seen.page
+        ready(page)
+        assert page.evaluate(DRAWN, 1.5) == [0, 1, 2]
+        assert page.evaluate(DRAWN, 4) == [0, 1, 2, 3]
+        assert page.evaluate(DRAWN, 6) == [0, 2, 3]
+        x, y = page.evaluate("() => replay.scenes[0].at(...replay.run.place(0, 6, 1))")
+        assert page.evaluate("([x, y]) => replay.scenes[0].robotAt(x, y, 0, 6)", [x, y]) != 1
+        assert page.evaluate("([x, y]) => replay.scenes[0].robotAt(x, y, 0, 4)", [x, y]) == 1
+
+
 def test_attention_that_a_robot_receives(browser: Browser, tmp_path: Path) -> None:
     faults = [{"robot": "medical_0", "kind": "unavailable", "value": 1.0, "onset_step": 3}]
     record = watched(Scenario.preset("mixed").replace(faults=faults), episodes=1)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.envs.render import paint_world
+from innerattn.envs.render import paint_world, positions_of
 from innerattn.errors import MissingLibraryError, RunError
 from innerattn.measures.moments import handoffs_of_all_robots, obstacle_places
 from innerattn.records.record import Record
@@ -159,6 +159,8 @@ def _paint(
     kept = {field: values[episode, now] for field, values in record.steps.items()}
     later = record.steps["positions"][episode, min(now + 1, last)]
     positions = kept["positions"] + np.float32(moment - int(moment)) * (later - kept["positions"])
+    if record.scenario.robots_leave and "faults" in kept:
+        positions = positions_of(positions, kept["faults"]["unavailable"] < 1.0)
     legend = paint_world(
         axes, record.scenario, positions, kept["velocities"], kept["victims"], obstacles
     )
@@ -204,7 +206,7 @@ def _paint_attention(
     colour = 0.65 * np.asarray(disc.get_facecolor()[:3]) + 0.35
     for other, weight in enumerate(weights.tolist()):
         width = weight * _WIDEST_PT
-        if other == robot or width < 0.4:
+        if other == robot or width < 0.4 or np.isnan(positions[[robot, other]]).any():
             continue
         arrow = FancyArrowPatch(
             tuple(positions[robot].tolist()),

@@ -40,11 +40,17 @@ class Scene {
     return [(px - this.side / 2) / this.scale, (this.side / 2 - py) / this.scale];
   }
 
+  /** Where a robot is on the canvas; no numbers, which draw nothing, while it has left the arena. */
+  spot(episode, step, index) {
+    const left = this.worlds.robots_leave && this.run.isAway(episode, step, index);
+    return left ? [NaN, NaN] : this.at(...this.run.place(episode, step, index));
+  }
+
   /** The robot under a point of the canvas in CSS pixels, or -1. */
   robotAt(x, y, episode, step) {
     let found = -1, least = 14;
     for (const robot of this.worlds.robots) {
-      const [px, py] = this.at(...this.run.place(episode, step, robot.index));
+      const [px, py] = this.spot(episode, step, robot.index);
       const away = Math.hypot(px - x, py - y) - robot.radius_m * this.scale;
       if (away < least) [found, least] = [robot.index, away];
     }
@@ -58,7 +64,7 @@ class Scene {
   draw(episode, step, look, paint) {
     const { context, run, worlds } = this, victims = run.victims[episode];
     Object.assign(this, { episode, step, look, paint, labels: [] });
-    this.spots = worlds.robots.map((one) => this.at(...run.place(episode, step, one.index)));
+    this.spots = worlds.robots.map((one) => this.spot(episode, step, one.index));
     this.room = new Room(this.side, worlds.robots.map(({ index, radius_m: radius }) => (
       [...this.spots[index], radius * this.scale + (index === look.robot ? 6 : 2)]
     )));
@@ -86,7 +92,7 @@ class Scene {
     let [x, y] = this.spots[robot.index];
     const first = run.firstOf(episode, robot.index);
     for (let past = Math.ceil(step) - 1; past >= first && past > step - TRAIL_STEPS; past--) {
-      const [px, py] = this.at(...run.place(episode, past, robot.index));
+      const [px, py] = this.spot(episode, past, robot.index);
       context.globalAlpha = 0.45 * (1 - (step - past) / TRAIL_STEPS);
       context.beginPath();
       context.moveTo(x, y);
