@@ -140,12 +140,10 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[FinishedRun]:
 
     def make(folder: Path) -> None:
         for case in cases:
-            made_run(folder, case.situation, case.method, case.seed)
+            made_run(folder, case.worlds, case.method, case.seed)
 
     folder = made_once(tmp_path_factory, "made_runs", make)
-    return [
-        read_run(case, folder / f"{case.situation}-{case.method}-s{case.seed}") for case in cases
-    ]
+    return [read_run(case, folder / f"{case.worlds}-{case.method}-s{case.seed}") for case in cases]
 
 
 @pytest.fixture(scope="session")

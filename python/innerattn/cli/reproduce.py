@@ -161,7 +161,7 @@ class Reproduce(LongCommand):
             return
         if self.page.suffix != ".html":
             raise UsageError(f"--page {self.page}: must end in .html")
-        cases = {(run.case.situation, run.case.method, run.case.seed) for run in study.planned}
+        cases = {(run.case.worlds, run.case.method, run.case.seed) for run in study.planned}
         if len(cases) < len(study.planned):
             raise UsageError(f"--page: runs of {self.target} differ by more than a page tells")
         check_target(self.page)

@@ -181,7 +181,7 @@ def _row(run: FinishedRun) -> dict[str, Any]:
     rescues = np.concatenate([record.rescues for record in records])
     rewards = np.concatenate([record.rewards_total for record in records])
     row: dict[str, Any] = {
-        "situation": run.situation,
+        "situation": run.case.worlds,
         "method": run.method,
         "variant": run.case.variant,
         "seed": run.seed,

@@ -17,24 +17,25 @@ class Case:
     """What tells the runs of one study apart.
 
     Attributes:
-        situation: name of the built-in scenario, such as "mixed" or "mixed-8".
+        worlds: name of the built-in scenario, such as "mixed" or "mixed-8"; of other worlds their
+            situation.
         method: value of `train.method`.
         seed: of training.
         variant: what else was changed, as a word; nothing in the paper's own comparison.
     """
 
-    situation: str
+    worlds: str
     method: str
     seed: int
     variant: str = ""
 
     @property
     def trained(self) -> str:
-        """How it was trained, apart from the situation and the seed."""
+        """How it was trained, apart from the worlds and the seed."""
         return f"{self.method} {self.variant}".rstrip()
 
     def __str__(self) -> str:
-        return f"{self.situation} {self.trained} seed {self.seed}"
+        return f"{self.worlds} {self.trained} seed {self.seed}"
 
 
 def of_seed(seed: int) -> dict[str, object]:

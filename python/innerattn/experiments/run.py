@@ -65,8 +65,8 @@ class FinishedRun(Shown):
 
     @property
     def situation(self) -> str:
-        """The worlds it was trained and measured in, such as "mixed"."""
-        return self.case.situation
+        """The situation of the worlds it was trained and measured in."""
+        return self.config.scenario.situation
 
     @property
     def method(self) -> str:
@@ -171,24 +171,24 @@ def read_metrics(run: FinishedRun, *names: str) -> list[tuple[Any, ...]]:
 
 
 def by_method(runs: Sequence[FinishedRun]) -> dict[tuple[str, str], list[FinishedRun]]:
-    """Runs by situation and method, in the order these first appear; by seed within.
+    """Runs by worlds and method, in the order these first appear; by seed within.
 
     Raises:
-        RunError: there are none, or a situation, method and seed come twice.
+        RunError: there are none, or worlds, method and seed come twice.
     """
     if not runs:
         raise RunError("a study needs at least one run")
     groups: dict[tuple[str, str], list[FinishedRun]] = {}
     for run in sorted(runs, key=lambda run: run.seed):
-        groups.setdefault((run.situation, run.method), []).append(run)
+        groups.setdefault((run.case.worlds, run.method), []).append(run)
     for group in groups.values():
         for first, second in pairwise(group):
             if first.seed == second.seed:
                 raise RunError(
-                    f"{first.folder} and {second.folder}: both are {first.situation}, "
+                    f"{first.folder} and {second.folder}: both are {first.case.worlds}, "
                     f"{first.method}, seed {first.seed}; must be one run of each seed"
                 )
-    order = dict.fromkeys((run.situation, run.method) for run in runs)
+    order = dict.fromkeys((run.case.worlds, run.method) for run in runs)
     return {key: groups[key] for key in order}
 
 
@@ -196,9 +196,9 @@ def refuse_unlike(runs: Sequence[FinishedRun]) -> None:
     """Refuse runs that cannot be compared.
 
     Raises:
-        RunError: a run's label is not what its configuration says; runs of one situation and
-            method were trained or measured differently, other than by their seed; or runs of one
-            situation and seed were measured in different worlds, so that they are no pairs.
+        RunError: a run's label is not what its configuration says; runs of the same worlds and
+            method were trained or measured differently, other than by their seed; or runs of the
+            same worlds and seed were measured in different worlds, so that they are no pairs.
     """
     seen: dict[tuple[str, str], tuple[Path, dict[str, Any]]] = {}
     measured: dict[tuple[str, int], tuple[Path, int]] = {}
@@ -210,13 +210,13 @@ def refuse_unlike(runs: Sequence[FinishedRun]) -> None:
                     f"but it is listed as {label!r}"
                 )
         what, worlds = comparable(run.config), run.config.evaluate.seed
-        first = measured.setdefault((run.situation, run.seed), (run.folder, worlds))
+        first = measured.setdefault((run.case.worlds, run.seed), (run.folder, worlds))
         if worlds != first[1]:
             raise RunError(
                 f"{run.folder} and {first[0]}: are of one seed, and evaluate.seed is {worlds} and "
                 f"{first[1]}: must be the same worlds"
             )
-        other, known = seen.setdefault((run.situation, run.method), (run.folder, what))
+        other, known = seen.setdefault((run.case.worlds, run.method), (run.folder, what))
         if differing := [name for name in what if what[name] != known.get(name)]:
             raise RunError(
                 f"{run.folder} and {other}: are listed as the same but for the seed, and differ "

@@ -24,6 +24,13 @@ def unframed(learner: Learner) -> Learner:
     return learner.learner if isinstance(learner, FramedLearner) else learner
 
 
+def as_seen(learner: Learner, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor]:
+    """Observations (B, R, D) and actions (B, R) as a policy's networks have them when it plays."""
+    if isinstance(learner, FramedLearner):
+        return learner.as_seen(obs, actions)
+    return obs, actions
+
+
 class FramedLearner:
     """A learner in frames that observations choose themselves, or that are drawn.
 

@@ -15,14 +15,14 @@ def test_all_combinations_are_planned_and_are_what_they_say() -> None:
     found = set()
     for one in runs:
         config, arm = one.config, arm_of(one.case)
-        assert config.scenario.situation == one.case.situation
+        assert config.scenario.situation == one.case.worlds
         assert (config.train.method, config.train.seed) == (one.case.method, one.case.seed)
         assert config.network.attention == one.case.method.removeprefix("td-")
         assert config.scenario.rescue_credit == arm.credit
         if arm.penalty is not None:
             assert config.td.attention_logit_penalty == arm.penalty
         assert config.network.parameter_sharing == ("kind" if arm.shared else "none")
-        found.add((one.case.situation, one.case.seed, arm))
+        found.add((one.case.worlds, one.case.seed, arm))
     assert found == set(product(("single", "mixed"), range(2), ARMS))
     assert [arm for arm in ARMS if arm.shared] == [Arm("team", 0.0, shared=True)]
     inner = {(arm.credit, arm.penalty) for arm in ARMS if arm.method == "td-inner"}

@@ -11,14 +11,14 @@ from innerattn.experiments.robustness.design import TEAMS, groups
 
 def test_the_runs_of_the_study() -> None:
     planned = planned_of("robustness", METHODS, ("mixed",), 2)
-    parts = Counter((one.case.situation, one.case.variant) for one in planned)
+    parts = Counter((one.case.worlds, one.case.variant) for one in planned)
     own = {("mixed", ""): 8, ("mixed-faults", ""): 2, ("mixed-faults", "masked"): 2}
     assert parts == own | {(name, "team"): 1 for name in TEAMS}
     assert len({one.key for one in planned}) == len(planned)
     by_case = {one.case: one.config for one in planned}
     for case, config in by_case.items():
         assert config.network.mask_unavailable == (case.variant == "masked")
-        assert bool(config.scenario.faults) == (case.situation == "mixed-faults")
+        assert bool(config.scenario.faults) == (case.worlds == "mixed-faults")
         short = by_case[Case("mixed", "td-inner", 0)].train.env_steps
         assert (config.train.env_steps < short) == (case.variant == "team")
     teams = [by_case[Case(name, "td-inner", 0, "team")] for name in TEAMS]

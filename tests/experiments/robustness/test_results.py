@@ -25,7 +25,7 @@ def made(seeds: range) -> tuple[Documents, list[GroupResult]]:
     planned = planned_of("robustness", METHODS, ("mixed",), len(seeds))
     documents, found = {}, []
     for number, group in enumerate(groups([one.case for one in planned])):
-        name = group.cases[0].situation if group.part == "teams" else "mixed"
+        name = group.cases[0].worlds if group.part == "teams" else "mixed"
         methods = [case.method for case in group.cases]
         document = made_document(methods, Scenario.preset(name), group.kinds, number)
         documents[group.name] = json.loads(json.dumps(document))
@@ -47,6 +47,7 @@ def assert_over_seeds(found: Estimate | None, values: list[float]) -> None:
     assert found.runs == len(values)
 
 
+@pytest.mark.long
 def test_retention_of_every_policy(study: tuple[Documents, Robustness]) -> None:
     documents, found = study
     (deployment,) = found.deployments

@@ -19,7 +19,7 @@ def made(*parts: str) -> Robustness:
     """What made-up documents of two seeds say about parts of the study."""
 
     def document(group: Group, seed: int) -> dict[str, object]:
-        name = group.cases[0].situation if group.part == "teams" else "mixed"
+        name = group.cases[0].worlds if group.part == "teams" else "mixed"
         methods = [case.method for case in group.cases]
         return made_document(methods, Scenario.preset(name), group.kinds, seed)
 
@@ -38,6 +38,7 @@ def section(text: str, heading: str) -> str:
     return text.split(f"\n## {heading}\n")[1].split("\n## ")[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("place", [0, 1])
 def test_tables_of_a_situation(place: int, whole: Robustness) -> None:
     text = robustness_page(whole, "short", [])

@@ -26,7 +26,7 @@ from innerattn.evaluate.bounds.results import Attention, Bounds, Level, level_of
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import TrainedPolicy
 from innerattn.learn.actor_critic import ActorCritic
-from innerattn.learn.framed import FramedLearner, unframed
+from innerattn.learn.framed import as_seen, unframed
 from innerattn.learn.types import Learner
 from innerattn.nn import Actor, CentralCritic, Critic, InnerAttention, JointCritic
 from innerattn.train import load_policy
@@ -180,8 +180,7 @@ def played_states(config: RunConfig, learner: Learner, count: int, seed: int) ->
     obs, actions = (
         torch.tensor(record.steps[name][np.arange(count), step]) for name in ("obs", "actions")
     )
-    if isinstance(learner, FramedLearner):
-        obs, actions = learner.as_seen(obs, actions)
+    obs, actions = as_seen(learner, obs, actions)
     obs, actions = obs.transpose(0, 1), actions.t()
     available = None
     if config.network.mask_unavailable:

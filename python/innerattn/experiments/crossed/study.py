@@ -63,8 +63,8 @@ def read_situations(runs: Sequence[FinishedRun]) -> list[Situation]:
     Raises:
         RunError: records cannot be read, or a run's team has not two food robots.
     """
-    names = list(dict.fromkeys(run.case.situation for run in runs))
-    return [_situation(name, [run for run in runs if run.case.situation == name]) for name in names]
+    names = list(dict.fromkeys(run.case.worlds for run in runs))
+    return [_situation(name, [run for run in runs if run.case.worlds == name]) for name in names]
 
 
 def _situation(name: str, own: Sequence[FinishedRun]) -> Situation:

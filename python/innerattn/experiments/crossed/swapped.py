@@ -65,7 +65,7 @@ def read_swaps(runs: Sequence[FinishedRun]) -> list[Swap]:
     shares: dict[tuple[str, str], tuple[dict[int, float], dict[int, float]]] = {}
     for run in runs:
         share, case = outcome_of(run).first_share, run.case
-        group = shares.setdefault((case.situation, case.method), ({}, {}))
+        group = shares.setdefault((case.worlds, case.method), ({}, {}))
         if share is not None:
             group[case.variant.endswith(SWAPPED)][case.seed] = share
     return [

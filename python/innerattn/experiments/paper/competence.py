@@ -83,7 +83,7 @@ def _over_runs(
 ) -> Competence:
     mean = {name: seed_estimate([values[name] for values in each]) for name in competence_units()}
     seeds = tuple(run.seed for run in group)
-    return Competence(group[0].situation, method, seeds, counts, each, mean)
+    return Competence(group[0].case.worlds, method, seeds, counts, each, mean)
 
 
 def _of_run(run: FinishedRun) -> tuple[dict[str, int], dict[str, float | None]]:

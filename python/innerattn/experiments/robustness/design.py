@@ -57,7 +57,7 @@ def groups(cases: Collection[Case]) -> list[Group]:
             found.append(Group("training", f"trained-with-faults-s{seed}", faulty))
     for team in map(_team, TEAMS):
         if team in cases:
-            name = f"team-{team.situation}"
+            name = f"team-{team.worlds}"
             found.append(Group("teams", name, (team,), ("unavailable",), 200))
     return found
 

@@ -135,7 +135,7 @@ def read_robustness(runs: Sequence[FinishedRun], out: Path) -> Robustness:
     Raises:
         RunError: a document is damaged.
     """
-    faulty = (run for run in runs if run.situation == WITH_FAULTS)
+    faulty = (run for run in runs if run.case.worlds == WITH_FAULTS)
     seen = {fault.kind for run in faulty for fault in run.config.scenario.faults}
     return over_groups(read_measurements(runs, out), seen)
 
@@ -153,7 +153,7 @@ def over_groups(found: Sequence[GroupResult], seen: Collection[str]) -> Robustne
     )
     by_situation: dict[str, list[GroupResult]] = {}
     for one in deployed:
-        by_situation.setdefault(one.group.cases[0].situation, []).append(one)
+        by_situation.setdefault(one.group.cases[0].worlds, []).append(one)
     return Robustness(
         deployments=tuple(_deployment(*both) for both in by_situation.items()),
         training=_fault_training(trained, seen) if trained else None,
@@ -210,7 +210,7 @@ def _teams(group: GroupResult) -> list[TeamResult]:
     kinds = dict.fromkeys(robot.rpartition("_")[0] for robot in group.robots)
     return [
         TeamResult(
-            name=group.group.cases[0].situation,
+            name=group.group.cases[0].worlds,
             robots=group.robots,
             policy=name,
             rescues=policy.rescues,

@@ -20,8 +20,8 @@ def grouped(runs: Sequence[FinishedRun]) -> list[list[FinishedRun]]:
     """
     worlds = [json.dumps(run.config.scenario.model_dump(mode="json")) for run in runs]
     settings = [json.dumps(comparable(run.config)) for run in runs]
-    named = _named(runs, [(run.situation,) for run in runs], worlds)
-    named = _named(named, [(run.situation, run.method) for run in named], settings)
+    named = _named(runs, [(run.case.worlds,) for run in runs], worlds)
+    named = _named(named, [(run.case.worlds, run.method) for run in named], settings)
     return list(by_method(named).values())
 
 
@@ -31,7 +31,7 @@ def in_situations(
     """The groups of each situation, in the order in which these first appear."""
     found: dict[str, list[Sequence[FinishedRun]]] = {}
     for group in groups:
-        found.setdefault(group[0].situation, []).append(group)
+        found.setdefault(group[0].case.worlds, []).append(group)
     return found
 
 
@@ -47,6 +47,6 @@ def _named(
         if len(firsts[key]) > 1:
             first = firsts[key][variant]
             name = f"{first.config.scenario.situation} as in {first.folder.name}"
-            run = replace(run, case=replace(run.case, situation=name))
+            run = replace(run, case=replace(run.case, worlds=name))
         found.append(run)
     return found

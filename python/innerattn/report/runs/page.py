@@ -100,7 +100,7 @@ def runs_page(
     if robustness is not None:
         parts.append(_robustness(robustness, plots))
     parts.append(_replay(runs))
-    title = ", ".join(f"{group[0].method} on {group[0].situation}" for group in groups)
+    title = ", ".join(f"{group[0].method} on {group[0].case.worlds}" for group in groups)
     count = "1 run" if len(runs) == 1 else f"{len(runs)} runs"
     return fill(
         _text("report.html"),
@@ -132,7 +132,7 @@ def _details(summary: str, inside: str) -> str:
 def _training(
     runs: Sequence[FinishedRun], groups: Sequence[Sequence[FinishedRun]], plots: list[Plot]
 ) -> str:
-    curves = learning_curves((own[0].situation, own[0].method, own) for own in groups)
+    curves = learning_curves((own[0].case.worlds, own[0].method, own) for own in groups)
     parts = [html_table(training_table(runs))]
     if curves:
         for worlds in dict.fromkeys(curve.situation for curve in curves):

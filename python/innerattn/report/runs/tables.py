@@ -32,7 +32,7 @@ def training_table(runs: Sequence[FinishedRun]) -> Table:
         info = run.info
         rows.append(
             [
-                *(run.folder.name, run.method, run.situation, str(run.seed)),
+                *(run.folder.name, run.method, run.case.worlds, str(run.seed)),
                 *(f"{info.env_steps:,}", f"{info.updates:,}", f"{info.seconds / 60:.1f}"),
                 *(str(info.threads), info.device, info.warm_start),
                 *((text or NONE)[:_DIGITS] for text in (info.commit, run.config_sha256)),
@@ -60,7 +60,7 @@ def verdict(groups: Sequence[Sequence[FinishedRun]]) -> str:
         own = group[0].summary["score"]
         score = mean.score if mean else _estimate(own)
         of = f"mean of {len(group)} runs " if mean else ""
-        name = f"{group[0].method} on {group[0].situation}"
+        name = f"{group[0].method} on {group[0].case.worlds}"
         found.append((-math.inf if score is None else score.mean, f"{name} {of}{_score(score)}"))
     found.sort(key=lambda one: one[0], reverse=True)
     shown = [text for _, text in found[:_MOST_NAMED]]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import ExportError
-from innerattn.learn.framed import FramedLearner
+from innerattn.learn.framed import as_seen
 from innerattn.learn.types import Learner
 from innerattn.nn import Actor
 from innerattn.nn.actions import mean_and_log_std
@@ -90,12 +90,10 @@ def logits_of(learner: Learner, actor: Actor, obs: torch.Tensor) -> NDArray[np.f
     """
     if learner.act(obs[:1], greedy=True).is_floating_point():
         return _vectors_of(learner, actor, obs)
-    if not isinstance(learner, FramedLearner):
-        return np.asarray(actor(obs.transpose(0, 1)).permute(2, 0, 1).numpy())
-    seen, _ = learner.as_seen(obs, torch.zeros(obs.shape[:2], dtype=torch.int64))
+    seen, _ = as_seen(learner, obs, torch.zeros(obs.shape[:2], dtype=torch.int64))
     inside = actor(seen.transpose(0, 1)).permute(2, 0, 1)
     named = [
-        learner.as_seen(obs, torch.full(obs.shape[:2], action))[1]
+        as_seen(learner, obs, torch.full(obs.shape[:2], action))[1]
         for action in range(inside.shape[2])
     ]
     return np.asarray(inside.gather(2, torch.stack(named, dim=2)).numpy())
@@ -103,14 +101,11 @@ def logits_of(learner: Learner, actor: Actor, obs: torch.Tensor) -> NDArray[np.f
 
 def _vectors_of(learner: Learner, actor: Actor, obs: torch.Tensor) -> NDArray[np.float32]:
     """Means and log standard deviations (B, R, 4) in the frame of the world."""
-    if not isinstance(learner, FramedLearner):
-        parts = mean_and_log_std(actor(obs.transpose(0, 1)))
-        return np.asarray(torch.cat(parts, dim=1).permute(2, 0, 1).numpy())
     nothing = torch.zeros(*obs.shape[:2], 2)
-    seen, _ = learner.as_seen(obs, nothing)
+    seen, _ = as_seen(learner, obs, nothing)
     mean, log_std = (one.permute(2, 0, 1) for one in mean_and_log_std(actor(seen.transpose(0, 1))))
     # What x and y of the world are called in the frames: a vector's x is its part along the first.
-    axes = [learner.as_seen(obs, nothing + axis)[1] for axis in torch.eye(2)]
+    axes = [as_seen(learner, obs, nothing + axis)[1] for axis in torch.eye(2)]
     back = [(mean * axis).sum(dim=2) for axis in axes]
     back += [(log_std * axis.abs()).sum(dim=2) for axis in axes]
     return np.asarray(torch.stack(back, dim=2).numpy())
