@@ -65,6 +65,11 @@ def test_wrong_scenario_is_one_line(
     assert message in line
 
 
+def test_one_thing_is_asked_for_at_a_time(capsys: pytest.CaptureFixture[str]) -> None:
+    line = error_of(capsys, "info", "--schema", "run", "--instance", "ral")
+    assert line == "innerattn: error: --instance and --schema: must be one of them at a time"
+
+
 def test_debug_shows_the_traceback(tmp_path: Path) -> None:
     missing = str(tmp_path / "none.toml")
     plain, debug = (run("info", "--scenario", missing, *flag) for flag in ([], ["--debug"]))

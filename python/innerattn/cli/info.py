@@ -14,6 +14,7 @@ import tomli_w
 from innerattn.cli.options import Command
 from innerattn.config import BUDGETS, SCENARIOS, Scenario
 from innerattn.cores import usable_cores
+from innerattn.errors import ConfigError
 from innerattn.zoo import zoo_names
 
 _PACKAGES = ("torch", "numpy", "pydantic", "gymnasium", "pettingzoo")
@@ -38,8 +39,13 @@ class Info(Command):
             The exit code, 0.
 
         Raises:
-            ConfigError: the file of a scenario or of instances is not valid.
+            ConfigError: the file of a scenario or of instances is not valid, or several are asked
+                for.
         """
+        names = ("scenario", "instance", "schema")
+        asked = [f"--{name}" for name in names if getattr(self, name) is not None]
+        if len(asked) > 1:
+            raise ConfigError(f"{' and '.join(asked)}: must be one of them at a time")
         if self.instance is not None:
             from innerattn.config.instances import named_instance
             from innerattn.policies.scripted.planner import plan
