@@ -25,9 +25,12 @@ robot: setup ## export a trained team, and let four processes drive it, one for 
 
 LIMIT := $(shell command -v timeout >/dev/null && echo timeout 900)# of all Rust tests together [s]
 
-test: setup lint ## every check but the long one
+test: setup lint ## every check but the long ones
 	$(LIMIT) cargo test --quiet --locked
-	pytest -n auto --dist worksteal
+	pytest -n auto --dist worksteal -m 'not long and not slow and not gpu'
+
+test-long: setup ## whole trainings, studies, exports and pages, and processes that are killed; some 20 minutes
+	pytest -n auto --dist worksteal -m 'long and not slow and not gpu'
 
 test-pool: ## the pool of threads under every order of events that the memory model allows
 	RUSTFLAGS='--cfg loom' cargo test --quiet --locked --target-dir target/loom -p innerattn-pool

@@ -58,6 +58,7 @@ def study(tmp_path: Path) -> Path:
     return pool / ATTENTION[0]
 
 
+@pytest.mark.long
 def test_tables_and_runs_of_a_study_go_to_their_places(pages: Path, study: Path) -> None:
     archive = pages / "records" / "fast.parquet"
     before = {run.folder.name: run.config_sha256 for run in read_archive(archive)}

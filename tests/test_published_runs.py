@@ -75,6 +75,7 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("target", "budget", "options"),
     [
@@ -108,6 +109,7 @@ def test_tables_are_made_of_the_archive(
         assert part(shown.stem, name) == "\n\n".join(found[one] for one in headings if one in found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", PAGES)
 def test_pages_show_what_is_made_of_the_archive(name: str, made: dict[str, Path]) -> None:
     summary, details = made_sections(name, made[name])

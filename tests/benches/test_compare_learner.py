@@ -242,6 +242,7 @@ def test_everything_but_the_public_code_is_measured_without_it(
     assert min(found.values()) > 0.0
 
 
+@pytest.mark.long
 def test_a_failed_measurement_ends_the_comparison(tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match="No module named 'algorithms'"):
         compare_learner.one_round((8, 1), tmp_path)

@@ -38,6 +38,7 @@ print(json.dumps(asdict(watched.soaked("x", 1, ["a problem"]))))
 """Keeps memory, a thread and a file, and prints what is said of that."""
 
 
+@pytest.mark.long
 def test_memory_threads_and_files_that_stay_are_told(tmp_path: Path) -> None:
     # In a process of its own: here, a thread or a file of an earlier test may end meanwhile.
     command = [sys.executable, "-c", LEAK, str(tmp_path / "file")]

@@ -142,6 +142,7 @@ def test_a_scenario_is_checked_as_it_is_measured(
     assert (document["episode_steps"], document["long"]["episode_steps"]) == (60, 80)
 
 
+@pytest.mark.long
 def test_output_that_cannot_be_written_as_it_is_is_written_anyhow() -> None:
     found = subprocess.run(
         [sys.executable, "-m", "innerattn", "evaluate", "greedy", *FEW],

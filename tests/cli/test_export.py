@@ -16,6 +16,7 @@ def run(run_dir: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(run_dir, tmp_path / "run"))
 
 
+@pytest.mark.long
 def test_a_trained_run_is_exported_into_its_folder(
     run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -26,6 +26,7 @@ def posted(address: str, path: str, message: object) -> tuple[int, dict[str, obj
     return found
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("interruptible")
 def test_a_run_is_played(run_dir: Path) -> None:
     command = [sys.executable, "-m", "innerattn", "play", str(run_dir), "--seed", "3"]

@@ -47,6 +47,7 @@ def asked(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> li
     return [name] if name == "statvfs" else refused
 
 
+@pytest.mark.long
 def test_a_study_is_worked_and_watched(asked: list[str], tmp_path: Path) -> None:
     file = tmp_path / "tiny.toml"
     file.write_text(TINY.replace('"0..2"', "[0]"))

@@ -64,6 +64,7 @@ def test_a_run_without_attention(tmp_path: Path, tiny: list[str]) -> None:
     assert "attention" not in replayed(tmp_path / "r.html", run)["runs"][0]
 
 
+@pytest.mark.long
 def test_a_moving_picture(run_dir: Path, tmp_path: Path) -> None:
     out = tmp_path / "r.gif"
     assert main(["replay", str(run_dir), "-o", str(out), "--episode", "1"]) == 0

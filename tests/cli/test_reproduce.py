@@ -75,6 +75,7 @@ def test_a_page_about_the_finished_runs(
         assert message in capsys.readouterr().err
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("in_this_process")
 def test_runs_are_trained_on_a_device_and_reported_from_any(
     study: Path, command: Command, capsys: pytest.CaptureFixture[str]
@@ -227,6 +228,7 @@ def few_faults(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("innerattn.experiments.processes.run_side_by_side", do_in_turn)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_faults")
 def test_robustness_is_measured_once_and_then_read(
     study: Path,

@@ -13,6 +13,7 @@ from innerattn.cli.main import main
 FEW = ["--episodes", "4", "--episode-steps", "26", "--faults", "motor_gain, lost_communication"]
 
 
+@pytest.mark.long
 def test_the_document_alone_on_standard_output_and_a_page_about_the_run(
     run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -40,6 +41,7 @@ def test_the_document_alone_on_standard_output_and_a_page_about_the_run(
     assert "must be one run of each seed" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_tables_a_file_and_a_picture(
     run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -114,6 +116,7 @@ def test_a_run_that_is_not_there_is_named(capsys: pytest.CaptureFixture[str]) ->
     assert "no-such-run" in capsys.readouterr().err
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("robots", "left_out"), [(1, "its bounds included"), (2, "where attention")]
 )

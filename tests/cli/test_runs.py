@@ -106,6 +106,7 @@ def test_without_runs_there_is_no_latest(tmp_path: Path, monkeypatch: pytest.Mon
         named_run("latest")
 
 
+@pytest.mark.long
 def test_commands_take_names(
     run_dir: Path,
     tmp_path: Path,

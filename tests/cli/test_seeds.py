@@ -22,6 +22,7 @@ def test_seeds_are_read(text: str, seeds: tuple[int, ...]) -> None:
     assert parse_seeds(text) == seeds
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "text",
     [

@@ -116,6 +116,7 @@ def test_as_soon_as_a_page_is_served(
     assert out.pressed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sent", IN_TRAINING)
 def test_in_training(sent: signal.Signals, tiny: list[str], tmp_path: Path) -> None:
     run = tmp_path / "run"
@@ -129,6 +130,7 @@ def test_in_training(sent: signal.Signals, tiny: list[str], tmp_path: Path) -> N
     assert f"go on with: innerattn train --resume {run}" in err
 
 
+@pytest.mark.long
 def test_a_second_one_ends_at_once(tiny: list[str], tmp_path: Path) -> None:
     run = tmp_path / "run"
     with begin(run, [*tiny, *ENDLESS]) as process:
@@ -159,6 +161,7 @@ def test_at_any_time(
     print(f"{sent.name} after {seconds:.1f} s: out after {took:.2f} s")
 
 
+@pytest.mark.long
 def test_nobody_reads_what_it_says(tiny: list[str], tmp_path: Path) -> None:
     run = tmp_path / "run"
     command = [sys.executable, "-m", "innerattn", "train", "--run-dir", str(run), *tiny]

@@ -44,6 +44,7 @@ def test_without_its_extra_the_command_says_what_to_install(library: str) -> Non
     assert (done.returncode, done.stdout, done.stderr) == (1, "", wanted)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("ended", "out"), [(130, "said\n"), (0, "said\nfreed\n")])
 def test_what_was_interrupted_does_not_wait_for_pythons_end(ended: int, out: str) -> None:
     code = f"""
@@ -72,6 +73,7 @@ def test_a_library_that_is_missed_later_is_named_too(
     assert capsys.readouterr().err == wanted
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "library", "extra"),
     [

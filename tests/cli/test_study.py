@@ -28,6 +28,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_study_from_file_to_report(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["study", "run", str(file)]) == 0
     said = capsys.readouterr().out
@@ -59,6 +60,7 @@ def test_a_study_from_file_to_report(file: Path, capsys: pytest.CaptureFixture[s
     assert "summary.json: is not the file that manifest.json names" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_everything_is_killed_and_goes_on(file: Path) -> None:
     file.write_text(FOUR)
     words = [sys.executable, "-m", "innerattn", "study", "run", str(file), "--workers", "2", "-q"]
@@ -75,6 +77,7 @@ def test_everything_is_killed_and_goes_on(file: Path) -> None:
     assert sorted(os.listdir("studies/tiny/runs")) == sorted(one["key"] for one in found["runs"])
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_saves_and_frees_every_run(file: Path) -> None:
     """A terminal sends it to all processes of the command; none may take it for a second one."""
@@ -105,6 +108,7 @@ def test_status_and_report_begin_no_study(file: Path, capsys: pytest.CaptureFixt
     assert not Path("studies").exists()
 
 
+@pytest.mark.long
 def test_slurm_runs_workers(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """With a stand-in for srun, which just runs the command."""
     file.write_text(FOUR)

@@ -42,6 +42,7 @@ def logged(path: Path, tiny: list[str], hangup: signal.Handlers) -> Iterator[sub
             process.kill()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
 def test_a_request_to_end_keeps_the_weights(
     sent: signal.Signals, tiny: list[str], tmp_path: Path

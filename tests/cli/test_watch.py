@@ -35,6 +35,7 @@ def mark(run: Path, **values: Any) -> None:
     (run / "new.json").replace(run / "run.json")
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("interruptible")
 def test_a_training_goes_on_under_the_eyes_of_its_reader(run_dir: Path, tmp_path: Path) -> None:
     run = Path(shutil.copytree(run_dir, tmp_path / "mine <b>"))
@@ -171,6 +172,7 @@ def test_no_script_stands_beside_a_run_for_many_teams(run_dir: Path, tmp_path: P
     assert _scripts_beside([run]) == {}
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("interruptible")
 def test_a_study_is_watched_while_it_goes_on(tmp_path: Path) -> None:
     file = tmp_path / "tiny.toml"

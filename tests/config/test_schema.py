@@ -57,6 +57,7 @@ def test_scenario_presets_are_valid_in_both_forms(path: Path) -> None:
     validator("run").validate({"scenario": table(path)})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", BUDGET_FILES, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_budgets_are_valid(path: Path) -> None:
     validator("run").validate(table(path))

@@ -19,6 +19,7 @@ def test_the_kept_scenarios_are_those_of_the_source() -> None:
     assert len({row["sha256"] for row in KEPT["rows"]}) == len(ROWS) == 10
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ROWS)
 def test_worlds_do_what_they_did(name: str) -> None:
     row = ROWS[name]

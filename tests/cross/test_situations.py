@@ -130,6 +130,7 @@ def test_a_rescued_victim_is_replaced_at_once(situation: str) -> None:
         assert_uniform(np.bincount(np.concatenate(new_tasks), minlength=2))
 
 
+@pytest.mark.long
 def test_a_new_wave_waits_for_the_last_of_the_old() -> None:
     scenario = Scenario(situation="mixed", max_victims=3, episode_steps=150)
     sizes, tasks, partly = [], [], 0

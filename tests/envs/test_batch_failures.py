@@ -136,6 +136,7 @@ print(done, lacked)
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of another kind")
 @pytest.mark.parametrize(("beside", "least_done"), [("0", 0), ("1", 15)])
 def test_a_lack_of_memory_is_an_error_and_never_an_abort(beside: str, least_done: int) -> None:

@@ -32,6 +32,7 @@ def test_the_scenario_in_python_is_the_one_in_the_file() -> None:
     exec(compile(example, str(PAGE), "exec"), {})
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("harbour")
 def test_the_commands_run() -> None:
     commands, _ = blocks("sh")  # the second trains

@@ -89,6 +89,7 @@ def overlaps(ratio: float, play: str, steps: int) -> NDArray[Any]:
 PAIRS = tuple(combinations(range(8), 2))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("play", PLAYS)
 @pytest.mark.parametrize(
     ("ratio", "usual", "most"),

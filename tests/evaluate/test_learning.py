@@ -48,6 +48,7 @@ def test_two_robots_learn_to_rescue(method: str, tmp_path: Path) -> None:
     assert found["rescues_per_episode"]["low"] > 1.0 > 5 * random
 
 
+@pytest.mark.long
 def test_the_fast_budget_learns_within_seconds(tmp_path: Path) -> None:
     given = {"train.env_steps": 150_000, "train.threads": 1, "train.compile": "off"}
     config = load_run_config("single", "mappo", "fast", overrides=given)

@@ -87,6 +87,7 @@ def updated(made: TD) -> dict[str, Tensor]:
     return made.state()
 
 
+@pytest.mark.long
 def test_it_is_trained_plain_and_compiled() -> None:
     torch.compiler.reset()
     compiled = learner()
@@ -101,6 +102,7 @@ def test_it_is_trained_plain_and_compiled() -> None:
         torch.testing.assert_close(found[name], after[name], rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.long
 def test_its_methods_train_from_the_command_line(
     run_installed: Callable[..., subprocess.CompletedProcess[str]], tmp_path: Path
 ) -> None:

@@ -85,6 +85,7 @@ def test_a_robot_learns_from_nothing_but_its_own_steps(ippo: ModuleType) -> None
             assert alike == (robot != 1), (name, robot)
 
 
+@pytest.mark.long
 def test_a_compiled_update_agrees(ippo: ModuleType) -> None:
     torch.compiler.reset()
     compiled = make(ippo)
@@ -113,6 +114,7 @@ def test_updates_that_are_not_finite_are_left_out_where_asked_for(ippo: ModuleTy
         assert all(torch.equal(before[name], after[name]) for name in weights)
 
 
+@pytest.mark.long
 def test_it_learns_to_rescue_from_the_command_line(
     run_installed: Callable[..., subprocess.CompletedProcess[str]],
     tmp_path: Path,

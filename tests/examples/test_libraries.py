@@ -98,6 +98,7 @@ def test_random_actions_score_zero_and_standing_still_less(
     assert still["rescues_per_episode"] < found["rescues_per_episode"]
 
 
+@pytest.mark.long
 def test_the_single_file_learns() -> None:
     done = subprocess.run(
         [sys.executable, str(LIBRARIES / "single_file_mappo.py"), "--env-steps", "60000"],

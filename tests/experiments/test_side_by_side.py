@@ -62,6 +62,7 @@ def on_change(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Sequence[R
     return have
 
 
+@pytest.mark.long
 def test_runs_are_those_of_single_commands_and_a_failure_leaves_them_alone(
     run_dir: Path,
     tiny: list[str],

@@ -123,14 +123,17 @@ def test_the_traced_update_agrees_masked_and_clipped(
     agree(algorithm, 4, "aot_eager", {"attention": attention, "mask_unavailable": True}, numbers)
 
 
+@pytest.mark.long
 def test_the_traced_update_agrees_without_attention() -> None:
     agree("ppo", 4, "aot_eager", {"attention": "none"}, {"advantage": "value"})
 
 
+@pytest.mark.long
 def test_the_traced_update_agrees_by_entities() -> None:
     agree("ppo", 4, "aot_eager", ENTITIES, {})
 
 
+@pytest.mark.long
 def test_the_traced_update_agrees_by_kind() -> None:
     agree("td", 4, "aot_eager", {**BY_KIND, "shared_gradients": "mean"}, {})
 

@@ -60,6 +60,7 @@ def alike(left: dict[str, Tensor], right: dict[str, Tensor]) -> bool:
     return all(torch.equal(left[name], right[name]) for name in left)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("bad", [math.nan, -math.inf])
 @pytest.mark.parametrize("compiled", [False, True])
 def test_td_learns_nothing_from_a_broken_reward(compiled: bool, bad: float) -> None:
@@ -82,6 +83,7 @@ def test_td_learns_nothing_from_a_broken_reward(compiled: bool, bad: float) -> N
     assert learner.updates == 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("compiled", [False, True])
 def test_ppo_learns_nothing_from_a_broken_advantage(compiled: bool) -> None:
     learner, rows = ppo(compiled), rollout()

@@ -27,6 +27,7 @@ def waiting(actions: Tensor) -> tuple[Transitions, Tensor]:
     return Transitions(obs, actions, reward, obs, finished), torch.zeros(worlds, dtype=torch.bool)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", ["td", "ppo"])
 def test_finishing_beats_waiting_for_ever(algorithm: str) -> None:
     """With gamma 0.9 waiting for ever is worth -10, finishing -5."""

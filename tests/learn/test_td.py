@@ -99,6 +99,7 @@ def compare(learner: TD, plain: PlainTD, draws: Draws, batches: list[Transitions
     assert learner.updates == len(batches)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("entropy_target", ["consistent", "maac"])
 @pytest.mark.parametrize("policy_gradient", ["expected", "sampled"])
 @pytest.mark.parametrize("attention", ["inner", "uniform"])

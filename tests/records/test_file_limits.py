@@ -49,6 +49,7 @@ def peak(text: str) -> tuple[int, str]:
     return most, refused
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("value", VALUES)
 def test_no_json_takes_more_than_its_share_of_memory(value: str) -> None:
     one = VALUES[value]
@@ -78,6 +79,7 @@ TABLES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("table", TABLES)
 def test_tables_at_their_limits_take_their_share(table: str) -> None:
     text = TABLES[table]
@@ -154,6 +156,7 @@ CHECKPOINTS: dict[str, tuple[dict[str, object], str]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", CHECKPOINTS)
 def test_checkpoints_at_their_limits_take_their_share(what: str) -> None:
     changed, message = CHECKPOINTS[what]
@@ -191,6 +194,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
 """
 
 
+@pytest.mark.long
 def test_networks_are_measured_before_they_are_made(run_dir: Path, tmp_path: Path) -> None:
     run = tmp_path / "run"
     newest = (run_dir / "checkpoints" / "latest").read_text().strip()

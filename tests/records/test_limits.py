@@ -206,6 +206,7 @@ except RunError as error:
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rows", [20_000_000, 200_000_000])
 def test_a_table_that_unpacks_to_far_more_than_its_file_is_refused(
     folder: Path, tmp_path: Path, rows: int

@@ -33,6 +33,7 @@ TABLES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("table", TABLES)
 def test_no_table_has_more_columns_than_are_counted_in_a_second(table: str, tmp_path: Path) -> None:
     made, options = TABLES[table]()

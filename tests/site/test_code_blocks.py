@@ -162,6 +162,7 @@ def lines() -> list[tuple[str, str]]:
 LINES = lines()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("place")
 def test_commands_of_innerattn_are_understood() -> None:
     """Names of methods that only an installed example knows are left to tests/examples."""
@@ -192,6 +193,7 @@ def some_of_each() -> list[str]:
     return list(found.values())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", some_of_each())
 def test_commands_run(place: Path, command: str, capsys: pytest.CaptureFixture[str]) -> None:
     words = shlex.split(command)[1:]

@@ -95,6 +95,7 @@ FIXED: dict[str, Words] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("message", FIXED)
 def test_the_command_that_the_page_advises(
     message: str,

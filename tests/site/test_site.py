@@ -45,6 +45,7 @@ def pages(site: Path) -> dict[Path, Links]:
     return {page: Links(page.read_text("utf-8")) for page in site.rglob("*.html")}
 
 
+@pytest.mark.long
 def test_links_and_anchors(site: Path, pages: dict[Path, Links]) -> None:
     checked = 0
     for page, found in pages.items():
@@ -119,6 +120,7 @@ LOOKED_AT = sorted(
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [WIDE, PHONE], ids=["wide", "phone"])
 def test_no_page_scrolls_sideways(site: Path, browser: Browser, size: tuple[int, int]) -> None:
     for name in LOOKED_AT:

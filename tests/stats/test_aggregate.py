@@ -80,6 +80,7 @@ def test_what_is_no_stratum_is_refused(bad: list) -> None:
         interquartile_mean([])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("runs", "least", "most"), [(3, 0.08, 0.18), (15, 0.02, 0.085)])
 def test_intervals_are_short_where_strata_hold_few_runs(
     runs: int, least: float, most: float, monkeypatch: pytest.MonkeyPatch

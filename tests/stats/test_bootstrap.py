@@ -103,6 +103,7 @@ def test_score_against_a_plain_loop() -> None:
     assert score.high == pytest.approx(high, abs=0.1 * (high - low))
 
 
+@pytest.mark.long
 def test_intervals_over_episodes_hold_the_truth_as_often_as_they_say() -> None:
     rng, draws = np.random.default_rng(5), 500
     missed = {"mean": 0, "score": 0}

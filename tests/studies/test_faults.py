@@ -56,6 +56,7 @@ def measure(study: StudyFolder, most: int | None = None) -> list[RunUnderFaults]
     return jobs
 
 
+@pytest.mark.long
 def test_each_run_meets_the_faults_once(done: StudyFolder) -> None:
     assert {job.run.key for job in measure(done)} == set(done.keys)
     assert to_measure(done) == []
@@ -97,6 +98,7 @@ def test_other_faults_are_measured_anew_and_runs_without_are_told(done: StudyFol
     assert len(to_measure(done)) == 5
 
 
+@pytest.mark.long
 def test_the_command_measures_what_is_missing(
     done: StudyFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -112,6 +114,7 @@ def test_the_command_measures_what_is_missing(
     assert retained(begun, missing.run).keys() == {"retained", "retained_unavailable"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"run": "other", "retained": {}}', "{" * 2_000])
 def test_a_damaged_file_is_named_and_its_run_left_out(text: str, done: StudyFolder) -> None:
     (job,) = measure(done, 1)
@@ -123,6 +126,7 @@ def test_a_damaged_file_is_named_and_its_run_left_out(text: str, done: StudyFold
     assert "not a measurement under faults" in why
 
 
+@pytest.mark.long
 def test_of_another_run_is_refused(done: StudyFolder) -> None:
     first, second = measure(done, 2)
     document = json.loads(second.path.read_text())

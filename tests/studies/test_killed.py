@@ -23,6 +23,7 @@ needs_ray = pytest.mark.skipif(
 )
 
 
+@pytest.mark.long
 @needs_ray
 @pytest.mark.timeout(900)  # each of its processes loads PyTorch and Ray
 def test_a_killed_worker_changes_nothing(tmp_path: Path) -> None:
@@ -61,6 +62,7 @@ def open_to_others() -> set[str]:
     return {row[1] for row in rows if row[3] == "0A" and not row[1].startswith(LOOPBACK)}
 
 
+@pytest.mark.long
 @needs_ray
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_a_cluster_of_this_machine_listens_to_nobody_else(tmp_path: Path) -> None:

@@ -287,6 +287,7 @@ while set(ledger.states(keys).values()) != {"done"}:
 """
 
 
+@pytest.mark.long
 def test_workers_that_are_killed_lose_and_repeat_nothing(tmp_path: Path) -> None:
     runs, steps, rng = 16, 60, random.Random(0)
     words = [sys.executable, "-c", WORKER, str(tmp_path), str(runs), str(steps)]

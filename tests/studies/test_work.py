@@ -39,6 +39,7 @@ def test_one_worker_does_all(tiny_file: Path, tmp_path: Path) -> None:
     assert again == []
 
 
+@pytest.mark.long
 def test_stopped_and_gone_on_with_it_gives_the_same(
     tiny_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -139,6 +140,7 @@ def test_a_claim_that_is_lost_ends_the_run(
     assert list(study.runs.iterdir()) == []
 
 
+@pytest.mark.long
 def test_two_workers_share_the_runs(tiny_file: Path, tmp_path: Path) -> None:
     alone, shared = (begin_study(tiny_file, tmp_path / name) for name in ("alone", "shared"))
     work(alone.ledger(), alone.planned)

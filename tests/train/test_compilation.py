@@ -24,6 +24,7 @@ from innerattn.train.weights import digest_of
 TINY = {"train.env_steps": 128, "train.num_envs": 4, "train.threads": 1}
 
 
+@pytest.mark.long
 @pytest.mark.timeout(180)
 def test_each_run_of_a_process_is_compiled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
@@ -149,6 +150,7 @@ def test_where_the_compiler_fails_the_run_is_that_without_it(
     assert infos[0].updates == infos[1].updates > 0
 
 
+@pytest.mark.long
 def test_without_a_compiler_training_goes_on_and_says_so(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "innerattn", "train", "--compile", "on"]
     command += ["--run-dir", str(tmp_path / "run")]

@@ -50,6 +50,7 @@ def given(values: dict[str, Any]) -> RunConfig:
     return RunConfig.model_validate(sections)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["ppo-inner", "mappo"])
 def test_a_team_learns_to_rescue(tmp_path: Path, method: str) -> None:
     run = train(given({**SHORT, "train.threads": 1, "train.method": method}), tmp_path / "run")

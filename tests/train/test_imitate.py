@@ -178,6 +178,7 @@ def test_continuous_actions_are_refused(small_config: Configure) -> None:
     assert "\n" not in str(e.value)
 
 
+@pytest.mark.long
 def test_agreement_with_the_script_grows(small_config: Configure) -> None:
     numbers = {
         "imitation.env_steps": 48_000,

@@ -51,6 +51,7 @@ def names(folder: Path) -> list[str]:
     return sorted(entry.name for entry in folder.iterdir())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("where", ["first", "last"])
 def test_what_a_killed_process_made_is_swept_at_the_next_start(
     small_config: Configure, tmp_path: Path, where: str

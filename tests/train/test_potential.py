@@ -112,6 +112,7 @@ def discounted_returns(
     return np.concatenate(seen[:states]), returns.reshape(-1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "obstacles", [(), (Obstacle(shape="disc", position_m=(0.0, 0.0), radius_m=0.1),)]
 )

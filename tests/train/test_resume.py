@@ -181,6 +181,7 @@ def test_a_run_that_was_cut_is_the_run_that_was_not(
         resume(run)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", ["td-inner warm start", "ppo-inner schedule"])
 def test_a_new_process_goes_on_alike(
     small_config: Configure,
@@ -252,6 +253,7 @@ def test_one_that_was_killed_before_its_first_checkpoint_begins_anew(
     assert planted.exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", ["td-inner", "ppo-inner", "mappo warm start"])
 def test_checkpoints_at_every_step_change_nothing(
     small_config: Configure,

@@ -97,6 +97,7 @@ def kill_again_and_again(config: RunConfig, tmp_path: Path, times: int) -> None:
     assert read_info(run).state == "running"
 
 
+@pytest.mark.long
 def test_a_killed_training_loses_no_checkpoint(small_config: Configure, tmp_path: Path) -> None:
     kill_again_and_again(small_config(**ENDLESS), tmp_path, 4)
     run = tmp_path / "run"
@@ -116,6 +117,7 @@ def interrupted(_: object) -> None:
     raise KeyboardInterrupt
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["weights", "state", "checkpoint", "rows", "metrics"])
 def test_a_flipped_byte_is_named_and_the_checkpoint_before_it_is_there(
     small_config: Configure, tmp_path: Path, name: str

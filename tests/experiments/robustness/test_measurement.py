@@ -48,6 +48,7 @@ def measured(runs: list[FinishedRun], study: Path) -> FaultMeasurement:
     return job
 
 
+@pytest.mark.long
 def test_a_document_is_that_of_the_command_and_is_read_without_playing(
     study: Path,
     runs: list[FinishedRun],

@@ -224,6 +224,7 @@ def test_pooled_share_against_a_plain_loop() -> None:
     assert found.high == pytest.approx(high, abs=0.05 * (high - low))
 
 
+@pytest.mark.long
 def test_pooled_share_of_many_runs_misses_as_often_as_it_says(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -162,6 +162,7 @@ def test_attention_that_passes_on_is_found() -> None:
     assert np.all(found.to_be.change[1] > 0.1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("episodes", [8, 15])
 def test_chance_is_found_as_rarely_as_it_says(
     episodes: int, monkeypatch: pytest.MonkeyPatch

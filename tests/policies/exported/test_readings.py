@@ -42,6 +42,7 @@ def played(env: BatchEnv, steps: int, seed: int) -> np.ndarray:
 exported = cache(partial(Exported, backend="numpy"))
 
 
+@pytest.mark.long
 @BOTH
 @settings(max_examples=10)
 @given(seed=st.integers(0, 2**32), steps=st.integers(0, 30))
@@ -70,6 +71,7 @@ TASKS = [
 ]
 
 
+@pytest.mark.long
 def test_rows_of_worlds_with_amounts_times_order_and_arrivals(tmp_path: Path) -> None:
     robots = [robot.model_dump() for robot in Scenario().robots]
     robots[1]["abilities"], robots[3]["abilities"] = {"food": 2.5}, {"medicine": 0.3, "food": 0.2}

@@ -5,6 +5,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from markdown_rows import rows_of
 
 from innerattn.experiments.crossed.arms import arm_of
@@ -19,6 +20,7 @@ from innerattn.train.weights import digest_of
 Crossed = tuple[Path, list[FinishedRun]]
 
 
+@pytest.mark.long
 def test_files_are_the_same_twice_and_say_what_they_are_of(crossed_study: Crossed) -> None:
     out, runs = crossed_study
     write_crossed(runs, out, "quick", ["mixed td-inner seed 9: failed"])

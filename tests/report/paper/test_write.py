@@ -30,6 +30,7 @@ def folder(runs: list[FinishedRun], tmp_path_factory: pytest.TempPathFactory) ->
     return path
 
 
+@pytest.mark.long
 def test_all_files_are_written_and_the_same_twice(
     runs: list[FinishedRun], folder: Path, tmp_path: Path
 ) -> None:
@@ -55,6 +56,7 @@ def test_the_report_opens_with_one_row_for_each_claim(folder: Path) -> None:
     assert len(text.split()) < 2_500
 
 
+@pytest.mark.long
 def test_archived_runs_count_for_the_table_and_not_for_the_figures(
     runs: list[FinishedRun], folder: Path, tmp_path: Path
 ) -> None:
@@ -103,6 +105,7 @@ def test_all_else_is_linked(runs: list[FinishedRun], folder: Path) -> None:
         assert row["weights_sha256"] == digest_of(weights)
 
 
+@pytest.mark.long
 def test_every_claim_is_there_in_full(runs: list[FinishedRun], tmp_path: Path) -> None:
     findings = write_report(runs, tmp_path, "short")
     rows = rows_of((tmp_path / "claims.md").read_text())[1:]
@@ -116,6 +119,7 @@ def test_every_claim_is_there_in_full(runs: list[FinishedRun], tmp_path: Path) -
     assert len(rows) == len(findings.claims) + 2
 
 
+@pytest.mark.long
 def test_every_run_has_its_handoffs(runs: list[FinishedRun], tmp_path: Path) -> None:
     findings = write_report(runs, tmp_path, "short")
     assert findings.evidence is not None
@@ -131,6 +135,7 @@ def test_every_run_has_its_handoffs(runs: list[FinishedRun], tmp_path: Path) -> 
     assert mean[8] == format_estimate(part.ceiling)
 
 
+@pytest.mark.long
 def test_every_file_of_a_smoke_run_says_so(
     runs: list[FinishedRun], folder: Path, tmp_path: Path
 ) -> None:

@@ -308,6 +308,7 @@ def test_who_still_attends_to_a_robot_that_is_out(browser: Browser, team: Any) -
         assert page.get_by_role("button", name="Let go").is_visible()
 
 
+@pytest.mark.long
 def test_two_browsers_play_apart_and_a_closed_page_gives_its_place_back(browser: Browser) -> None:
     with played(scripted_world()) as server, visit(browser, server.address) as one:
         ready(one.page)
@@ -325,6 +326,7 @@ def test_two_browsers_play_apart_and_a_closed_page_gives_its_place_back(browser:
                 ready(other.page)
 
 
+@pytest.mark.long
 def test_the_end_of_the_server_and_of_a_session_is_told(browser: Browser) -> None:
     with played(scripted_world()) as server, visit(browser, server.address) as seen:
         page = seen.page
@@ -416,6 +418,7 @@ def test_a_finger_drags_a_robot(browser: Browser) -> None:
         assert state(page)["positions"][3] == pytest.approx([0.2, 0.4], abs=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("size", [WIDE, PHONE])
 def test_everybody_can_use_it(

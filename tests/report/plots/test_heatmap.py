@@ -36,6 +36,7 @@ def test_a_panel_for_each_robot_and_onset_with_its_numbers() -> None:
         assert texts == [f"{x:.2f}" for x in value[:, :, robot, onset].ravel()]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
 def test_the_same_figures_give_the_same_file(tmp_path: Path, suffix: str) -> None:
     files = [tmp_path / f"{name}{suffix}" for name in "ab"]

@@ -251,6 +251,7 @@ def test_a_damaged_page_says_so(browser: Browser, one: Path, tmp_path: Path) -> 
         seen.page.get_by_text("This replay cannot be shown").wait_for()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("size", [WIDE, PHONE])
 def test_everybody_can_use_it(

@@ -148,6 +148,7 @@ def test_it_opens_with_the_scores_the_best_first(page: str) -> None:
     assert found == sorted(found, reverse=True)
 
 
+@pytest.mark.long
 def test_scenarios_and_settings_of_every_kind_stand_side_by_side(
     runs: list[FinishedRun], tmp_path: Path
 ) -> None:
@@ -229,6 +230,7 @@ def test_what_is_missing_is_named(mixed: list[FinishedRun], tmp_path: Path) -> N
         read_robustness(tmp_path / "nothing.json")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("size", [WIDE, PHONE])
 def test_everybody_can_read_it(

@@ -50,6 +50,7 @@ def what_is_known(standings: list[Standing]) -> list[object]:
     return [(one.trial.name, dict(one.trial.values), one.scores, one.state) for one in standings]
 
 
+@pytest.mark.long
 def test_a_search_races_chooses_and_confirms(begun: StudyFolder) -> None:
     trained: list[tuple[object, int]] = []
     work(
@@ -95,6 +96,7 @@ def test_a_search_races_chooses_and_confirms(begun: StudyFolder) -> None:
     assert f"--ppo.learning-rate {best_rate}" in command
 
 
+@pytest.mark.long
 def test_the_same_search_finds_the_same_after_a_stop(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -137,6 +139,7 @@ def test_a_number_is_one_workers(begun: StudyFolder) -> None:
     assert [one.name for one in (begun.path / "search").iterdir()] == ["trial-1.json"]
 
 
+@pytest.mark.long
 def test_a_trial_that_fails_or_cannot_be_run_stops_no_other(
     begun: StudyFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -163,6 +166,7 @@ def test_a_trial_that_fails_or_cannot_be_run_stops_no_other(
     assert "no such luck" in page
 
 
+@pytest.mark.long
 def test_a_trial_of_another_space_stays_in_the_race(begun: StudyFolder) -> None:
     add_values(begun, 1, {"ppo.learning_rate": 0.01})
     file = begun.path.parent / "searched.toml"
@@ -207,6 +211,7 @@ def test_a_damaged_trial_is_named(text: str, begun: StudyFolder) -> None:
         Searching(begun).look()
 
 
+@pytest.mark.long
 def test_the_commands_show_a_search(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """With two workers, and real scores of untrained teams: nothing beats the recipe."""
     file, out = tmp_path / "searched.toml", tmp_path / "out"

@@ -39,6 +39,7 @@ def central(tmp_path_factory: pytest.TempPathFactory) -> Made:
     return made_export(tmp_path_factory.mktemp("central"), "mappo", **values)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("made", ["framed", "central"])
 def test_an_exported_team_plays_as_the_trained_one(
     request: pytest.FixtureRequest, made: str
@@ -58,6 +59,7 @@ def test_an_exported_team_plays_as_the_trained_one(
     assert len(np.unique(taken)) > 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("values", [FRAMED, {}], ids=["framed", "plain"])
 def test_a_team_of_forces_plays_as_the_trained_one(
     tmp_path: Path, values: dict[str, object]
@@ -88,6 +90,7 @@ def test_a_team_of_forces_plays_as_the_trained_one(
         np.testing.assert_allclose(decision.force, team.act(PolicyInput(obs[:1]))[0, 1], atol=1e-6)
 
 
+@pytest.mark.long
 def test_forces_are_drawn_as_in_training(tmp_path: Path) -> None:
     run, folder = made_export(
         tmp_path, "mappo", **{"scenario.actions": "continuous", "network.symmetry": "canonical"}
@@ -153,6 +156,7 @@ def test_what_differs_is_refused(framed: Made) -> None:
         check_export(config, learner, actor, *teams)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("call", "number"),
     [

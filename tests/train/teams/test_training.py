@@ -59,6 +59,7 @@ def stops_after(env_steps: int, stage: str) -> Callable[[Progress], None]:
     return stop
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["team-inner", "team-uniform", "team-max", "team-nearest"])
 def test_a_run_acts_in_worlds_of_any_team(tmp_path: Path, method: str) -> None:
     run = train(config(method, train__warm_start="hungarian"), tmp_path / "run")
@@ -78,6 +79,7 @@ def test_a_run_acts_in_worlds_of_any_team(tmp_path: Path, method: str) -> None:
     assert actions.shape == (6, 4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("env_steps", "stage"), [(160, "imitating"), (480, "imitating"), (320, "training")]
 )

@@ -122,6 +122,7 @@ def whole(
     return left
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_a_run_that_is_stopped_goes_on_to_the_same_bits(
     case: str, whole: Callable[[str], tuple[str, str]], small_config: Configure, tmp_path: Path
@@ -138,6 +139,7 @@ def test_a_run_that_is_stopped_goes_on_to_the_same_bits(
     assert read_info(cut).state == "done"
 
 
+@pytest.mark.long
 def test_a_worker_that_is_killed_ends_the_run_which_goes_on_to_the_same_bits(
     whole: Callable[[str], tuple[str, str]], small_config: Configure, tmp_path: Path
 ) -> None:
@@ -186,6 +188,7 @@ def begun(config: RunConfig, run: Path, tmp_path: Path) -> subprocess.Popen[str]
     return process
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
 def test_no_worker_outlives_the_first(
     sent: signal.Signals, small_config: Configure, tmp_path: Path
@@ -246,6 +249,7 @@ def test_what_cannot_be_is_refused_before_a_process_starts(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.long
 def test_what_another_worker_finds_is_told_in_one_line(
     small_config: Configure, tmp_path: Path
 ) -> None:

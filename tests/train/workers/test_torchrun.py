@@ -47,6 +47,7 @@ def config(**values: object) -> RunConfig:
     return load_run_config("mixed", overrides={**VALUES, **values})
 
 
+@pytest.mark.long
 def test_the_same_bits_as_with_one_command(tmp_path: Path) -> None:
     write_toml(config(), tmp_path / "config.toml")
     with started(tmp_path, "--config", "config.toml", "--run-dir", "run") as process:

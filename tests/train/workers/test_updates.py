@@ -102,6 +102,7 @@ def test_ppo(together: Together, network: dict, count: int) -> None:
     compare(together(count, work), alone.state(), torch.stack(metrics))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [2, 3])
 @pytest.mark.parametrize("network", CASES.values(), ids=CASES)
 def test_td(together: Together, network: dict, count: int) -> None:
