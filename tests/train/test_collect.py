@@ -88,6 +88,27 @@ def test_losses_are_counted_where_victims_can_be_lost() -> None:
         others.load_resume_state({**others.resume_state(), "tally": state["tally"]})
 
 
+def test_victims_that_are_turned_away_are_counted() -> None:
+    plain = Scenario.preset("double")
+    tasks = tuple(task.replace(arrival_rate_hz=6.0) for task in plain.tasks)
+    worlds = plain.replace(situation="poisson", max_victims=1, tasks=tasks)
+    env, other = (BatchEnv(worlds, 5, seed=3, num_threads=1) for _ in range(2))
+    collector = Collector(env, Scripted(env), torch.device("cpu"))
+    other.reset()
+    turned_away = 0
+    for _ in range(40):
+        transitions, _ = collector.step()
+        other.step(transitions.actions.numpy())
+        turned_away += int(other.turned_away().sum())
+    state = collector.resume_state()
+    tally = collector.take_tally()
+    assert tally.all_turned_away == turned_away > 0
+    assert tally.all_lost is None
+    assert collector.take_tally().all_turned_away == 0
+    collector.load_resume_state(state)
+    assert collector.take_tally().all_turned_away == turned_away
+
+
 def test_transitions_stay_when_the_worlds_go_on() -> None:
     env = BatchEnv("mixed", 3, seed=0, num_threads=1)
     collector = Collector(env, Scripted(env), torch.device("cpu"))

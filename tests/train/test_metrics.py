@@ -27,6 +27,10 @@ def test_interval_counts_from_line_to_line() -> None:
     assert line["rescues_per_episode"] is None
     assert line["rescues_per_env_step"] == 0.002
     assert (line["env_steps"], line["updates"], line["episodes"]) == (1500, 30, 4)
+    assert not {"lost_per_env_step", "turned_away_per_env_step"} & line.keys()
+    line = interval.close(2000, 30, Tally(0, 0, 4, 1, all_lost=5, all_turned_away=20), {})
+    assert line["lost_per_env_step"] == 0.01
+    assert line["turned_away_per_env_step"] == 0.04
 
 
 def test_rates_are_of_the_interval_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,7 +5,7 @@ It does not learn, and stores only counts of episodes and rescues.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,7 @@ class Tally:
         total_episodes: all that ended so far.
         all_rescues: of all worlds, whether or not their episodes have ended.
         all_lost: victims lost in all worlds; None where none can be lost.
+        all_turned_away: victims that found no slot, in all worlds; None where none arrive.
     """
 
     episodes: int
@@ -41,6 +42,7 @@ class Tally:
     total_episodes: int
     all_rescues: int
     all_lost: int | None = None
+    all_turned_away: int | None = None
 
 
 class Collector:
@@ -72,7 +74,8 @@ class Collector:
         self._afterstates = afterstates
         self._obs = self._tensor(staggered(env) if stagger_starts else env.reset())
         self._open_rescues: NDArray[np.int64] = np.zeros(env.num_envs, np.int64)
-        self._episodes = self._rescues = self._total = self._all_rescues = self._all_lost = 0
+        self._episodes = self._rescues = self._total = self._all_rescues = 0
+        self._all_lost = self._all_turned_away = 0
 
     def step(self) -> tuple[Transitions, Tensor]:
         """One control step of all worlds, with actions sampled from the policy.
@@ -105,14 +108,22 @@ class Collector:
         self._all_rescues += len(step.rescues)
         if self._env.scenario.has_deadlines:
             self._all_lost += len(self._env.lost())
+        if self._env.scenario.has_arrivals:
+            self._all_turned_away += int(self._env.turned_away().sum())
         self._count(step.terminated | step.truncated)
         return transitions, truncated
 
     def take_tally(self) -> Tally:
         """Counts since the last call, of all workers."""
-        own = self._counts()
-        self._episodes = self._rescues = self._all_rescues = self._all_lost = 0
-        return Tally(*workers.total(own).tolist())
+        numbers = workers.total(self._counts()).tolist()
+        self._episodes = self._rescues = self._all_rescues = 0
+        self._all_lost = self._all_turned_away = 0
+        tally, worlds = Tally(*numbers[:4]), self._env.scenario
+        if worlds.has_deadlines:
+            tally = replace(tally, all_lost=numbers[4])
+        if worlds.has_arrivals:
+            tally = replace(tally, all_turned_away=numbers[5])
+        return tally
 
     def resume_state(self) -> dict[str, Tensor]:
         """All but the worlds; see `Resumable`."""
@@ -133,12 +144,17 @@ class Collector:
             raise ValueError(f"'tally' has {len(tally)} numbers: must have {most}")
         self._episodes, self._rescues, self._total = tally[:3]
         self._all_rescues = sum(tally[3:4])  # which older versions did not count, nor the next
-        self._all_lost = sum(tally[4:])
+        self._all_lost = sum(tally[4:5])
+        self._all_turned_away = sum(tally[5:])
 
     def _counts(self) -> Tensor:
-        """The numbers of a `Tally`."""
+        """The numbers of a `Tally`, up to the last that these worlds have."""
         counts = [self._episodes, self._rescues, self._total, self._all_rescues]
-        return torch.tensor(counts + [self._all_lost] * self._env.scenario.has_deadlines)
+        counts += [self._all_lost, self._all_turned_away]
+        worlds = self._env.scenario
+        return torch.tensor(
+            counts[: 6 if worlds.has_arrivals else 5 if worlds.has_deadlines else 4]
+        )
 
     def _count(self, ended: NDArray[np.bool_]) -> None:
         count = int(ended.sum())

@@ -30,7 +30,8 @@ Metrics = Mapping[str, Any]
 """One line: env_steps, episodes, updates, seconds, env_steps_per_s, updates_per_s, losses by name,
 rescues_per_episode (of the episodes that ended; none where none did), rescues_per_env_step (of all
 worlds), attention_entropy by robot and head [nats], empty where the critic has no attention, and
-where victims can be lost lost_per_env_step (of all worlds)."""
+where victims can be lost lost_per_env_step, and where they arrive turned_away_per_env_step (both of
+all worlds)."""
 
 
 class MetricsFile:
@@ -195,6 +196,8 @@ class Interval:
         }
         if tally.all_lost is not None:
             line["lost_per_env_step"] = tally.all_lost / max(steps, 1)
+        if tally.all_turned_away is not None:
+            line["turned_away_per_env_step"] = tally.all_turned_away / max(steps, 1)
         self._seconds, self._env_steps, self._updates = seconds, env_steps, updates
         self._losses = {}
         return line

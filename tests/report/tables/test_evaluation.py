@@ -97,6 +97,21 @@ def test_victims_rescued_in_time_have_a_table_where_there_are_deadlines() -> Non
     assert "td-inner" not in {row[0] for row in printed(found) if row}
 
 
+def test_victims_turned_away_have_a_table_where_they_arrive() -> None:
+    plain = Scenario()
+    arriving = tuple(one.model_copy(update={"arrival_rate_hz": 2.0}) for one in plain.tasks)
+    busy = plain.model_copy(update={"situation": "poisson", "tasks": arriving})
+    counts = {"random": 1250, "greedy": 500, "hungarian": 250, "td-inner": 0}
+    of_policy = {name: {"turned_away": count} for name, count in counts.items()}
+    lengths = {
+        name: replace(figures(steps), measures=of_policy)
+        for name, steps in (("standard", 25), ("long", 100))
+    }
+    rows = {row[0]: row[1:] for row in printed(replace(summary(), **lengths), busy) if row}
+    assert rows["random"] == ["1.25"] * 2
+    assert rows["td-inner"] == ["0.00"] * 2
+
+
 def test_a_warm_start_is_named() -> None:
     warm = replace(summary(), warm_start="greedy")
     text = " ".join(cell for row in printed(warm) for cell in row)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -44,6 +44,8 @@ def print_summary(console: Console, summary: Summary, scenario: Scenario) -> Non
     print_table(console, _rescues(summary))
     if scenario.has_deadlines:
         print_table(console, _in_time(summary))
+    if scenario.has_arrivals:
+        print_table(console, _turned_away(summary))
     if any(summary.cooperation.values()):
         print_table(console, _cooperation(summary, scenario))
     if summary.attention_entropy:
@@ -127,21 +129,42 @@ def _rescues(summary: Summary) -> Table:
 def _in_time(summary: Summary) -> Table:
     """What share of the victims each policy rescued before their deadline, and how many it lost."""
     lengths = (summary.standard, summary.long)
+    heads = [head for one in lengths for head in (f"{one.episode_steps} steps", "lost")]
+    return Table(
+        columns(["policy"], heads),
+        (section(_by_policy(summary, _lost_cells)),),
+        "Share of victims rescued before their deadline",
+        ("lost: victims per episode whose deadline passed",),
+    )
+
+
+def _turned_away(summary: Summary) -> Table:
+    """How many victims found no slot while each policy played."""
+    lengths = (summary.standard, summary.long)
+    return Table(
+        columns(["policy"], [f"{one.episode_steps} steps" for one in lengths]),
+        (section(_by_policy(summary, _turned_away_cells)),),
+        "Victims turned away per episode",
+        ("turned away: they arrived when all slots of their task were taken",),
+    )
+
+
+def _by_policy(summary: Summary, cells: Callable[[Performance, str], tuple[str, ...]]) -> list[Row]:
+    """Rows of the scripts and of what is measured, with cells of both lengths of episodes."""
     scripts = [name for name in summary.standard.scripted if name != summary.method]
-    rows = [
+    return [
         Row(
-            (name, *(cell for one in lengths for cell in _lost_cells(one, name))),
+            (name, *(x for one in (summary.standard, summary.long) for x in cells(one, name))),
             strong=name == summary.method,
         )
         for name in (*scripts, summary.method)
     ]
-    heads = [head for one in lengths for head in (f"{one.episode_steps} steps", "lost")]
-    return Table(
-        columns(["policy"], heads),
-        (section(rows),),
-        "Share of victims rescued before their deadline",
-        ("lost: victims per episode whose deadline passed",),
-    )
+
+
+def _turned_away_cells(measured: Performance, name: str) -> tuple[str]:
+    turned_away = measured.measures[name]["turned_away"]
+    assert isinstance(turned_away, int)
+    return (number(turned_away / measured.episodes),)
 
 
 def _lost_cells(measured: Performance, name: str) -> tuple[str, str]:
