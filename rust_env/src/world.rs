@@ -9,11 +9,11 @@ use crate::fault_state::{FaultState, Moment};
 use crate::geometry::Vec2;
 use crate::observe::Scene;
 use crate::physics::Workspace;
+use crate::place::DRAWS;
 use crate::reward::{self, Happened, total_distance};
 use crate::rng::{Purpose, Stream};
 use crate::robot::Commands;
 use crate::rules::Rules;
-use crate::place::DRAWS;
 use crate::scenario::{MAX_ROBOTS, Shaping, Unavailable};
 use crate::tasks::{Events, Loss, Rescue, Victim};
 
@@ -119,9 +119,9 @@ impl World {
         self.velocities.fill(Vec2::zeros());
         let mut stream = Stream::new(self.seed, self.stream, episode, Purpose::Start);
         rules.spawn.place_start(&mut stream, &mut self.obstacles, &mut self.positions);
-        self.fill_slots(rules, 0);
         let now = self.now();
         self.faults.begin(rules, now);
+        self.fill_slots(rules, self.absent(rules));
         self.freeze(rules);
     }
 
@@ -181,8 +181,13 @@ impl World {
             let (drive, cap) = self.faults.drive(robot, drive);
             self.velocities[robot] = body.driven(self.velocities[robot], drive, damping, cap);
         }
-        let touched =
-            rules.physics.advance(workspace, &mut self.positions, &mut self.velocities, &self.obstacles, absent);
+        let touched = rules.physics.advance(
+            workspace,
+            &mut self.positions,
+            &mut self.velocities,
+            &self.obstacles,
+            absent,
+        );
         let mut distance_after = if shaping == Shaping::Progress { self.distance(rules) } else { 0.0 };
 
         let earlier = (events.rescues.len(), events.losses.len());

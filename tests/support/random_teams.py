@@ -32,6 +32,7 @@ def random_tables(size: Size, seed: int) -> TeamTables:
     needs = (torch.rand(worlds, victims, abilities, generator=draw) * 2.6).floor()
     return TeamTables(
         is_robot=torch.ones(worlds, robots, dtype=torch.bool),
+        is_there=torch.ones(worlds, robots, dtype=torch.bool),
         positions=uniform(-0.6, 0.6, worlds, robots, 2),
         velocities=uniform(-0.7, 0.7, worlds, robots, 2),
         bodies=uniform(0.3, 1.5, worlds, robots, 3),

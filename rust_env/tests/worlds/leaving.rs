@@ -110,7 +110,6 @@ proptest! {
             robots: robots[..ROBOTS - 1].to_vec(),
             engine: Engine::Discs,
             arena_half_width_m: 0.5,
-            victim_places_m: vec![[-0.3, 0.3], [0.0, 0.3], [0.3, 0.3], [0.0, 0.0]],
             ..Scenario::default()
         };
         let faults = vec![fault(&robots[ROBOTS - 1].name, Kind::Unavailable, 1.0)];

@@ -49,6 +49,7 @@ def test_orders_of_robots_victims_and_abilities_do_not_matter(pooling: str) -> N
     robots, victims, abilities = (torch.randperm(count) for count in (5, 4, 4))
     mixed = TeamTables(
         is_robot=tables.is_robot[:, robots],
+        is_there=tables.is_there[:, robots],
         positions=tables.positions[:, robots],
         velocities=tables.velocities[:, robots],
         bodies=tables.bodies[:, robots],

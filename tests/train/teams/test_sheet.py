@@ -78,3 +78,44 @@ def test_continuous_actions_are_refused() -> None:
     scenario = Scenario(actions="continuous")
     with pytest.raises(ConfigError, match="actions = 'continuous': must be 'discrete'"):
         TeamSheet(scenario, BatchEnv(scenario, 1).observation_names())
+
+
+@pytest.mark.parametrize("each", [False, True])
+def test_a_robot_that_never_comes_changes_nothing(each: bool) -> None:
+    alone = Scenario.preset("mixed").replace(engine="discs", unavailable_robots="leave")
+    if each:
+        sees = Fault(robot="food_0", kind="position_noise", value=0.0)
+        alone = alone.replace(faults=(sees,))
+    robots = [robot.model_dump() for robot in alone.robots]
+    away = Fault(robot="food_2", kind="unavailable", value=1.0)
+    beside = alone.replace(
+        robots=[*robots, robots[0] | {"name": "food_2"}], faults=(*alone.faults, away)
+    )
+    torch.manual_seed(1)
+    actor = TeamActor(8, "inner", 4)
+    chosen, rng = [], np.random.default_rng(0)
+    plan = rng.integers(0, 5, (12, 9, 5))
+    for scenario in (alone, beside):
+        with closing(BatchEnv(scenario, 9, seed=3)) as env:
+            sheet, obs, found = TeamSheet(scenario, env.observation_names()), env.reset(), []
+            for actions in plan:
+                with torch.no_grad():
+                    rows = sheet.own_rows(actor(relate(sheet.tables(as_tensor(obs)))))
+                found.append(rows.view(9, env.num_robots, -1)[:, :4])
+                obs = env.step(actions[:, : env.num_robots]).obs
+            chosen.append(torch.stack(found))
+    torch.testing.assert_close(chosen[0], chosen[1])
+
+
+def test_victims_are_known_when_the_first_robot_has_left() -> None:
+    scenario = Scenario.preset("mixed").replace(unavailable_robots="leave")
+    with closing(BatchEnv(scenario, 4, seed=1)) as env:
+        present = np.ones((4, 4), np.bool_)
+        present[:2, 0] = False
+        present[0, 1] = False
+        env.set_present(present)
+        tables = TeamSheet(scenario, env.observation_names()).tables(as_tensor(env.observe()))
+        np.testing.assert_array_equal(tables.is_there, present)
+        assert not tables.abilities[0, :2].any()
+        abilities = sorted({one for robot in scenario.robots for one in robot.abilities})
+        _same_victims(tables.is_victim, tables.places, tables.needs, env, abilities, 1)

@@ -189,7 +189,7 @@ def _nearest_teammate(tables: TeamTables) -> Tensor:
     """(B, R, 2) way to the nearest teammate, at most 2 m in x and y; zero for a robot alone."""
     ways = tables.positions[:, None] - tables.positions[:, :, None]
     squares = ways.pow(2).sum(-1)
-    nobody = torch.eye(ways.shape[1], dtype=torch.bool) | ~tables.is_robot[:, None]
+    nobody = torch.eye(ways.shape[1], dtype=torch.bool) | ~tables.is_there[:, None]
     nearest = squares.masked_fill(nobody, torch.inf).argmin(-1)
     found = ways.gather(2, nearest[..., None, None].expand(-1, -1, 1, 2)).squeeze(2)
     return found.clamp(-2.0, 2.0) * (~nobody).any(-1, keepdim=True)
@@ -252,10 +252,10 @@ def _robots(
 
 def _worlds(tables: TeamTables) -> Tensor:
     """(B, WORLD_WIDTH) what tells teams and their tasks apart, for a critic."""
-    robots = tables.is_robot.float()
-    number = robots.sum(1)
+    robots = tables.is_there.float()
+    number = robots.sum(1).clamp(min=1.0)
     speeds = tables.bodies[..., 0]
-    slowest = speeds.masked_fill(~tables.is_robot, torch.inf).amin(1)
+    slowest = speeds.masked_fill(~tables.is_there, torch.inf).amin(1).clamp(max=100.0)
     have = (tables.abilities * robots[..., None]).sum(1)
     spare = torch.where(tables.demand > 0.0, have / tables.demand.clamp(min=1e-6), 9.0).amin(1)
     return torch.stack(

@@ -15,6 +15,7 @@ class TeamTables(NamedTuple):
 
     Attributes:
         is_robot: (B, R) bool, which rows are robots.
+        is_there: (B, R) bool, which of them are in the arena.
         positions: (B, R, 2) [m].
         velocities: (B, R, 2) [m/s].
         bodies: (B, R, 3) final speed at full drive [m/s], the time that a start from rest costs
@@ -28,6 +29,7 @@ class TeamTables(NamedTuple):
     """
 
     is_robot: Tensor
+    is_there: Tensor
     positions: Tensor
     velocities: Tensor
     bodies: Tensor
@@ -41,6 +43,7 @@ class TeamTables(NamedTuple):
 
 _SIZES = {
     "is_robot": "R",
+    "is_there": "R",
     "positions": "R2",
     "velocities": "R2",
     "bodies": "R3",

@@ -43,6 +43,7 @@ class TeamSheet:
             raise ConfigError("scenario.actions = 'continuous': must be 'discrete' for any team")
         self.num_robots = len(scenario.robots)
         self.each_sees = any(fault.kind in SENSES for fault in scenario.faults)
+        self._leave = scenario.robots_leave
         steering = Steering(scenario)
         push = [robot.drive_force_n / robot.mass_kg * scenario.dt_s for robot in scenario.robots]
         bodies = np.stack([steering.speed, steering.lag, push], -1)
@@ -95,13 +96,15 @@ class TeamSheet:
             return self._of_each(obs)
         positions = obs[..., self._own_position]
         available = obs[..., self._own_available] > 0.5
-        first = obs[:, 0]
+        # Of who sees the victims: all who are in the arena do.
+        world, robot = torch.arange(len(obs)), available.int().argmax(1) if self._leave else 0
         return self._made(
             positions,
             obs[..., self._own_velocity],
-            obs[..., self._own_abilities] * available[..., None],
-            first,
-            positions[:, 0],
+            obs[..., self._own_abilities],
+            available,
+            obs[world, robot],
+            positions[world, robot],
         )
 
     def _of_each(self, obs: Tensor) -> TeamTables:
@@ -113,30 +116,38 @@ class TeamSheet:
             return both.gather(1, order.expand(-1, -1, both.shape[2]))
 
         own, velocity = rows[:, self._own_position], rows[:, self._own_velocity]
-        own_can = rows[:, self._own_abilities] * (rows[:, self._own_available] > 0.5)[:, None]
+        own_can, ready = rows[:, self._own_abilities], rows[:, [self._own_available]]
         if self._mate_positions:
             places = rows[:, self._mate_positions] + own[:, None]
             moving = rows[:, self._mate_velocities] + velocity[:, None]
-            can = rows[:, self._mate_abilities]
-            can = can * (rows[:, self._mate_available] > 0.5)[..., None]
+            can, others = rows[:, self._mate_abilities], rows[:, self._mate_available, None]
         else:
-            places, moving, can = (x[:, None][:, :0] for x in (own, velocity, own_can))
-        return self._made(
-            of_team(own, places), of_team(velocity, moving), of_team(own_can, can), rows, own
-        )
+            places, moving, can, others = (
+                x[:, None][:, :0] for x in (own, velocity, own_can, ready)
+            )
+        available = of_team(ready, others).squeeze(2) > 0.5
+        team = (of_team(own, places), of_team(velocity, moving), of_team(own_can, can))
+        return self._made(*team, available, rows, own)
 
     def _made(
-        self, positions: Tensor, velocities: Tensor, abilities: Tensor, seen: Tensor, own: Tensor
+        self,
+        positions: Tensor,
+        velocities: Tensor,
+        abilities: Tensor,
+        available: Tensor,
+        seen: Tensor,
+        own: Tensor,
     ) -> TeamTables:
         count, robots = positions.shape[:2]
         present = seen[:, self._present] > 0.5
         places = (seen[:, self._places] + own[:, None]) * present[..., None]
         return TeamTables(
-            is_robot=torch.ones(count, robots, dtype=torch.bool),
+            is_robot=(everyone := torch.ones(count, robots, dtype=torch.bool)),
+            is_there=available if self._leave else everyone,
             positions=positions,
             velocities=velocities,
             bodies=self._bodies.expand(count, -1, -1),
-            abilities=abilities,
+            abilities=abilities * available[..., None],
             is_victim=present,
             places=places,
             needs=seen[:, self._needs] * present[..., None],
