@@ -174,6 +174,9 @@ class Batch:
     def observe(self) -> NDArray[np.float32]:
         """Present observations, (E, R, D)."""
 
+    def charge(self) -> NDArray[np.float32]:
+        """Charges of the robots as shares of their battery's capacity, (E, R)."""
+
     def positions(self) -> NDArray[np.float32]:
         """Places of the robots, (E, R, 2), m."""
 

@@ -16,6 +16,7 @@ pub mod rng;
 
 pub mod robot;
 
+pub mod energy;
 pub mod place;
 pub mod tasks;
 

@@ -1,5 +1,6 @@
 //! Observations: world → one row of numbers for each robot, with named columns.
 
+use crate::energy::Energy;
 use crate::fault::{HEALTHY, KINDS, Kind, Levels};
 use crate::geometry::Vec2;
 use crate::robot::Body;
@@ -20,6 +21,8 @@ pub struct Scene<'a> {
     pub positions: &'a [Vec2],
     /// Velocities of the robots, m/s.
     pub velocities: &'a [Vec2],
+    /// Charges of the robots, J; none where no robot has a battery.
+    pub charges: &'a [f64],
     /// Victims by slot.
     pub victims: &'a [Option<Victim>],
     /// Steps done in the episode.
@@ -50,7 +53,7 @@ pub struct Layout {
     robots: usize,
     victims: usize,
     sorted: VictimOrder,
-    /// Whether each robot's block ends with the faults in effect.
+    /// Whether each robot's block has the faults in effect.
     faults: bool,
     /// For each task, how many of each ability it needs.
     needs: Vec<Vec<f32>>,
@@ -58,6 +61,7 @@ pub struct Layout {
     services: Option<Vec<Service>>,
     deadlines: Option<Deadlines>,
     order: Option<Order>,
+    energy: Option<Energy>,
     /// The columns that never change, of all robots (R × D); zeros elsewhere.
     fixed: Vec<f32>,
 }
@@ -78,6 +82,7 @@ impl Layout {
             services: Some(Service::of_tasks(scenario)).filter(|_| scenario.has_services()),
             deadlines: Deadlines::new(scenario),
             order: Order::new(scenario),
+            energy: Energy::new(scenario),
             abilities,
             needs,
             fixed: vec![],
@@ -91,9 +96,7 @@ impl Layout {
         let mut fixed = vec![0.0; self.robots * self.width()];
         for (own, row) in fixed.chunks_exact_mut(self.width()).enumerate() {
             let others = (0..self.robots).filter(|other| *other != own);
-            for (block, robot) in
-                row.chunks_exact_mut(self.robot_width()).zip(std::iter::once(own).chain(others))
-            {
+            for (block, robot) in self.blocks(row).zip(std::iter::once(own).chain(others)) {
                 for (column, ability) in block[4..].iter_mut().zip(&self.abilities) {
                     *column = scenario.robots[robot].abilities.amount(ability) as f32;
                 }
@@ -109,17 +112,40 @@ impl Layout {
         4 + self.abilities.len()
     }
 
-    /// Writes the faults in effect into the end of a robot's block, if they are to be seen.
+    /// Column of the charge in a robot's block, if it has one.
+    fn charge(&self) -> usize {
+        self.availability() + if self.faults { KINDS.len() } else { 1 }
+    }
+
+    /// Writes the faults in effect into a robot's block, if they are to be seen.
     fn write_levels(&self, levels: &Levels, block: &mut [f32]) {
         let shown = KINDS.into_iter().filter(|kind| *kind != Kind::Unavailable);
-        for (column, kind) in block[self.availability() + 1..].iter_mut().zip(shown) {
+        for (column, kind) in block[self.availability() + 1..self.charge()].iter_mut().zip(shown) {
             *column = levels[kind as usize];
         }
     }
 
     /// Columns of one robot.
     fn robot_width(&self) -> usize {
-        self.availability() + if self.faults { KINDS.len() } else { 1 }
+        self.charge() + usize::from(self.energy.is_some())
+    }
+
+    /// Columns of the way to the nearest station, behind a robot's own block.
+    fn station_width(&self) -> usize {
+        if self.energy.as_ref().is_some_and(Energy::has_stations) { 2 } else { 0 }
+    }
+
+    /// Columns before those of victims.
+    fn victims_from(&self) -> usize {
+        self.robots * self.robot_width() + self.station_width()
+    }
+
+    /// The blocks of the robot itself and of its teammates.
+    fn blocks<'a>(&self, row: &'a mut [f32]) -> impl Iterator<Item = &'a mut [f32]> {
+        let (own, rest) = row.split_at_mut(self.robot_width());
+        let mates = (self.robots - 1) * self.robot_width();
+        let mates = &mut rest[self.station_width()..][..mates];
+        std::iter::once(own).chain(mates.chunks_exact_mut(self.robot_width()))
     }
 
     /// Columns of one victim.
@@ -133,11 +159,11 @@ impl Layout {
     /// Width D of a row.
     #[must_use]
     pub fn width(&self) -> usize {
-        self.robots * self.robot_width() + self.victims * self.victim_width()
+        self.victims_from() + self.victims * self.victim_width()
     }
 
     /// The name of every column; units are m and m/s, flags are 0 or 1, abilities are 0 or 1 or
-    /// amounts, needs are counts or amounts, `served` and `time_left` are shares.
+    /// amounts, needs are counts or amounts, `charge`, `served` and `time_left` are shares.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let mut names = Vec::with_capacity(self.width());
@@ -157,6 +183,10 @@ impl Layout {
             if self.faults {
                 let shown = KINDS.iter().filter(|kind| **kind != Kind::Unavailable);
                 names.extend(shown.map(|kind| format!("{who}.fault.{}", kind.name())));
+            }
+            names.extend(self.energy.iter().map(|_| format!("{who}.charge")));
+            if robot == 0 && self.station_width() > 0 {
+                names.extend(["x", "y"].map(|axis| format!("own.station.{axis}")));
             }
         }
         for victim in 0..self.victims {
@@ -185,10 +215,8 @@ impl Layout {
         if senses.absent >> own & 1 == 1 {
             return row.fill(0.0);
         }
-        let (robots, _) = row.split_at_mut(self.robots * self.robot_width());
         let others = (0..self.robots).filter(|other| *other != own);
-        let order = std::iter::once(own).chain(others);
-        for (block, robot) in robots.chunks_exact_mut(self.robot_width()).zip(order) {
+        for (block, robot) in self.blocks(row).zip(std::iter::once(own).chain(others)) {
             if senses.deaf && robot != own || senses.absent >> robot & 1 == 1 {
                 block.fill(0.0);
                 continue;
@@ -198,7 +226,8 @@ impl Layout {
         }
     }
 
-    /// Leaves a robot nothing of its row but what it knows of itself: abilities, availability, faults.
+    /// Leaves a robot nothing of its row but what it knows of itself: abilities, availability, faults,
+    /// charge.
     pub fn darken(&self, row: &mut [f32]) {
         row[..4].fill(0.0);
         row[self.robot_width()..].fill(0.0);
@@ -213,20 +242,31 @@ impl Layout {
         velocity_error: Vec2,
         row: &mut [f32],
     ) {
-        let (robots, rest) = row.split_at_mut(self.robots * self.robot_width());
-        let mut blocks = robots.chunks_exact_mut(self.robot_width());
         let position = scene.positions[own] + position_error;
         let velocity = scene.velocities[own] + velocity_error;
-        let mut write = |position: Vec2, velocity: Vec2| {
-            if let Some(block) = blocks.next() {
-                block[..4].copy_from_slice(&[position.x, position.y, velocity.x, velocity.y]);
-            }
-        };
-        write(position, velocity);
-        for other in (0..self.robots).filter(|other| *other != own) {
-            write(scene.positions[other] - position, scene.velocities[other] - velocity);
+        let others = (0..self.robots).filter(|other| *other != own);
+        let (block, rest) = row.split_at_mut(self.robot_width());
+        block[..4].copy_from_slice(&[position.x, position.y, velocity.x, velocity.y]);
+        let mates = rest[self.station_width()..].chunks_exact_mut(self.robot_width());
+        for (block, other) in mates.zip(others) {
+            let (place, speed) = (scene.positions[other] - position, scene.velocities[other] - velocity);
+            block[..4].copy_from_slice(&[place.x, place.y, speed.x, speed.y]);
         }
-        self.write_victims(scene, &scene.team[own], position, rest);
+        if let Some(energy) = &self.energy {
+            self.write_energy(energy, scene.charges, own, position, row);
+        }
+        self.write_victims(scene, &scene.team[own], position, &mut row[self.victims_from()..]);
+    }
+
+    /// Writes the charges of all robots, and the way to the nearest station from `position`.
+    fn write_energy(&self, energy: &Energy, charges: &[f64], own: usize, position: Vec2, row: &mut [f32]) {
+        let others = (0..self.robots).filter(|other| *other != own);
+        for (block, robot) in self.blocks(row).zip(std::iter::once(own).chain(others)) {
+            block[self.charge()] = energy.share(robot, charges);
+        }
+        if let Some(way) = energy.nearest_station(position) {
+            row[self.robot_width()..][..2].copy_from_slice(&[way.x, way.y]);
+        }
     }
 
     fn write_victims(&self, scene: Scene, body: &Body, own: Vec2, rows: &mut [f32]) {
@@ -304,6 +344,7 @@ mod tests {
             tasks: &tasks,
             positions: &at,
             velocities: &moving,
+            charges: &[],
             victims: &victims,
             step: 0,
         };

@@ -1,6 +1,7 @@
 //! A scenario found valid and made ready to play: every constant that worlds share, computed once. There
 //! is no other way from a description to a world.
 
+use crate::energy::Energy;
 use crate::error::{Error, Result};
 use crate::fault::{HEALTHY, Kind};
 use crate::geometry::{Solid, Vec2};
@@ -51,6 +52,8 @@ pub struct Rules {
     pub arrivals: Option<Arrivals>,
     /// Which tasks come before which, if any.
     pub order: Option<Order>,
+    /// Batteries and stations, if any.
+    pub energy: Option<Energy>,
     /// The obstacles' forms.
     pub solids: Vec<Solid>,
     /// Motion and contacts.
@@ -101,6 +104,7 @@ impl Rules {
             deadlines: Deadlines::new(&scenario),
             arrivals: Arrivals::new(&scenario),
             order: Order::new(&scenario),
+            energy: Energy::new(&scenario),
             weights: Weights::new(&scenario),
             faults: processes(&scenario),
             spawn,

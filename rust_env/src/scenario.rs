@@ -3,6 +3,7 @@
 
 mod abilities;
 mod arrivals;
+mod battery;
 mod check;
 mod order;
 mod task;
@@ -15,6 +16,7 @@ use crate::fault::Fault;
 
 pub use abilities::{Abilities, reaches};
 pub use arrivals::Arrival;
+pub use battery::{Battery, Station};
 pub(crate) use task::steps_of;
 pub use task::{Deadline, Interrupted, Task};
 
@@ -24,6 +26,8 @@ pub const MAX_ROBOTS: usize = 64;
 pub const MAX_VICTIMS: usize = 32;
 /// Most obstacles in an arena.
 pub const MAX_OBSTACLES: usize = 64;
+/// Most stations in a scenario.
+pub const MAX_STATIONS: usize = 64;
 /// Most places in a list of those at which victims appear.
 pub const MAX_PLACES: usize = 256;
 /// Most different abilities in a scenario.
@@ -165,6 +169,9 @@ pub struct Robot {
     /// Where it is when an episode starts, m; a random place in each episode if absent.
     #[serde(default)]
     pub start_m: Option<[f64; 2]>,
+    /// Its battery; it needs no energy if absent.
+    #[serde(default)]
+    pub battery: Option<Battery>,
 }
 
 fn default_radius_m() -> f64 {
@@ -208,6 +215,8 @@ pub struct Scenario {
     pub arrivals: Vec<Arrival>,
     /// Solid things in the arena.
     pub obstacles: Vec<Obstacle>,
+    /// Places that charge batteries.
+    pub stations: Vec<Station>,
     /// Half the side of the square arena, m.
     pub arena_half_width_m: f64,
     /// How near a helper must be, m.
@@ -274,6 +283,7 @@ impl Default for Scenario {
             radius_m: default_radius_m(),
             drive_force_n: default_drive_force_n(),
             start_m: None,
+            battery: None,
         };
         let task = |name: &str, needs: [&str; 2]| Task::new(name, needs.map(String::from).to_vec());
         Self {
@@ -288,6 +298,7 @@ impl Default for Scenario {
             max_victims: 2,
             arrivals: vec![],
             obstacles: vec![],
+            stations: vec![],
             arena_half_width_m: 1.0,
             rescue_radius_m: 0.15,
             spawn_clearance_m: 0.2,

@@ -62,6 +62,9 @@ pub struct World {
     pub positions: Vec<Vec2>,
     /// Velocities of the robots, m/s.
     pub velocities: Vec<Vec2>,
+    /// Charges of the robots, J; none where no robot has a battery. Images have them apart.
+    #[serde(skip)]
+    pub charges: Vec<f64>,
     /// Places of the obstacles, m.
     pub obstacles: Vec<Vec2>,
     /// Victims by slot.
@@ -87,6 +90,7 @@ impl World {
             victim_words: 0,
             positions: vec![Vec2::zeros(); rules.team.len()],
             velocities: vec![Vec2::zeros(); rules.team.len()],
+            charges: vec![],
             obstacles: vec![Vec2::zeros(); rules.solids.len()],
             victims: vec![None; rules.scenario.num_victims()],
             faults: FaultState::default(),
@@ -102,8 +106,9 @@ impl World {
         let places = (2 * robots + rules.solids.len()) * size_of::<Vec2>();
         let victims = rules.scenario.num_victims() * size_of::<Option<Victim>>();
         let struck = if faults == 0 { 0 } else { FaultState::most_bytes(robots, rules.layout.width()) };
+        let charges = if rules.energy.is_some() { robots * size_of::<f64>() } else { 0 };
         // Allocators round up, and keep a little beside each list.
-        size_of::<Self>() + (places + victims + struck + 8 * faults) * 9 / 8 + 8 * 16
+        size_of::<Self>() + (places + victims + struck + charges + 8 * faults) * 9 / 8 + 8 * 16
     }
 
     /// Starts `episode`: places everything anew from that episode's streams.
@@ -117,6 +122,9 @@ impl World {
         self.victim_words = 0;
         self.victims.fill(None);
         self.velocities.fill(Vec2::zeros());
+        if let Some(energy) = &rules.energy {
+            energy.fill(&mut self.charges);
+        }
         let mut stream = Stream::new(self.seed, self.stream, episode, Purpose::Start);
         rules.spawn.place_start(&mut stream, &mut self.obstacles, &mut self.positions);
         let now = self.now();
@@ -171,16 +179,23 @@ impl World {
         reward: &mut [f32],
     ) -> Ending {
         let shaping = rules.weights.shaping;
-        let distance_before = if shaping == Shaping::None { 0.0 } else { self.distance(rules) };
-        let (away, absent) = (self.faults.unavailable(), self.absent(rules));
+        let (away, absent) = (self.away(rules), self.absent(rules));
+        let distance_before = if shaping == Shaping::None { 0.0 } else { self.distance(rules, away) };
         let mut effort = [0.0; MAX_ROBOTS];
         let damping = rules.scenario.damping as f32;
         for (robot, body) in rules.team.iter().enumerate() {
-            let drive = commands.drive(env * rules.team.len() + robot);
-            effort[robot] = if away >> robot & 1 == 1 { 0.0 } else { drive.norm_squared() };
+            let is_away = away >> robot & 1 == 1;
+            let given = commands.drive(env * rules.team.len() + robot);
+            let drive = if is_away { Vec2::zeros() } else { given };
+            effort[robot] = drive.norm_squared();
             let (drive, cap) = self.faults.drive(robot, drive);
             self.velocities[robot] = body.driven(self.velocities[robot], drive, damping, cap);
         }
+        let before = rules.energy.as_ref().map(|_| {
+            let mut places = [Vec2::zeros(); MAX_ROBOTS];
+            places[..self.positions.len()].copy_from_slice(&self.positions);
+            places
+        });
         let touched = rules.physics.advance(
             workspace,
             &mut self.positions,
@@ -188,7 +203,10 @@ impl World {
             &self.obstacles,
             absent,
         );
-        let mut distance_after = if shaping == Shaping::Progress { self.distance(rules) } else { 0.0 };
+        if let (Some(energy), Some(before)) = (&rules.energy, &before) {
+            energy.account(before, &self.positions, absent, &mut self.charges);
+        }
+        let mut distance_after = if shaping == Shaping::Progress { self.distance(rules, away) } else { 0.0 };
 
         let earlier = (events.rescues.len(), events.losses.len());
         self.settle(rules, env, &mut events.rescues);
@@ -209,7 +227,7 @@ impl World {
         };
         self.over = ending.over();
         if shaping == Shaping::Potential && !ending.terminated {
-            distance_after = self.distance(rules);
+            distance_after = self.distance(rules, self.away(rules));
         }
         let happened = Happened {
             rescues: &events.rescues[earlier.0..],
@@ -227,7 +245,7 @@ impl World {
     /// to wait is decided before anybody is rescued.
     fn settle(&mut self, rules: &Rules, env: usize, rescues: &mut Vec<Rescue>) {
         let radius = rules.scenario.rescue_radius_m as f32;
-        let mut busy = self.faults.unavailable();
+        let mut busy = self.away(rules);
         let blocked = rules.order.as_ref().map_or(0, |order| order.blocked(&self.victims));
         for (slot, place) in self.victims.iter_mut().enumerate() {
             let Some(victim) = place else { continue };
@@ -274,8 +292,14 @@ impl World {
         }
     }
 
-    fn distance(&self, rules: &Rules) -> f32 {
-        let away = self.faults.unavailable();
+    /// Robots that neither drive nor help now, as bits: unavailable ones, and those whose battery is empty.
+    fn away(&self, rules: &Rules) -> u64 {
+        let empty = rules.energy.as_ref().map_or(0, |energy| energy.empty(&self.charges));
+        self.faults.unavailable() | empty
+    }
+
+    /// Distance of victims from the robots that are not `away`, as rewards count it, m.
+    fn distance(&self, rules: &Rules, away: u64) -> f32 {
         total_distance(self.victims.iter().flatten(), &rules.tasks, &rules.team, &self.positions, away)
     }
 
@@ -353,6 +377,7 @@ impl World {
             tasks: &rules.tasks,
             positions: &self.positions,
             velocities: &self.velocities,
+            charges: &self.charges,
             victims: &self.victims,
             step: self.step,
         }

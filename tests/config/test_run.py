@@ -243,7 +243,14 @@ def test_what_a_run_depends_on(method: str, warm_start: str, unused: set[str]) -
 
 
 ADDED_SINCE = {
-    "scenario": ("victim_area_m", "victim_places_m", "lost_cost", "arrivals", "unavailable_robots"),
+    "scenario": (
+        "victim_area_m",
+        "victim_places_m",
+        "lost_cost",
+        "arrivals",
+        "unavailable_robots",
+        "stations",
+    ),
     "network": ("swapped_robots", "shared_gradients", "joint_critic", "symmetry"),
     "train": (
         *("episode_steps", "engine", "stagger_starts", "schedule"),
@@ -261,7 +268,7 @@ def test_a_digest_is_that_of_the_values_in_use() -> None:
         for name in names:
             del values[section][name]  # at its default
     for robot in values["scenario"]["robots"]:
-        del robot["start_m"]
+        del robot["start_m"], robot["battery"]
     for task in values["scenario"]["tasks"]:
         for name in ("service_s", "service", "deadline_s", "after", "arrival_rate_hz"):
             del task[name]

@@ -1,8 +1,8 @@
 """A second, plain reading of the rescue world in float64, to hold the compiled one against.
 
-It covers motion without contacts, the rescue rule, sums, services and deadlines, rewards,
-observations and the faults that need no random numbers. It draws nothing: starts, and the places
-and deadlines of new victims, are taken from the world that is checked.
+It covers motion without contacts, batteries, the rescue rule, sums, services and deadlines,
+rewards, observations and the faults that need no random numbers. It draws nothing:
+starts, and the places and deadlines of new victims, are taken from the world that is checked.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], dtype=np.float
 @dataclass
 class State:
     """E worlds: places and velocities (E, R, 2), obstacles (E, O, 2), victims (E, V) and faults
-    (E, R) structured, steps done (E,)."""
+    (E, R) structured, steps done (E,), charges as shares (E, R)."""
 
     positions: Array
     velocities: Array
@@ -34,10 +34,16 @@ class State:
     victims: NDArray[np.void]
     faults: NDArray[np.void]
     steps: NDArray[np.int64]
+    charge: Array
 
     @property
     def available(self) -> Bools:
         return np.asarray(self.faults["unavailable"] == 0)
+
+    @property
+    def able(self) -> Bools:
+        """Robots that drive and help, (E, R)."""
+        return np.asarray(self.available & (self.charge > 0))
 
     @property
     def present(self) -> Bools:
@@ -68,6 +74,11 @@ class Stepper:
         # Least whole numbers of periods that last at least so long, up to rounding.
         self.service = np.array([self._periods(task.service_s) for task in tasks])
         self.restarts = np.array([task.service == "restart" for task in tasks])
+        batteries = [robot.battery for robot in robots]
+        self.powered = np.array([one is not None for one in batteries])
+        self.capacity = np.array([one.capacity_j if one else 1.0 for one in batteries])
+        self.per_m = np.array([one.per_m_j if one else 0.0 for one in batteries])
+        self.idle = np.array([one.idle_w if one else 0.0 for one in batteries])
         everyone = range(len(robots))
         self.others = np.array([[j for j in everyone if j != i] for i in everyone], dtype=int)
 
@@ -94,6 +105,23 @@ class Stepper:
         all_of = [one for one in self.scenario.arrivals if one.task == name]
         return [one.position_m for one in all_of if self._periods(one.at_s) == step]
 
+    def charged(self, before: State, after: Array) -> tuple[Array, Bools]:
+        """Charges after a step that ends at these places, (E, R), and where rounding might decide
+        whether a robot stands at a station or is empty, (E,)."""
+        dt = self.scenario.dt_s
+        way = np.linalg.norm(after - before.positions, axis=-1)
+        joules = before.charge * self.capacity - self.per_m * way - self.idle * dt
+        given, unsure = np.zeros(way.shape), np.zeros(way.shape, dtype=bool)
+        for station in self.scenario.stations:
+            distance = np.linalg.norm(after - station.position_m, axis=-1)
+            here = distance <= station.radius_m
+            given = np.where(here, np.maximum(given, station.recharge_w * dt), given)
+            unsure |= abs(distance - station.radius_m) < 1e-5
+        share = np.clip((joules + given) / self.capacity, 0.0, 1.0)
+        unsure |= (abs(joules + given) < 1e-5 * self.capacity) & (before.charge > 0)
+        changes = self.powered & self.there(before)
+        return np.where(changes, share, before.charge), (unsure & changes).any(-1)
+
     def drive(self, actions: NDArray[Any]) -> Array:
         """Directions whose length is the share of full force, (E, R, 2)."""
         if self.scenario.actions == "discrete":
@@ -107,7 +135,7 @@ class Stepper:
         sin, cos = (f(faults["heading_bias"].astype(np.float64)) for f in (np.sin, np.cos))
         x, y = drive[..., 0], drive[..., 1]
         drive = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
-        drive = drive * (faults["motor_gain"] * state.available)[..., None]
+        drive = drive * (faults["motor_gain"] * state.able)[..., None]
         velocities = (1 - self.scenario.damping) * state.velocities
         velocities = velocities + self.acceleration[:, None] * dt * drive
         speed = np.linalg.norm(velocities, axis=-1)
@@ -143,7 +171,7 @@ class Stepper:
     def total_distance(self, state: State, positions: Array) -> Array:
         """Σ over present victims and their needs of the nearest able robots' distances, (E,)."""
         distances = self.distances(state, positions)
-        distances = np.where(state.available[:, None], distances, np.inf)
+        distances = np.where(state.able[:, None], distances, np.inf)
         total = np.zeros(len(positions))
         for task, counts in enumerate(self.counts):
             mine = state.present & (state.victims["task"] == task)
@@ -162,8 +190,11 @@ class Stepper:
                 total += np.where(mine, nearest, 0.0).sum(-1)
         return total
 
-    def met(self, state: State, positions: Array) -> tuple[list[tuple[int, ...]], Bools]:
-        """(env, slot, helpers...) of all victims whose needs are met; worlds in which rounding
+    def met(
+        self, state: State, positions: Array, charge: Array
+    ) -> tuple[list[tuple[int, ...]], Bools]:
+        """(env, slot, helpers...) of all victims whose needs are met by robots with a
+        charge (E, R); worlds in which rounding
         might decide, (E,)."""
         radius = self.scenario.rescue_radius_m
         distances = self.distances(state, positions)
@@ -172,7 +203,7 @@ class Stepper:
         tied = (np.diff(in_order, axis=-1) < 1e-5) & (in_order[..., 1:] < radius)
         unsure = (state.present & (close.any(-1) | tied.any(-1))).any(-1)
         found: list[tuple[int, ...]] = []
-        near = (distances <= radius) & state.available[:, None]
+        near = (distances <= radius) & (state.available & (charge > 0))[:, None]
         waiting = self.waiting(state)
         for env in np.flatnonzero((state.present & near.any(-1)).any(-1)):
             busy: set[int] = set()
@@ -275,7 +306,7 @@ class Stepper:
         return {
             "rescue": rescue,
             "progress": np.broadcast_to((scenario.shaping_weight * dense)[:, None], rescue.shape),
-            "action": -scenario.action_cost * (drive**2).sum(-1) * before.available,
+            "action": -scenario.action_cost * (drive**2).sum(-1) * before.able,
             "lost": np.broadcast_to(-scenario.lost_cost * lost.sum(1)[:, None], rescue.shape),
         }
 
@@ -287,12 +318,20 @@ class Stepper:
         if self.scenario.observe_faults:
             shown = [kind for kind in state.faults.dtype.names or () if kind != "unavailable"]
             flags += [state.faults[kind][..., None] for kind in shown]
+        if self.powered.any():
+            flags.append(state.charge[..., None])
         there = self.there(state)[..., None]
         known = np.concatenate(flags, axis=-1) * there
         dark = (state.faults["blackout"] == 1)[..., None]
         deaf = (state.faults["lost_communication"] == 1)[..., None]
         motion = np.concatenate([state.positions, state.velocities], axis=-1)
         blocks = [np.where(dark, 0.0, motion), known]
+        if self.scenario.stations:
+            stations = np.array([one.position_m for one in self.scenario.stations])
+            ways = stations - state.positions[:, :, None]
+            nearest = np.linalg.norm(ways, axis=-1).argmin(-1)
+            way = np.take_along_axis(ways, nearest[..., None, None], 2)[:, :, 0]
+            blocks.append(np.where(dark, 0.0, way))
         if robots > 1:
             relative = (motion[:, self.others] - motion[:, :, None]) * there[:, self.others]
             teammates = np.concatenate([relative, known[:, self.others]], axis=-1)

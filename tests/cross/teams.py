@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from innerattn.config import Arrival, Obstacle, Robot, Scenario, Task
+from innerattn.config import Arrival, Battery, Obstacle, Robot, Scenario, Station, Task
 
 SIZES = (1, 2, 3, 4, 4, 5, 8, 12, 20, 64)
 
@@ -149,3 +149,30 @@ def with_order(scenario: Scenario, rng: np.random.Generator) -> Scenario:
         after = tuple(tasks[other].name for other in order[:place] if rng.random() < 0.6)
         tasks[index] = tasks[index].replace(after=after)
     return scenario.replace(tasks=tuple(tasks))
+
+
+def with_batteries(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, where most robots have a battery, and there are up to three stations."""
+    robots = [
+        robot.replace(
+            battery=Battery(
+                capacity_j=float(rng.uniform(2.0, 8.0)),
+                per_m_j=float(rng.uniform(0.0, 2.0)),
+                idle_w=float(rng.uniform(0.5, 2.0)),
+            )
+        )
+        if index == 0 or rng.random() < 0.7
+        else robot
+        for index, robot in enumerate(scenario.robots)
+    ]
+    reach = scenario.arena_half_width_m - max(robot.radius_m for robot in robots)
+    stations = [
+        Station(
+            position_m=tuple(rng.uniform(-reach, reach, 2).tolist()),
+            radius_m=float(rng.uniform(0.3, 1.0)),
+            recharge_w=float(rng.uniform(1.0, 20.0)),
+        )
+        for _ in range(rng.integers(1, 4))
+    ]
+    fixed = [one for one in scenario.obstacles if one.position_m is None]
+    return scenario.replace(robots=tuple(robots), stations=tuple(stations), obstacles=tuple(fixed))

@@ -8,7 +8,8 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from innerattn import _core
-from innerattn.config import Arrival, Fault, Obstacle, Robot, Scenario, Task
+from innerattn.config import Arrival, Battery, Fault, Obstacle, Robot, Scenario, Station, Task
+from innerattn.config.model import Told
 from innerattn.envs.batch import FAULT_KINDS
 
 ROBOT = {"name": "one", "kind": "any", "abilities": [], "max_speed_mps": 1.0, "mass_kg": 1.0}
@@ -16,6 +17,8 @@ OBSTACLE = {"shape": "disc", "radius_m": 0.1}
 TASK = {"name": "task", "needs": ["food"]}
 FAULT = {"robot": "food_0", "kind": "motor_gain", "value": 0.5}
 ARRIVAL = {"at_s": 1.5, "task": "task_1", "position_m": [0.25, -0.5]}
+STATION = {"position_m": [0.25, -0.5], "recharge_w": 5.0}
+BATTERY = {"capacity_j": 10.0, "per_m_j": 2.0}
 TEAM = Scenario().model_dump(mode="json")["robots"]
 NESTED = {
     "robots": (Robot, ROBOT),
@@ -23,6 +26,7 @@ NESTED = {
     "obstacles": (Obstacle, OBSTACLE),
     "faults": (Fault, FAULT),
     "arrivals": (Arrival, ARRIVAL),
+    "stations": (Station, STATION),
 }
 CHOICES = [
     (name, get_args(field.annotation))
@@ -38,6 +42,8 @@ def compiled(table: dict) -> dict:
 def within(key: str, item: dict) -> dict:
     """A scenario with `item` in the list `key`; the default team stays so that tasks are served."""
     listed = {"situation": "listed"} if key == "arrivals" else {}
+    if key == "stations":
+        listed = {"robots": [{**TEAM[0], "battery": BATTERY}, *TEAM[1:]]}
     return {key: [*TEAM, item] if key == "robots" else [item], **listed}
 
 
@@ -153,6 +159,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         "robots": [
             *TEAM[1:],
             {**TEAM[0], "radius_m": 0.04, "drive_force_n": 3.5, "start_m": [0.25, -0.5]},
+            {**TEAM[0], "name": "last", "battery": {**BATTERY, "idle_w": 0.25}},
         ],
         "tasks": [
             {
@@ -167,6 +174,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         ],
         "max_victims": 7,
         "obstacles": [{"shape": "box", "half_extents_m": [0.1, 0.2], "position_m": [0.3, 0.4]}],
+        "stations": [{**STATION, "radius_m": 0.25}],
         "arena_half_width_m": 2.0,
         "rescue_radius_m": 0.25,
         "spawn_clearance_m": 0.125,
@@ -217,3 +225,22 @@ def test_models_are_all_mirrored() -> None:
         if isinstance(argument, type) and issubclass(argument, BaseModel)
     }
     assert inner == {model for model, _ in NESTED.values()}
+
+
+@pytest.mark.parametrize(
+    ("model", "name"),
+    [
+        (model, name)
+        for model in (Battery, Station)
+        for name, field in model.model_fields.items()
+        if field.metadata
+    ],
+)
+def test_batteries_and_stations_are_in_their_told_ranges(model: type[BaseModel], name: str) -> None:
+    (told,) = (one for one in model.model_fields[name].metadata if isinstance(one, Told))
+    for value in (0.9 * told.low if told.low else -0.1, 1.1 * told.high):
+        battery = BATTERY | ({name: value} if model is Battery else {})
+        station = STATION | ({name: value} if model is Station else {})
+        team = [{**TEAM[0], "battery": battery}, *TEAM[1:]]
+        with pytest.raises(ValueError, match=rf"{name} = .*: must be in \S+\.\.=\S+"):
+            compiled({"robots": team, "stations": [station]})

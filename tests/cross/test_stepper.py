@@ -10,6 +10,7 @@ from teams import (
     random_scenario,
     with_amounts,
     with_arrivals,
+    with_batteries,
     with_list,
     with_order,
     with_times,
@@ -34,6 +35,7 @@ def state_of(env: BatchEnv) -> State:
         env.victims(),
         env.fault_state(),
         env.step_counts(),
+        env.charge().astype(np.float64),
     )
 
 
@@ -179,7 +181,12 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         assert_close(after.positions[free], positions[free], "positions")
         assert_close(after.velocities[free], velocities[free], "velocities", scale=3.0)
 
-        met, unsure = plain.met(before, after.positions)
+        charge, unsure_charge = plain.charged(before, after.positions)
+        assert_close(after.charge[~unsure_charge], charge[~unsure_charge], "charges")
+        seen["charged"] += int((after.charge > before.charge).sum())
+        seen["ran empty"] += int(((after.charge == 0) & (before.charge > 0)).sum())
+        met, unsure = plain.met(before, after.positions, charge)
+        unsure |= unsure_charge
         expected, lost, served = plain.settle(before, met)
         found = [
             (int(row["env"]), int(row["slot"]), *(h for h in row.tolist()[6:] if h >= 0))
@@ -344,6 +351,19 @@ def test_worlds_in_which_victims_arrive_are_as_the_plain_stepper_says(chunk: int
 
     total = compare_some(rng, changed)
     for what in ("rescues", "appeared", "turned away", "lost"):
+        assert total[what] > 50, (what, total)
+
+
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_with_batteries_are_as_the_plain_stepper_says(chunk: int) -> None:
+    rng = np.random.default_rng(600 + chunk)
+
+    def changed(scenario: Scenario) -> Scenario:
+        scenario = with_batteries(scenario, rng)
+        return with_times(scenario, rng) if rng.random() < 0.3 else scenario
+
+    total = compare_some(rng, changed)
+    for what in ("rescues", "appeared", "charged", "ran empty"):
         assert total[what] > 50, (what, total)
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from innerattn.config import Arrival, Scenario
+from innerattn.config import Arrival, Battery, Scenario, Station
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.errors import ConfigError
 from innerattn.report.scenario_words import _WHAT, scenario_words
@@ -57,6 +57,30 @@ def test_robots_that_leave_have_words() -> None:
         "food_0: is out in 100 % of the steps from step 9 on",
         "Robots that are out are not in the arena.",
     ]
+
+
+def test_batteries_have_words() -> None:
+    first, *others = Scenario().robots
+    made = Scenario.model_validate(
+        {
+            "robots": [
+                first.replace(battery=Battery(capacity_j=6.0, per_m_j=2.0, idle_w=2.0)),
+                others[0].replace(battery=Battery(capacity_j=1.0, per_m_j=2.0)),
+                *others[1:],
+            ],
+            "stations": [Station(position_m=(0.0, 0.0), recharge_w=2.0)],
+        }
+    )
+    lines = scenario_words(made).splitlines()
+    assert lines[2:] == [
+        "food_0: drives 1.5 m with a full battery",
+        "food_1: drives 0.5 m with a full battery",
+        "food_1: its battery hardly lasts; the arena is 2 m wide",
+    ]
+    both = made.replace(robots=(made.robots[0], *others))
+    assert scenario_words(both).splitlines()[-1] == (
+        "stations[0]: gives no more than the 2 W that robots there use"
+    )
 
 
 def test_what_is_doubtful() -> None:

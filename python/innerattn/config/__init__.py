@@ -10,6 +10,7 @@ from innerattn.lazy import lazy_names
 
 if TYPE_CHECKING:
     from innerattn.config.algorithm import Algorithm, AlgorithmConfig
+    from innerattn.config.battery import Battery, Station
     from innerattn.config.load import load_run_config, read_toml, write_toml
     from innerattn.config.ppo import PPOConfig
     from innerattn.config.registry import register_algorithm, register_attention
@@ -30,6 +31,7 @@ __all__ = [
     "Algorithm",
     "AlgorithmConfig",
     "Arrival",
+    "Battery",
     "EvaluateConfig",
     "Fault",
     "ImitationConfig",
@@ -39,6 +41,7 @@ __all__ = [
     "Robot",
     "RunConfig",
     "Scenario",
+    "Station",
     "TDConfig",
     "Task",
     "TrainConfig",
@@ -57,6 +60,7 @@ __getattr__ = lazy_names(
         "AlgorithmConfig": "algorithm",
         "Arrival": "task",
         "BUDGETS": "run",
+        "Battery": "battery",
         "EvaluateConfig": "sections",
         "Fault": "scenario",
         "ImitationConfig": "sections",
@@ -67,6 +71,7 @@ __getattr__ = lazy_names(
         "RunConfig": "run",
         "SCENARIOS": "scenario",
         "Scenario": "scenario",
+        "Station": "battery",
         "TDConfig": "td",
         "Task": "task",
         "TrainConfig": "sections",

@@ -15,6 +15,7 @@ from pydantic import Field, PrivateAttr, ValidationError, field_validator
 
 from innerattn import _core
 from innerattn.config.amounts import Amounts, list_or_table
+from innerattn.config.battery import Battery, Station
 from innerattn.config.files import preset_names, preset_table, toml_table
 from innerattn.config.model import ADDED_LATER, Model, Told, config_error
 from innerattn.config.near import did_you_mean
@@ -50,6 +51,11 @@ class Robot(Model):
         None,
         description="place when an episode starts, inside the walls [m]; "
         "None: a new random place each episode",
+    )
+    battery: Annotated[Battery | None, ADDED_LATER] = Field(
+        None,
+        description="its battery, such as { capacity_j = 100.0, per_m_j = 20.0, idle_w = 1.0 }; "
+        "None: it needs no energy",
     )
 
     _check_abilities = field_validator("abilities", mode="before")(list_or_table)
@@ -188,6 +194,9 @@ class Scenario(Model, Shown):
     )
     obstacles: Annotated[tuple[Obstacle, ...], Told(0, 64)] = Field(
         (), description="fixed bodies in the way"
+    )
+    stations: Annotated[tuple[Station, ...], ADDED_LATER, Told(0, 64)] = Field(
+        (), description="places that charge batteries"
     )
     arena_half_width_m: Annotated[float, Told(0.2, 100.0)] = Field(
         1.0, description="half the side of the square arena [m]"
@@ -359,6 +368,11 @@ class Scenario(Model, Shown):
     def has_order(self) -> bool:
         """Whether some victims have to wait for others."""
         return any(task.after for task in self.tasks)
+
+    @property
+    def has_batteries(self) -> bool:
+        """Whether some robots have a battery."""
+        return any(robot.battery is not None for robot in self.robots)
 
     @property
     def robots_leave(self) -> bool:

@@ -182,6 +182,13 @@ class BatchEnv(Shown):
         """Velocities of the robots, (E, R, 2) float32, m/s, world frame."""
         return self._core.velocities()
 
+    def charge(self) -> NDArray[np.float32]:
+        """Charges of the robots, (E, R) float32, shares of their battery's capacity.
+
+        It is 1 for a robot without a battery. At 0 a robot neither drives nor helps.
+        """
+        return self._core.charge()
+
     def obstacles(self) -> NDArray[np.float32]:
         """Centres of the obstacles in scenario order, (E, O, 2) float32, m."""
         return self._core.obstacles()
@@ -231,7 +238,8 @@ class BatchEnv(Shown):
     def state(self) -> NDArray[np.float32]:
         """The whole of each world, (E, S) float32, world frame, for centralised critics.
 
-        Columns are `state_names`: for each robot x, y [m] and x, y velocity [m/s]; for each victim
+        Columns are `state_names`: for each robot x, y [m] and x, y velocity [m/s], and its charge
+        as a share where some robots have a battery; for each victim
         slot one column per task (1 where such a victim is present), x, y [m], and where the
         scenario has them the share of its service that it has had, the time that it has left as a
         share of the longest deadline, and 1 if it has to wait for others; for each obstacle x, y
@@ -244,6 +252,7 @@ class BatchEnv(Shown):
             self.obstacles(),
             self.step_counts(),
             self.scenario,
+            self.charge(),
         )
 
     def state_names(self) -> list[str]:

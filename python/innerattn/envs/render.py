@@ -108,6 +108,10 @@ def _paint_arena(axes: Axes, scenario: Scenario, obstacles: NDArray[np.float32])
 
     half = scenario.arena_half_width_m
     axes.add_patch(Rectangle((-half, -half), 2 * half, 2 * half, fill=False, linewidth=2.5))
+    for station in scenario.stations:
+        (x, y), size = station.position_m, station.radius_m
+        square = Rectangle((x - size, y - size), 2 * size, 2 * size, facecolor="#d9ead3", zorder=0)
+        axes.add_patch(square)
     style: dict[str, Any] = {"facecolor": "#999999", "edgecolor": "#444444", "zorder": 1}
     for shape, (x, y) in zip(scenario.obstacles, obstacles.tolist(), strict=True):
         if shape.shape == "disc":

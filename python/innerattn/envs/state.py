@@ -14,10 +14,12 @@ from innerattn.envs.aligned import aligned_empty
 def state_names(scenario: Scenario) -> list[str]:
     """Names of the S columns of `world_states`; units are m and m/s, shares have none."""
     robots = [
-        f"{robot.name}.{quantity}.{axis}"
+        f"{robot.name}.{quantity}"
         for robot in scenario.robots
-        for quantity in ("position", "velocity")
-        for axis in ("x", "y")
+        for quantity in (
+            *("position.x", "position.y", "velocity.x", "velocity.y"),
+            *["charge"] * scenario.has_batteries,
+        )
     ]
     columns = [*(f"task.{task.name}" for task in scenario.tasks), "position.x", "position.y"]
     columns += ["served"] * scenario.has_services + ["time_left"] * scenario.has_deadlines
@@ -40,6 +42,7 @@ def world_states(
     obstacles: NDArray[np.float32],
     step_counts: NDArray[np.int64],
     scenario: Scenario,
+    charge: NDArray[np.float32],
 ) -> NDArray[np.float32]:
     """The states of E worlds.
 
@@ -50,6 +53,7 @@ def world_states(
         obstacles: (E, O, 2) obstacles' centres [m].
         step_counts: (E,) steps done in the episodes.
         scenario: the worlds' description.
+        charge: (E, R) charges of the robots, shares.
 
     Returns:
         (E, S) float32, columns `state_names`.
@@ -65,8 +69,9 @@ def world_states(
         times.append((left * present)[..., None])
     if scenario.has_order:
         times.append(victims["blocked"][..., None])
+    charges = [charge[..., None]] * scenario.has_batteries
     parts = [
-        np.concatenate([positions, velocities], axis=2),
+        np.concatenate([positions, velocities, *charges], axis=2),
         np.concatenate([is_task & present[..., None], places, *times], axis=2),
         obstacles,
     ]

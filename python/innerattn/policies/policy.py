@@ -20,6 +20,7 @@ class WorldState(NamedTuple):
         victims: (E, V) structured, the fields of `BatchEnv.victims`.
         faults: (E, R) structured, the fields of `BatchEnv.fault_state`.
         step_counts: (E,) int64 steps done in the episodes; deadlines are counted in them.
+        charge: (E, R) float32 charges as shares; None where no robot has a battery.
     """
 
     positions: NDArray[np.float32]
@@ -27,12 +28,18 @@ class WorldState(NamedTuple):
     victims: NDArray[np.void]
     faults: NDArray[np.void]
     step_counts: NDArray[np.int64]
+    charge: NDArray[np.float32] | None = None
 
     @classmethod
     def of(cls, env: BatchEnv) -> Self:
         """The present state of the worlds of ``env``."""
         return cls(
-            env.positions(), env.velocities(), env.victims(), env.fault_state(), env.step_counts()
+            env.positions(),
+            env.velocities(),
+            env.victims(),
+            env.fault_state(),
+            env.step_counts(),
+            env.charge() if env.scenario.has_batteries else None,
         )
 
 

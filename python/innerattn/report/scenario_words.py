@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from innerattn.config import Fault, Scenario, Task
+from innerattn.config import Fault, Robot, Scenario, Task
 from innerattn.report.reachability import closed_off
 
 _WHAT = {
@@ -22,10 +22,10 @@ _WHAT = {
 
 
 def scenario_words(scenario: Scenario) -> str:
-    """Sentences, a line each: tasks and who can do them, what is doubtful, and the faults."""
+    """Sentences, a line each: tasks and who can do them, batteries, doubts, and the faults."""
     faults = map(_fault, scenario.faults)
     gone = ["Robots that are out are not in the arena."] if scenario.robots_leave else []
-    return "\n".join([*_tasks(scenario), *_doubts(scenario), *faults, *gone])
+    return "\n".join([*_tasks(scenario), *_batteries(scenario), *_doubts(scenario), *faults, *gone])
 
 
 def _tasks(scenario: Scenario) -> Iterator[str]:
@@ -63,6 +63,21 @@ def _times(task: Task) -> str:
     return words
 
 
+def _batteries(scenario: Scenario) -> Iterator[str]:
+    for robot in scenario.robots:
+        if robot.battery is not None:
+            yield f"{robot.name}: drives {_reach_m(robot):.3g} m with a full battery"
+
+
+def _reach_m(robot: Robot) -> float:
+    """How far a robot drives at its highest speed with a full battery [m]."""
+    if robot.battery is None:
+        return math.inf
+    return robot.battery.capacity_j / (
+        robot.battery.per_m_j + robot.battery.idle_w / robot.max_speed_mps
+    )
+
+
 def _doubts(scenario: Scenario) -> Iterator[str]:
     needed = {need for task in scenario.tasks for need in task.needs}
     for robot in scenario.robots:
@@ -70,6 +85,15 @@ def _doubts(scenario: Scenario) -> Iterator[str]:
             yield f"{robot.name}: has no ability that a task needs"
         if robot.drive_force_n == 0.0:
             yield f"{robot.name}: cannot move, its drive_force_n is 0"
+        if _reach_m(robot) < scenario.arena_half_width_m:
+            yield (
+                f"{robot.name}: its battery hardly lasts; the arena is "
+                f"{2.0 * scenario.arena_half_width_m:g} m wide"
+            )
+    idle = [robot.battery.idle_w for robot in scenario.robots if robot.battery is not None]
+    for index, station in enumerate(scenario.stations):
+        if station.recharge_w <= min(idle):
+            yield f"stations[{index}]: gives no more than the {min(idle):g} W that robots there use"
     for task in scenario.tasks:
         radii = sorted(
             robot.radius_m for robot in scenario.robots if set(task.needs) & set(robot.abilities)

@@ -37,6 +37,9 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
             {"name": name, "unit": unit, "healthy": healthy, "least": least, "most": most}
             for name, unit, least, most, healthy, _ in _core.FAULT_KINDS
         ],
+        "stations": [
+            {"position_m": one.position_m, "radius_m": one.radius_m} for one in scenario.stations
+        ],
         "obstacles": [
             {"radius_m": one.radius_m, "half_extents_m": one.half_extents_m}
             for one in scenario.obstacles

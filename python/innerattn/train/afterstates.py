@@ -29,4 +29,5 @@ def afterstates(
     victims["present"] &= ~new[worlds]
     moving = env.positions()[worlds], env.velocities()[worlds]
     others = env.obstacles()[worlds], env.step_counts()[worlds]
-    return worlds, world_states(*moving, victims, *others, env.scenario)
+    charge = env.charge()[worlds]
+    return worlds, world_states(*moving, victims, *others, env.scenario, charge)

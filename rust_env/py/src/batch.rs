@@ -11,7 +11,7 @@ use innerattn_env::scenario::Actions;
 use innerattn_env::snapshot::most_bytes;
 use innerattn_env::tasks::Rescue;
 use innerattn_env::world::World;
-use numpy::{IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray3, PyArrayMethods};
+use numpy::{IntoPyArray, Ix1, Ix2, Ix3, PyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -175,6 +175,17 @@ impl Batch {
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let robots = self.worlds.rules().team.len();
         self.vectors(py, robots, |world| &world.positions)
+    }
+
+    fn charge<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let (rules, envs) = (self.worlds.rules(), self.worlds.num_envs());
+        let robots = rules.team.len();
+        let of = |world: &'_ World| {
+            let share = |robot| rules.energy.as_ref().map_or(1.0, |one| one.share(robot, &world.charges));
+            (0..robots).map(share).collect::<Vec<_>>()
+        };
+        let shares = gather(envs * robots, self.worlds.worlds().flat_map(of))?;
+        shares.into_pyarray(py).reshape([envs, robots])
     }
 
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {

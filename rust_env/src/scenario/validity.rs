@@ -24,7 +24,8 @@ impl Scenario {
         self.validate_sizes()?;
         self.validate_starts()?;
         self.validate_victim_places()?;
-        self.validate_arrivals()
+        self.validate_arrivals()?;
+        self.validate_batteries()
     }
 
     fn validate_numbers(&self) -> Result<()> {

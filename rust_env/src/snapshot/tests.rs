@@ -108,7 +108,18 @@ fn an_image_from_before_a_key_was_added_is_taken() {
     let older = older.replace(times, "").replace(r#","lost_cost":0.0"#, "");
     let keys = r#","after":[],"arrival_rate_hz":0.0"#;
     let older = older.replace(keys, "").replace(r#","arrivals":[]"#, "");
-    for key in ["arriv", "after", "victim_places_m", "start_m", "service_s", "deadline_s", "lost_cost"] {
+    let older = older.replace(r#","battery":null"#, "").replace(r#","stations":[]"#, "");
+    for key in [
+        "battery",
+        "stations",
+        "arriv",
+        "after",
+        "victim_places_m",
+        "start_m",
+        "service_s",
+        "deadline_s",
+        "lost_cost",
+    ] {
         assert!(!older.contains(key));
     }
     assert_eq!(text(&older), Ok(worlds.to_vec()));

@@ -9,8 +9,8 @@ use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
-    Abilities, Actions, Arrival, Deadline, Engine, Interrupted, Obstacle, Robot, Scenario, Shape, Situation,
-    Unavailable,
+    Abilities, Actions, Arrival, Battery, Deadline, Engine, Interrupted, Obstacle, Robot, Scenario, Shape,
+    Situation, Station, Unavailable,
 };
 use innerattn_env::tasks::{Loss, Rescue};
 
@@ -215,6 +215,15 @@ pub fn with_leaving(scenario: Scenario) -> Scenario {
     };
     let faults = scenario.robots.iter().map(leaves).collect();
     Scenario { faults, unavailable_robots: Unavailable::Leave, ..scenario }
+}
+
+/// The same with batteries that last for about a second, and two stations; one robot has no battery.
+pub fn with_batteries(mut scenario: Scenario) -> Scenario {
+    for robot in &mut scenario.robots[1..] {
+        robot.battery = Some(Battery { capacity_j: 3.0, per_m_j: 2.0, idle_w: 1.0 });
+    }
+    let station = |x: f64, recharge_w| Station { position_m: [x, -0.2], radius_m: 0.2, recharge_w };
+    Scenario { stations: vec![station(-0.3, 20.0), station(0.3, 4.0)], rescue_radius_m: 0.4, ..scenario }
 }
 
 /// A disc at a random place, a box at a random place, and a box that stays.

@@ -79,6 +79,7 @@ fn extreme(source: &mut Stream) -> Scenario {
             radius_m: scaled(source, small, large),
             drive_force_n: scaled(source, 0.001, 1e5),
             start_m: None,
+            battery: None,
         })
         .collect();
     if engine == Engine::Rapier {

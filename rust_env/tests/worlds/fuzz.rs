@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
-    with_amounts, with_arrivals, with_leaving, with_list, with_order, with_times,
+    with_amounts, with_arrivals, with_batteries, with_leaving, with_list, with_order, with_times,
 };
 
 const ENVS: usize = 2;
@@ -56,6 +56,7 @@ fn scenarios() -> Vec<Scenario> {
             with_arrivals(Scenario { engine, ..tight.clone() }),
             with_list(Scenario { engine, ..tight.clone() }),
             with_leaving(Scenario { engine, ..tight.clone() }),
+            with_batteries(Scenario { engine, ..tight.clone() }),
         ]
     };
     ENGINES.into_iter().flat_map(with).collect()

@@ -4,6 +4,7 @@
 mod common;
 
 mod arrivals;
+mod batteries;
 mod contacts;
 mod containment;
 mod determinism;

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use crate::common::{
     Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_amounts,
-    with_arrivals, with_leaving, with_list, with_order, with_times,
+    with_arrivals, with_batteries, with_leaving, with_list, with_order, with_times,
 };
 
 const ENVS: usize = 6;
@@ -31,6 +31,8 @@ fn scenarios() -> Vec<Scenario> {
         with_arrivals(tight.clone()),
         with_list(tight.clone()),
         with_leaving(tight.clone()),
+        with_batteries(with_leaving(tight.clone())),
+        with_batteries(tight.clone()),
         with_times(tight),
     ]
 }

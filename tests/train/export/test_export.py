@@ -14,8 +14,9 @@ import torch
 from fresh_run import make_run, run_config
 from made_export import FRAMED, made_export
 
+from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
-from innerattn.errors import ExportError, RunError
+from innerattn.errors import ConfigError, ExportError, RunError
 from innerattn.policies import Exported, PolicyInput
 from innerattn.records.run_files import RunFiles
 from innerattn.train import load_policy
@@ -222,4 +223,15 @@ def test_a_run_without_weights_is_refused(tmp_path: Path) -> None:
     RunFolder.create(tmp_path / "run", run_config("td-inner"), threads=1)
     with pytest.raises(RunError, match="holds no checkpoint yet"):
         export_run(tmp_path / "run", tmp_path / "export")
+    assert not (tmp_path / "export").exists()
+
+
+def test_a_team_with_batteries_is_trained_and_not_exported(tmp_path: Path) -> None:
+    robots = [robot.model_dump() for robot in Scenario().robots]
+    robots[1]["battery"] = {"capacity_j": 10.0, "per_m_j": 2.0}
+    stations = [{"position_m": [0.5, 0.0], "recharge_w": 20.0}]
+    values = {"scenario.robots": robots, "scenario.stations": stations}
+    run = make_run(tmp_path / "run", run_config("ppo-inner", **FRAMED, **values))
+    with pytest.raises(ConfigError, match=r"robots\[1\].battery.capacity_j = 10: there must be no"):
+        export_run(run, tmp_path / "export")
     assert not (tmp_path / "export").exists()

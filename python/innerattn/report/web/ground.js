@@ -30,6 +30,11 @@ function drawGround(scene) {
     context.lineTo(left + side, y);
   }
   context.stroke();
+  context.strokeStyle = paint.quiet;
+  for (const { position_m: [x, y], radius_m: size } of worlds.stations ?? []) {
+    const [atX, atY] = scene.at(x - size, y + size);
+    context.strokeRect(atX, atY, 2 * size * scale, 2 * size * scale);
+  }
   worlds.obstacles.forEach((shape, index) => drawObstacle(scene, shape, index));
   context.strokeStyle = paint.wall;
   context.lineWidth = 3;

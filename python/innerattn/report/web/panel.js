@@ -116,6 +116,9 @@ function fillLegend(list, worlds) {
     const arc = svg("path", { d: "M0 -8a8 8 0 1 1 -8 8", fill: "none", stroke: "var(--victim)", "stroke-width": 4 });
     row(symbol(arc), "thick arc around a victim: the share of its service that it has had");
   }
+  if ((worlds.stations ?? []).length) {
+    row(symbol(svg("rect", { x: -7, y: -7, width: 14, height: 14, fill: "none", stroke: "var(--quiet)" })), "square: a station that charges batteries");
+  }
   if (worlds.has_deadlines) {
     row(symbol(eventMark("lost", 0, 0)), "a victim is lost; seconds below a victim: until it is");
   }
