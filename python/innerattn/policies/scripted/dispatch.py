@@ -17,6 +17,7 @@ from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
 from innerattn.errors import ConfigError
 from innerattn.policies.policy import Policy, PolicyInput, WorldState
 from innerattn.policies.scripted.assignment import Needs, assign, can_be_rescued, pair_costs
+from innerattn.policies.scripted.charging import Charging
 from innerattn.policies.scripted.coalitions import Coalitions
 from innerattn.policies.scripted.steering import Steering
 from innerattn.policies.scripted.timing import Timing
@@ -64,14 +65,20 @@ class _Dispatcher(ABC):
         self.steering = Steering(scenario)
         self._timing = Timing(scenario)
         self._coalitions = Coalitions(scenario)
+        self._charging = Charging(scenario, self.steering)
 
     def act(self, view: PolicyInput) -> NDArray[Any]:
-        """See `Policy.act`; robots without a victim are drawn to the centre."""
+        """See `Policy.act`; robots without a victim are drawn to the centre.
+
+        Where there are stations, those of them that are not full are drawn to the nearest one.
+        """
         state = view.known_state
         places = np.stack([state.victims["x"], state.victims["y"]], -1).astype(np.float64)
         chosen = self.choose(state, places)
         targets = np.take_along_axis(places, np.maximum(chosen, 0)[..., None], 1)
         targets = np.where(chosen[..., None] >= 0, targets, 0.0)
+        if self._charging.is_needed:
+            targets = self._charging.targets(state, targets, chosen)
         faults = self._faults(state)
         return self.steering.actions(state.positions, state.velocities, targets, faults)
 
@@ -95,6 +102,8 @@ class GreedyPolicy(_Dispatcher):
     def choose(self, state: WorldState, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """See `_Dispatcher.choose`."""
         permitted = self.needs.permitted(state.victims["present"], state.victims["task"])
+        if self._charging.is_needed:
+            permitted &= self._charging.within_reach(state, places)[..., None]
         helpful = permitted.any(-1)
         way = places[:, None] - state.positions[:, :, None]
         distance = np.where(helpful, (way * way).sum(-1), np.inf)
@@ -125,6 +134,8 @@ class HungarianPolicy(_Dispatcher):
         needed = np.asarray(permitted.any(1))
         if faults is not None:
             permitted &= (faults["unavailable"] < 1.0)[:, :, None, None]
+        if self._charging.is_needed:
+            permitted &= self._charging.within_reach(state, places)[..., None]
         times = self.steering.arrival_times(state.positions, state.velocities, places, faults)
         blocked = state.victims["blocked"] if self._timing.has_order else None
         if self._coalitions.is_needed:

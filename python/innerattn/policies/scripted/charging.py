@@ -1,0 +1,85 @@
+"""What batteries mean for who goes where."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.config import Scenario
+from innerattn.policies.policy import WorldState
+from innerattn.policies.scripted.steering import Array, Steering
+
+_SPARE = 1.1
+"""Robots reckon with so much more energy than a free way takes."""
+
+
+class Charging:
+    """The batteries and stations of one scenario.
+
+    Attributes:
+        is_needed: whether some robots have a battery; where not, everybody goes as ever.
+    """
+
+    def __init__(self, scenario: Scenario, steering: Steering) -> None:
+        """Take batteries and stations from ``scenario``."""
+        self.is_needed = scenario.has_batteries
+        batteries = [robot.battery for robot in scenario.robots]
+        self._capacity = np.array([one.capacity_j if one else np.inf for one in batteries])
+        per_m = np.array([one.per_m_j if one else 0.0 for one in batteries])
+        idle = np.array([one.idle_w if one else 0.0 for one in batteries])
+        speed = np.maximum(steering.speed, 1e-9)
+        self._per_m = _SPARE * (per_m + idle / speed)  # at full speed
+        self._start_j = _SPARE * idle * steering.lag
+        self._stations = np.array([one.position_m for one in scenario.stations]).reshape(-1, 2)
+        self._along_axes = scenario.actions == "discrete"
+
+    def within_reach(self, state: WorldState, places: Array) -> NDArray[np.bool_]:
+        """Which places robots can drive to and, from there, to the nearest station.
+
+        Where there is no station, the way to the place is all. An empty robot reaches nothing.
+
+        Args:
+            state: of the worlds, with their charges.
+            places: (E, V, 2) [m].
+
+        Returns:
+            (E, R, V) bool.
+        """
+        charge = self._charge_j(state)[..., None]
+        way = self._way(places[:, None] - state.positions[:, :, None].astype(np.float64))
+        starts = self._start_j[:, None]
+        if len(self._stations):
+            back = self._way(places[:, :, None] - self._stations).min(-1)
+            way, starts = way + back[:, None], 2.0 * starts
+        return np.asarray((self._per_m[:, None] * way + starts <= charge) & (charge > 0.0))
+
+    def targets(self, state: WorldState, targets: Array, chosen: NDArray[np.int64]) -> Array:
+        """Targets of all robots, where those without a victim that are not full go to charge.
+
+        Args:
+            state: of the worlds, with their charges.
+            targets: (E, R, 2) [m], where robots go otherwise.
+            chosen: (E, R) the victim slot that each robot goes to, -1 for none.
+        """
+        if not len(self._stations):
+            return targets
+        at = state.positions.astype(np.float64)
+        nearest = self._way(self._stations - at[:, :, None]).argmin(-1)
+        charges = (chosen < 0) & (self._charge_j(state) < self._capacity) & self._has_battery
+        return np.asarray(np.where(charges[..., None], self._stations[nearest], targets))
+
+    @property
+    def _has_battery(self) -> NDArray[np.bool_]:
+        return np.asarray(np.isfinite(self._capacity))
+
+    def _charge_j(self, state: WorldState) -> Array:
+        """Charges (E, R) [J]; infinite of robots without a battery."""
+        if state.charge is None:
+            raise ValueError("state.charge = None: must be given where robots have a battery")
+        return np.where(self._has_battery, state.charge * self._capacity, np.inf)
+
+    def _way(self, apart: Array) -> Array:
+        """Lengths of ways (..., 2) as robots drive them [m]: with discrete actions along axes."""
+        if self._along_axes:
+            return np.asarray(np.abs(apart).sum(-1))
+        return np.asarray(np.sqrt((apart * apart).sum(-1)))

@@ -1,0 +1,70 @@
+"""Scripts in worlds with batteries: robots come back to a station before they are empty."""
+
+import numpy as np
+import pytest
+
+from innerattn.config import Battery, Scenario, Station
+from innerattn.envs import BatchEnv
+from innerattn.policies import PolicyInput, WorldState, scripted_policy
+
+SCRIPTS = pytest.mark.parametrize("name", ["greedy", "hungarian", "oracle"])
+
+
+def powered(stations: int = 2, capacity_j: float = 12.0, **changed: object) -> Scenario:
+    battery = Battery(capacity_j=capacity_j, per_m_j=2.0, idle_w=1.0)
+    places = ((-0.6, -0.6), (0.6, 0.6))[:stations]
+    return Scenario().replace(
+        robots=tuple(robot.replace(battery=battery) for robot in Scenario().robots),
+        stations=tuple(Station(position_m=at, radius_m=0.35, recharge_w=20.0) for at in places),
+        **{"episode_steps": 300, "engine": "discs", **changed},
+    )
+
+
+def played(name: str, scenario: Scenario, worlds: int = 16) -> tuple[int, float]:
+    """Rescues in an episode of each world, and the share of steps that robots were empty."""
+    policy = scripted_policy(name, scenario)
+    env = BatchEnv(scenario, worlds, seed=1, num_threads=1, autoreset="disabled")
+    obs, rescues, empty = env.reset(), 0, []
+    for _ in range(scenario.episode_steps):
+        step = env.step(policy.act(PolicyInput(obs, WorldState.of(env))))
+        obs, rescues = step.obs, rescues + len(step.rescues)
+        empty.append((env.charge() == 0.0).mean())
+    return rescues, float(np.mean(empty))
+
+
+@SCRIPTS
+@pytest.mark.parametrize("actions", ["discrete", "continuous"])
+def test_robots_that_charge_go_on_with_rescues(name: str, actions: str) -> None:
+    rescues, empty = played(name, powered(actions=actions))
+    alone, empty_alone = played(name, powered(stations=0, actions=actions))
+    assert empty < 0.02
+    assert empty_alone > 0.3
+    assert rescues > 2 * alone
+
+
+@SCRIPTS
+def test_batteries_that_last_change_nothing(name: str) -> None:
+    lasting = powered(stations=0, capacity_j=1e6, episode_steps=50)
+    plain = lasting.replace(robots=Scenario().robots)
+    assert played(name, lasting) == (played(name, plain)[0], 0.0)
+
+
+@SCRIPTS
+def test_who_has_too_little_for_the_way_back_goes_to_charge(name: str) -> None:
+    scenario = powered(stations=1, capacity_j=20.0, situation="single")
+    env = BatchEnv(scenario, 1, seed=2, num_threads=1)
+    env.reset()
+    victims = env.victims()
+    victims["task"], victims["x"], victims["y"] = 0, 0.8, 0.8
+    env.set_victims(victims)
+    env.set_motion(np.zeros((1, 4, 2)) + np.arange(4)[:, None] * 0.11, np.zeros((1, 4, 2)))
+    policy = scripted_policy(name, scenario)
+    state = WorldState.of(env)
+    places = np.stack([state.victims["x"], state.victims["y"]], -1).astype(float)
+    for share, goes in ((1.0, True), (0.3, False), (0.0, False)):
+        now = state._replace(charge=np.full((1, 4), share, np.float32))
+        chosen = policy.choose(now, places)[0]
+        assert (chosen[[0, 1, 3]] >= 0).any() == goes
+        if not goes:  # towards the station: -x or -y
+            actions = policy.act(PolicyInput(env.observe(), now))[0]
+            assert np.isin(actions, [2, 4]).all()
