@@ -139,7 +139,7 @@ proptest! {
     fn the_caller_takes_robots_out_and_puts_them_back(seed in 0..10_000_u64, robot in 0..ROBOTS) {
         let scenario = Scenario { faults: vec![], ..scenario(Engine::Rapier) };
         let mut table = Table::new(scenario.clone(), options(1, seed));
-        let mut levels = vec![HEALTHY; ROBOTS];
+        let mut levels = [HEALTHY; ROBOTS];
         levels[robot][Kind::Unavailable as usize] = 1.0;
         table.batch.set_faults(levels.as_flattened(), None).expect("valid levels");
         let absent = |table: &Table| {
@@ -151,7 +151,7 @@ proptest! {
             table.step(&(0..ROBOTS).map(|_| random_drive(&mut chance)).collect::<Vec<_>>());
             prop_assert_eq!(absent(&table), 1 << robot);
         }
-        table.batch.set_faults(vec![HEALTHY; ROBOTS].as_flattened(), None).expect("valid levels");
+        table.batch.set_faults([HEALTHY; ROBOTS].as_flattened(), None).expect("valid levels");
         prop_assert_eq!(absent(&table), 0);
         let world = table.batch.worlds().next().expect("a world");
         let there = present(&scenario, world, 0);
