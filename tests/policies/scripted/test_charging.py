@@ -68,3 +68,18 @@ def test_who_has_too_little_for_the_way_back_goes_to_charge(name: str) -> None:
         if not goes:  # towards the station: -x or -y
             actions = policy.act(PolicyInput(env.observe(), now))[0]
             assert np.isin(actions, [2, 4]).all()
+
+
+@pytest.mark.parametrize("name", ["hungarian", "oracle"])
+def test_a_battery_for_one_farther_victim_at_a_time_is_enough(name: str) -> None:
+    medic, food = Scenario().robots[3], Scenario().robots[0]
+    scenario = Scenario().replace(
+        robots=(medic.replace(battery=Battery(capacity_j=80.0, per_m_j=10.0, idle_w=1.0)), food),
+        tasks=(Scenario().tasks[0].replace(needs=(food.abilities[0], medic.abilities[0])),),
+        stations=(Station(position_m=(-0.8, 0.0), recharge_w=20.0),),
+        episode_steps=300,
+    )
+    early, _ = played(name, scenario.replace(episode_steps=150))
+    whole, empty = played(name, scenario)
+    assert empty == 0.0
+    assert whole > 1.6 * early, "the team does not come to a standstill"

@@ -12,6 +12,9 @@ from innerattn.policies.scripted.steering import Array, Steering
 _SPARE = 1.1
 """Robots reckon with so much more energy than a free way takes."""
 
+_NEARLY_FULL = 0.95
+"""Share of its capacity at which a robot leaves a station."""
+
 
 class Charging:
     """The batteries and stations of one scenario.
@@ -30,13 +33,18 @@ class Charging:
         speed = np.maximum(steering.speed, 1e-9)
         self._per_m = _SPARE * (per_m + idle / speed)  # at full speed
         self._start_j = _SPARE * idle * steering.lag
+        self._idle_w = idle
+        self._radii = np.array([one.radius_m for one in scenario.stations])
+        self._recharge_w = np.array([one.recharge_w for one in scenario.stations])
         self._stations = np.array([one.position_m for one in scenario.stations]).reshape(-1, 2)
         self._along_axes = scenario.actions == "discrete"
 
     def within_reach(self, state: WorldState, places: Array) -> NDArray[np.bool_]:
         """Which places robots can drive to and, from there, to the nearest station.
 
-        Where there is no station, the way to the place is all. An empty robot reaches nothing.
+        Where there is no station, the way to the place is all. An empty robot reaches nothing, nor
+        does one at a station until it is nearly full: who leaves with just enough for the nearest
+        victim never comes to a farther one.
 
         Args:
             state: of the worlds, with their charges.
@@ -51,7 +59,20 @@ class Charging:
         if len(self._stations):
             back = self._way(places[:, :, None] - self._stations).min(-1)
             way, starts = way + back[:, None], 2.0 * starts
-        return np.asarray((self._per_m[:, None] * way + starts <= charge) & (charge > 0.0))
+        free = ~self._is_charging(state)[..., None]
+        return np.asarray((self._per_m[:, None] * way + starts <= charge) & (charge > 0.0) & free)
+
+    def ever_within_reach(self, state: WorldState, places: Array) -> NDArray[np.bool_]:
+        """Which places are within reach now, or of a full battery at the station nearest to them.
+
+        Arguments and shape as of `within_reach`.
+        """
+        reached = self.within_reach(state, places)
+        if not len(self._stations):
+            return reached
+        way = 2.0 * self._way(places[:, :, None] - self._stations).min(-1)
+        needed = self._per_m[:, None] * way[:, None] + 2.0 * self._start_j[:, None]
+        return np.asarray(reached | (needed <= self._capacity[:, None]))
 
     def targets(self, state: WorldState, targets: Array, chosen: NDArray[np.int64]) -> Array:
         """Targets of all robots, where those without a victim that are not full go to charge.
@@ -67,6 +88,15 @@ class Charging:
         nearest = self._way(self._stations - at[:, :, None]).argmin(-1)
         charges = (chosen < 0) & (self._charge_j(state) < self._capacity) & self._has_battery
         return np.asarray(np.where(charges[..., None], self._stations[nearest], targets))
+
+    def _is_charging(self, state: WorldState) -> NDArray[np.bool_]:
+        """Which robots are at a station that has more to give them (E, R)."""
+        if not len(self._stations):
+            return np.zeros(state.positions.shape[:2], np.bool_)
+        apart = self._stations - state.positions[:, :, None].astype(np.float64)
+        near = (apart * apart).sum(-1) <= self._radii * self._radii
+        gains = (near & (self._recharge_w > self._idle_w[:, None])).any(-1)
+        return np.asarray(gains & (self._charge_j(state) < _NEARLY_FULL * self._capacity))
 
     @property
     def _has_battery(self) -> NDArray[np.bool_]:
