@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fresh_run import config_of_team, make_run, run_config
 
-from innerattn.config import Scenario
+from innerattn.config import Battery, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.evaluate.interactive import InteractiveWorld, endless
 from innerattn.evaluate.moment import Handoff
@@ -197,3 +197,16 @@ def test_an_endless_world_ends_at_last_and_goes_on() -> None:
         found.step()
     assert (found.moment().episode, found.moment().step) == (1, 1)
     assert endless(scenario.replace(end_when_rescued=1)).end_when_rescued is None
+
+
+def test_charges_are_told_where_robots_have_a_battery() -> None:
+    plain = Scenario.preset("mixed")
+    battery = Battery(capacity_j=5.0, per_m_j=0.0, idle_w=2.0)
+    powered = plain.replace(robots=(plain.robots[0].replace(battery=battery), *plain.robots[1:]))
+    found = world(powered)
+    for _ in range(5):
+        found.step()
+    charge = found.moment().charge
+    assert charge is not None
+    assert charge.tolist() == pytest.approx([0.8, 1.0, 1.0, 1.0])
+    assert world(plain).moment().charge is None

@@ -20,7 +20,7 @@ SCENARIO = Scenario.preset("mixed")
 @pytest.fixture(scope="module")
 def record() -> Record:
     policy = scripted_policy("greedy", SCENARIO)
-    return run_episodes(policy, SCENARIO, 60, 4, record=needed_fields())
+    return run_episodes(policy, SCENARIO, 60, 4, record=needed_fields(SCENARIO))
 
 
 def split(record: Record, at: int) -> tuple[Record, Record]:
@@ -118,7 +118,7 @@ def test_a_measure_that_is_registered_is_computed(
 ) -> None:
     mine = Measure("steps", "", "length of all episodes", lambda r: int(r.lengths.sum()), ("obs",))
     assert register(mine) is registry["steps"] is mine
-    assert "obs" in needed_fields()
+    assert "obs" in needed_fields(SCENARIO)
     assert measures_of(record)["steps"] is None  # observations were not recorded
     with pytest.raises(ValueError, match="'steps': is registered already"):
         register(mine)

@@ -78,6 +78,7 @@ class InteractiveWorld:
             velocities=env.velocities()[0],
             victims=env.victims()[0],
             faults=env.fault_state()[0],
+            charge=env.charge()[0] if env.scenario.has_batteries else None,
             obstacles=env.obstacles()[0],
             blocked=self._blocked,
             attention=self._attention,

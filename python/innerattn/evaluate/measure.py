@@ -123,7 +123,7 @@ def evaluate_policy(
     for name in names:
         chosen = policy if name == policy.name else scripted_policy(name, scenario, settings.seed)
         if chosen is not policy:
-            standard[name] = [run(chosen, scenario, scored, 0, needed_fields())]
+            standard[name] = [run(chosen, scenario, scored, 0, needed_fields(scenario))]
         long[name] = [run(chosen, long_worlds, settings.long_episodes, 0, ())]
     summary = summarise(label or policy.name, recorded, standard, long, warm_start)
     parts = [record for group in (standard, long) for all_ in group.values() for record in all_]

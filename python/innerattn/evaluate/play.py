@@ -108,7 +108,8 @@ def _run_batch(
         view = PolicyInput(obs, state if policy.needs_true_state else None)
         actions = policy.act(view)
         seen: dict[str, NDArray[Any]] = {"obs": obs, "actions": actions}
-        seen |= {} if state is None else state._asdict()
+        known = {} if state is None else state._asdict()
+        seen |= {name: values for name, values in known.items() if values is not None}
         if "attention" in record and isinstance(policy, Attentive):
             weights = policy.attention(view, actions)
             seen |= {} if weights is None else {"attention": weights}

@@ -8,7 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import takewhile
 
-from innerattn.measures import arrivals, deadlines, dispatch_quality, helpers, rescues, waiting
+from innerattn.config import Scenario
+from innerattn.measures import (
+    arrivals,
+    deadlines,
+    dispatch_quality,
+    energy,
+    helpers,
+    rescues,
+    waiting,
+)
 from innerattn.measures.measure import Measure, Value
 from innerattn.measures.sharing import imbalance
 from innerattn.records.record import Record, joined
@@ -24,6 +33,7 @@ _BUILT_IN = (
     *deadlines.MEASURES,
     *arrivals.MEASURES,
     *helpers.MEASURES,
+    *energy.MEASURES,
 )
 
 
@@ -39,9 +49,10 @@ def register(measure: Measure) -> Measure:
     return measure
 
 
-def needed_fields() -> tuple[str, ...]:
-    """What must be recorded step by step so that every measure can be computed."""
-    return tuple(dict.fromkeys(name for measure in MEASURES.values() for name in measure.needs))
+def needed_fields(scenario: Scenario) -> tuple[str, ...]:
+    """What must be recorded step by step so that every measure of a scenario can be computed."""
+    measures = (measure for measure in MEASURES.values() if measure.applies(scenario))
+    return tuple(dict.fromkeys(name for measure in measures for name in measure.needs))
 
 
 def measures_of(*parts: Record) -> dict[str, Value]:
@@ -62,12 +73,10 @@ def measures_of(*parts: Record) -> dict[str, Value]:
         ValueError: the parts are not consecutive episodes of one policy.
     """
     _refuse_gaps(parts)
-    joined = {needs: _with_fields(parts, needs) for needs in {m.needs for m in MEASURES.values()}}
-    return {
-        name: _value(measure, joined[measure.needs])
-        for name, measure in MEASURES.items()
-        if measure.applies(parts[0].scenario)
-    }
+    scenario = parts[0].scenario
+    measures = {name: one for name, one in MEASURES.items() if one.applies(scenario)}
+    joined = {needs: _with_fields(parts, needs) for needs in {m.needs for m in measures.values()}}
+    return {name: _value(measure, joined[measure.needs]) for name, measure in measures.items()}
 
 
 def measure_of(name: str, *parts: Record) -> Value:

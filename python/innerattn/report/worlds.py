@@ -30,6 +30,7 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
                 "abilities": list(robot.abilities),
                 "amounts": robot.abilities if isinstance(robot.abilities, dict) else {},
                 "radius_m": robot.radius_m,
+                "has_battery": robot.battery is not None,
             }
             for robot in scenario.robots
         ],

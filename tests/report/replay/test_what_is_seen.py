@@ -10,7 +10,7 @@ from browser import PHONE, WIDE, opened_browser, until, visit
 from playwright.sync_api import Browser, Page
 from watched import watched
 
-from innerattn.config import Scenario
+from innerattn.config import Battery, Scenario
 from innerattn.report.replay.page import replay_page
 
 # Draws many moments; gives the texts that cover a robot, and the badges drawn over robots.
@@ -141,6 +141,23 @@ def test_robots_that_left_are_not_drawn(browser: Browser, tmp_path: Path) -> Non
         x, y = page.evaluate("() => replay.scenes[0].at(...replay.run.place(0, 6, 1))")
         assert page.evaluate("([x, y]) => replay.scenes[0].robotAt(x, y, 0, 6)", [x, y]) != 1
         assert page.evaluate("([x, y]) => replay.scenes[0].robotAt(x, y, 0, 4)", [x, y]) == 1
+
+
+def test_charges_of_batteries_are_shown(browser: Browser, tmp_path: Path) -> None:
+    plain = Scenario.preset("mixed")
+    battery = Battery(capacity_j=4.0, per_m_j=0.0, idle_w=8.0)
+    robots = (plain.robots[0].replace(battery=battery), *plain.robots[1:])
+    record = watched(plain.replace(robots=robots), episodes=1)
+    with visit(browser, written(tmp_path, {"a": record})) as seen:
+        page = seen.page
+        ready(page)
+        notes = page.locator("#robots button")
+        slider = page.get_by_role("slider", name="Step")
+        slider.fill("3")
+        assert "battery 40 %" in notes.nth(0).inner_text()
+        assert "battery" not in notes.nth(1).inner_text()
+        slider.fill("5")
+        assert "battery empty" in notes.nth(0).inner_text()
 
 
 def test_attention_that_a_robot_receives(browser: Browser, tmp_path: Path) -> None:

@@ -166,6 +166,8 @@ def _run(record: Record, name: str, arrays: _Arrays) -> dict[str, Any]:
         found["served"] = arrays.add(_quantised(kept["victims"]["served"], 1 / 255, "uint8"))
     if "blocked" in (kept["victims"].dtype.names or ()):
         found["waits"] = arrays.add(kept["victims"]["blocked"].astype(np.uint8))
+    if "charge" in kept:
+        found["charge"] = arrays.add(_quantised(kept["charge"], 1 / 255, "uint8"))
     if "attention" in kept and record.scenario.num_robots > 1:
         found["attention"] = arrays.add(_quantised(kept["attention"], 1 / 255, "uint8"))
     if "rewards" in kept:

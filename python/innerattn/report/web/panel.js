@@ -20,8 +20,11 @@ class RobotList {
       count.textContent = counted(run.rescuesUntil(episode, step, index), "rescue");
       const faults = run.faultsAt(episode, step, index).map((one) => faultText(this.worlds, one));
       if (run.isBlocked(episode, step, index)) faults.push("blocked");
+      const charge = run.charge(episode, step, index);
+      if (robot.has_battery && charge === 0) faults.push("battery empty");
       note.className = faults.length ? "bad" : "";
       const parts = faults.length ? faults : [`offers ${listed(withAmounts(robot.abilities, robot.amounts))}`];
+      if (robot.has_battery && charge > 0) parts.push(`battery ${percent(charge)}`);
       if (run.attention && look.robot >= 0 && index !== look.robot) {
         const weight = percent(chosenWeight(run, episode, step, look, index)), { name } = this.worlds.robots[look.robot];
         parts.push(look.received ? `gives ${name} ${weight}` : `${weight} of ${name}'s attention`);

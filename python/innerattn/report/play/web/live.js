@@ -140,6 +140,10 @@ class LiveRun {
     ));
   }
 
+  charge(episode, step, robot) {
+    return this.now.charge?.[robot] ?? 1;
+  }
+
   isAway(episode, step, robot) {
     return this.now.faults[robot].unavailable >= 1;
   }

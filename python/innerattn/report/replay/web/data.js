@@ -46,6 +46,7 @@ class Run {
     const lists = (spec, toRow) => byEpisode(buffer, spec, this.episodes, toRow);
     this.shares = described.served ? view(buffer, described.served) : null;
     this.waiting = described.waits ? view(buffer, described.waits) : null;
+    this.charges = described.charge ? view(buffer, described.charge) : null;
     this.slots = (described.served ?? described.waits)?.shape[2] ?? 0;
     this.victims = lists(described.victims, ([, id, task, from, to, x, y, slot, deadline]) => (
       { id, task, from, to, x: x * worlds.unit, y: y * worlds.unit, slot, deadline }
@@ -122,6 +123,13 @@ class Run {
     return this.faults[episode].filter(
       (one) => one.robot === robot && one.start <= step && step < one.end,
     );
+  }
+
+  /** What share of its energy a robot has; 1 of all where there are no batteries. */
+  charge(episode, step, robot) {
+    if (!this.charges) return 1;
+    const at = Math.min(Math.floor(step), this.lengths[episode] - 1);
+    return this.charges[(episode * this.steps + at) * this.size + robot] / 255;
   }
 
   isAway(episode, step, robot) {
