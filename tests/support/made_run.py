@@ -67,7 +67,7 @@ def made_run(
     recorded = replace(recorded, policy=method, steps={**recorded.steps, "attention": weights})
     rest = replace(run("greedy", SCORED - RECORDED, RECORDED), policy=method)
     long = run_episodes(scripted_policy("greedy", long_worlds, chance), long_worlds, LONG, chance)
-    scripted = {name: [run(name, SCORED, 0, needed_fields(SCORED))] for name in SCRIPTED}
+    scripted = {name: [run(name, SCORED, 0, needed_fields(worlds))] for name in SCRIPTED}
     standard = {method: [recorded, rest], **scripted}
     longer = {name: [replace(long, policy=name, length="long")] for name in standard}
     summary = summarise(path.name, recorded, standard, longer)
