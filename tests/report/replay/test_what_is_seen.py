@@ -145,7 +145,7 @@ def test_robots_that_left_are_not_drawn(browser: Browser, tmp_path: Path) -> Non
 
 def test_charges_of_batteries_are_shown(browser: Browser, tmp_path: Path) -> None:
     plain = Scenario.preset("mixed")
-    battery = Battery(capacity_j=4.0, per_m_j=0.0, idle_w=8.0)
+    battery = Battery(capacity_j=4.0, per_m_j=0.0, idle_w=10.0)
     robots = (plain.robots[0].replace(battery=battery), *plain.robots[1:])
     record = watched(plain.replace(robots=robots), episodes=1)
     with visit(browser, written(tmp_path, {"a": record})) as seen:
@@ -154,7 +154,7 @@ def test_charges_of_batteries_are_shown(browser: Browser, tmp_path: Path) -> Non
         notes = page.locator("#robots button")
         slider = page.get_by_role("slider", name="Step")
         slider.fill("3")
-        assert "battery 40 %" in notes.nth(0).inner_text()
+        assert "battery 25 %" in notes.nth(0).inner_text()
         assert "battery" not in notes.nth(1).inner_text()
         slider.fill("5")
         assert "battery empty" in notes.nth(0).inner_text()

@@ -62,17 +62,13 @@ class Charging:
         free = ~self._is_charging(state)[..., None]
         return np.asarray((self._per_m[:, None] * way + starts <= charge) & (charge > 0.0) & free)
 
-    def ever_within_reach(self, state: WorldState, places: Array) -> NDArray[np.bool_]:
-        """Which places are within reach now, or of a full battery at the station nearest to them.
-
-        Arguments and shape as of `within_reach`.
-        """
-        reached = self.within_reach(state, places)
+    def within_full_reach(self, places: Array) -> NDArray[np.bool_]:
+        """Which places (E, V, 2) a full battery reaches from their nearest station, (E, R, V)."""
         if not len(self._stations):
-            return reached
+            return np.zeros((len(places), len(self._capacity), places.shape[1]), np.bool_)
         way = 2.0 * self._way(places[:, :, None] - self._stations).min(-1)
         needed = self._per_m[:, None] * way[:, None] + 2.0 * self._start_j[:, None]
-        return np.asarray(reached | (needed <= self._capacity[:, None]))
+        return np.asarray(needed <= self._capacity[:, None])
 
     def targets(self, state: WorldState, targets: Array, chosen: NDArray[np.int64]) -> Array:
         """Targets of all robots, where those without a victim that are not full go to charge.

@@ -135,9 +135,9 @@ class HungarianPolicy(_Dispatcher):
         if faults is not None:
             permitted &= (faults["unavailable"] < 1.0)[:, :, None, None]
         if self._charging.is_needed:
-            ever = permitted & self._charging.ever_within_reach(state, places)[..., None]
-            permitted &= self._charging.within_reach(state, places)[..., None]
-            permitted &= can_be_rescued(ever, needed)[:, None, :, None]
+            reached = self._charging.within_reach(state, places)
+            ever = permitted & (reached | self._charging.within_full_reach(places))[..., None]
+            permitted &= reached[..., None] & can_be_rescued(ever, needed)[:, None, :, None]
         times = self.steering.arrival_times(state.positions, state.velocities, places, faults)
         blocked = state.victims["blocked"] if self._timing.has_order else None
         if self._coalitions.is_needed:

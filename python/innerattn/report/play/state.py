@@ -42,7 +42,7 @@ def state_document(moment: Moment) -> dict[str, Any]:
         "velocities": _rounded(moment.velocities),
         "blocked": moment.blocked.tolist(),
         "faults": [_wrong(robot) for robot in moment.faults],
-        "charge": None if moment.charge is None else np.round(moment.charge, 3).tolist(),
+        "charge": None if moment.charge is None else np.round(moment.charge, _DECIMALS).tolist(),
         "victims": [
             {"slot": slot, "id": int(one["id"]), "task": int(one["task"])}
             | _times(one)

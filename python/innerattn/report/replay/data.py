@@ -167,7 +167,8 @@ def _run(record: Record, name: str, arrays: _Arrays) -> dict[str, Any]:
     if "blocked" in (kept["victims"].dtype.names or ()):
         found["waits"] = arrays.add(kept["victims"]["blocked"].astype(np.uint8))
     if "charge" in kept:
-        found["charge"] = arrays.add(_quantised(kept["charge"], 1 / 255, "uint8"))
+        charge = np.ceil(255 * kept["charge"])  # only an empty battery is 0
+        found["charge"] = arrays.add(charge.astype(np.uint8))
     if "attention" in kept and record.scenario.num_robots > 1:
         found["attention"] = arrays.add(_quantised(kept["attention"], 1 / 255, "uint8"))
     if "rewards" in kept:
