@@ -177,6 +177,9 @@ class Batch:
     def charge(self) -> NDArray[np.float32]:
         """Charges of the robots as shares of their battery's capacity, (E, R)."""
 
+    def load(self) -> NDArray[np.float32]:
+        """Loads of the robots as shares of their full load, (E, R)."""
+
     def positions(self) -> NDArray[np.float32]:
         """Places of the robots, (E, R, 2), m."""
 

@@ -1,6 +1,6 @@
 //! Energy: what robots with a battery use, what stations give them, and who has none left.
 
-use crate::geometry::Vec2;
+use crate::geometry::{Vec2, way_to_nearest};
 use crate::scenario::{Scenario, Station};
 
 /// The batteries and stations of a scenario.
@@ -88,8 +88,7 @@ impl Energy {
     /// The way from a place to the nearest station, m; ties by their order.
     #[must_use]
     pub fn nearest_station(&self, from: Vec2) -> Option<Vec2> {
-        let ways = self.stations.iter().map(|(place, ..)| place - from);
-        ways.min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+        way_to_nearest(from, self.stations.iter().map(|(place, ..)| *place))
     }
 
     /// Whether robots may have these charges.

@@ -8,6 +8,13 @@ use crate::scenario::{Obstacle, Shape};
 /// A point or direction in the plane, m or m/s.
 pub type Vec2 = Vector2<f32>;
 
+/// The way from a place to the nearest of others, m; ties by their order.
+#[must_use]
+pub fn way_to_nearest(from: Vec2, places: impl Iterator<Item = Vec2>) -> Option<Vec2> {
+    let ways = places.map(|place| place - from);
+    ways.min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+}
+
 /// The form of a solid that does not move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Solid {

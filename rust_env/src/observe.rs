@@ -1,6 +1,7 @@
 //! Observations: world → one row of numbers for each robot, with named columns.
 
-use crate::energy::Energy;
+mod stores;
+
 use crate::fault::{HEALTHY, KINDS, Kind, Levels};
 use crate::geometry::Vec2;
 use crate::robot::Body;
@@ -9,6 +10,7 @@ use crate::tasks::deadline::Deadlines;
 use crate::tasks::order::Order;
 use crate::tasks::service::Service;
 use crate::tasks::{Needs, Victim};
+use stores::Stores;
 
 /// The true state of a world, as far as robots can see it.
 #[derive(Debug, Clone, Copy)]
@@ -23,6 +25,8 @@ pub struct Scene<'a> {
     pub velocities: &'a [Vec2],
     /// Charges of the robots, J; none where no robot has a battery.
     pub charges: &'a [f64],
+    /// Loads of the robots; none where no robot has one.
+    pub loads: &'a [u32],
     /// Victims by slot.
     pub victims: &'a [Option<Victim>],
     /// Steps done in the episode.
@@ -61,7 +65,7 @@ pub struct Layout {
     services: Option<Vec<Service>>,
     deadlines: Option<Deadlines>,
     order: Option<Order>,
-    energy: Option<Energy>,
+    stores: Option<Stores>,
     /// The columns that never change, of all robots (R × D); zeros elsewhere.
     fixed: Vec<f32>,
 }
@@ -82,7 +86,7 @@ impl Layout {
             services: Some(Service::of_tasks(scenario)).filter(|_| scenario.has_services()),
             deadlines: Deadlines::new(scenario),
             order: Order::new(scenario),
-            energy: Energy::new(scenario),
+            stores: Stores::new(scenario),
             abilities,
             needs,
             fixed: vec![],
@@ -112,39 +116,39 @@ impl Layout {
         4 + self.abilities.len()
     }
 
-    /// Column of the charge in a robot's block, if it has one.
-    fn charge(&self) -> usize {
+    /// The first column of charge and load in a robot's block, where there are such.
+    fn stores_from(&self) -> usize {
         self.availability() + if self.faults { KINDS.len() } else { 1 }
     }
 
     /// Writes the faults in effect into a robot's block, if they are to be seen.
     fn write_levels(&self, levels: &Levels, block: &mut [f32]) {
         let shown = KINDS.into_iter().filter(|kind| *kind != Kind::Unavailable);
-        for (column, kind) in block[self.availability() + 1..self.charge()].iter_mut().zip(shown) {
+        for (column, kind) in block[self.availability() + 1..self.stores_from()].iter_mut().zip(shown) {
             *column = levels[kind as usize];
         }
     }
 
     /// Columns of one robot.
     fn robot_width(&self) -> usize {
-        self.charge() + usize::from(self.energy.is_some())
+        self.stores_from() + self.stores.as_ref().map_or(0, Stores::robot_width)
     }
 
-    /// Columns of the way to the nearest station, behind a robot's own block.
-    fn station_width(&self) -> usize {
-        if self.energy.as_ref().is_some_and(Energy::has_stations) { 2 } else { 0 }
+    /// Columns of the ways to the nearest station and depot, behind a robot's own block.
+    fn ways_width(&self) -> usize {
+        self.stores.as_ref().map_or(0, Stores::ways_width)
     }
 
     /// Columns before those of victims.
     fn victims_from(&self) -> usize {
-        self.robots * self.robot_width() + self.station_width()
+        self.robots * self.robot_width() + self.ways_width()
     }
 
     /// The blocks of the robot itself and of its teammates.
     fn blocks<'a>(&self, row: &'a mut [f32]) -> impl Iterator<Item = &'a mut [f32]> {
         let (own, rest) = row.split_at_mut(self.robot_width());
         let mates = (self.robots - 1) * self.robot_width();
-        let mates = &mut rest[self.station_width()..][..mates];
+        let mates = &mut rest[self.ways_width()..][..mates];
         std::iter::once(own).chain(mates.chunks_exact_mut(self.robot_width()))
     }
 
@@ -163,7 +167,7 @@ impl Layout {
     }
 
     /// The name of every column; units are m and m/s, flags are 0 or 1, abilities are 0 or 1 or
-    /// amounts, needs are counts or amounts, `charge`, `served` and `time_left` are shares.
+    /// amounts, needs are counts or amounts, `charge`, `load`, `served` and `time_left` are shares.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let mut names = Vec::with_capacity(self.width());
@@ -184,9 +188,10 @@ impl Layout {
                 let shown = KINDS.iter().filter(|kind| **kind != Kind::Unavailable);
                 names.extend(shown.map(|kind| format!("{who}.fault.{}", kind.name())));
             }
-            names.extend(self.energy.iter().map(|_| format!("{who}.charge")));
-            if robot == 0 && self.station_width() > 0 {
-                names.extend(["x", "y"].map(|axis| format!("own.station.{axis}")));
+            let stores = self.stores.as_ref();
+            names.extend(stores.into_iter().flat_map(Stores::names).map(|name| format!("{who}.{name}")));
+            if robot == 0 {
+                names.extend(stores.into_iter().flat_map(Stores::names_of_ways));
             }
         }
         for victim in 0..self.victims {
@@ -227,7 +232,7 @@ impl Layout {
     }
 
     /// Leaves a robot nothing of its row but what it knows of itself: abilities, availability, faults,
-    /// charge.
+    /// charge, load.
     pub fn darken(&self, row: &mut [f32]) {
         row[..4].fill(0.0);
         row[self.robot_width()..].fill(0.0);
@@ -247,26 +252,19 @@ impl Layout {
         let others = (0..self.robots).filter(|other| *other != own);
         let (block, rest) = row.split_at_mut(self.robot_width());
         block[..4].copy_from_slice(&[position.x, position.y, velocity.x, velocity.y]);
-        let mates = rest[self.station_width()..].chunks_exact_mut(self.robot_width());
+        let mates = rest[self.ways_width()..].chunks_exact_mut(self.robot_width());
         for (block, other) in mates.zip(others) {
             let (place, speed) = (scene.positions[other] - position, scene.velocities[other] - velocity);
             block[..4].copy_from_slice(&[place.x, place.y, speed.x, speed.y]);
         }
-        if let Some(energy) = &self.energy {
-            self.write_energy(energy, scene.charges, own, position, row);
+        if let Some(stores) = &self.stores {
+            let others = (0..self.robots).filter(|other| *other != own);
+            for (block, robot) in self.blocks(row).zip(std::iter::once(own).chain(others)) {
+                stores.write(scene, robot, &mut block[self.stores_from()..]);
+            }
+            stores.write_ways(position, &mut row[self.robot_width()..]);
         }
         self.write_victims(scene, &scene.team[own], position, &mut row[self.victims_from()..]);
-    }
-
-    /// Writes the charges of all robots, and the way to the nearest station from `position`.
-    fn write_energy(&self, energy: &Energy, charges: &[f64], own: usize, position: Vec2, row: &mut [f32]) {
-        let others = (0..self.robots).filter(|other| *other != own);
-        for (block, robot) in self.blocks(row).zip(std::iter::once(own).chain(others)) {
-            block[self.charge()] = energy.share(robot, charges);
-        }
-        if let Some(way) = energy.nearest_station(position) {
-            row[self.robot_width()..][..2].copy_from_slice(&[way.x, way.y]);
-        }
     }
 
     fn write_victims(&self, scene: Scene, body: &Body, own: Vec2, rows: &mut [f32]) {
@@ -345,6 +343,7 @@ mod tests {
             positions: &at,
             velocities: &moving,
             charges: &[],
+            loads: &[],
             victims: &victims,
             step: 0,
         };

@@ -12,6 +12,7 @@ use crate::reward::Weights;
 use crate::robot::{Body, bodies};
 use crate::scenario::{Arrival, Scenario};
 use crate::spawn::{Crowded, Spawn};
+use crate::supply::Supplies;
 use crate::tasks::Needs;
 use crate::tasks::arrivals::Arrivals;
 use crate::tasks::deadline::Deadlines;
@@ -54,6 +55,8 @@ pub struct Rules {
     pub order: Option<Order>,
     /// Batteries and stations, if any.
     pub energy: Option<Energy>,
+    /// Loads and depots, if any.
+    pub supplies: Option<Supplies>,
     /// The obstacles' forms.
     pub solids: Vec<Solid>,
     /// Motion and contacts.
@@ -105,6 +108,7 @@ impl Rules {
             arrivals: Arrivals::new(&scenario),
             order: Order::new(&scenario),
             energy: Energy::new(&scenario),
+            supplies: Supplies::new(&scenario),
             weights: Weights::new(&scenario),
             faults: processes(&scenario),
             spawn,

@@ -5,7 +5,9 @@ mod abilities;
 mod arrivals;
 mod battery;
 mod check;
+mod depot;
 mod order;
+mod spot;
 mod task;
 mod validity;
 
@@ -17,6 +19,7 @@ use crate::fault::Fault;
 pub use abilities::{Abilities, reaches};
 pub use arrivals::Arrival;
 pub use battery::{Battery, Station};
+pub use depot::Depot;
 pub(crate) use task::steps_of;
 pub use task::{Deadline, Interrupted, Task};
 
@@ -26,7 +29,7 @@ pub const MAX_ROBOTS: usize = 64;
 pub const MAX_VICTIMS: usize = 32;
 /// Most obstacles in an arena.
 pub const MAX_OBSTACLES: usize = 64;
-/// Most stations in a scenario.
+/// Most stations in a scenario, and most depots.
 pub const MAX_STATIONS: usize = 64;
 /// Most places in a list of those at which victims appear.
 pub const MAX_PLACES: usize = 256;
@@ -172,6 +175,9 @@ pub struct Robot {
     /// Its battery; it needs no energy if absent.
     #[serde(default)]
     pub battery: Option<Battery>,
+    /// How many rescues it can help with before a depot refills it; any number if absent.
+    #[serde(default)]
+    pub load: Option<u32>,
 }
 
 fn default_radius_m() -> f64 {
@@ -217,6 +223,8 @@ pub struct Scenario {
     pub obstacles: Vec<Obstacle>,
     /// Places that charge batteries.
     pub stations: Vec<Station>,
+    /// Places that refill loads.
+    pub depots: Vec<Depot>,
     /// Half the side of the square arena, m.
     pub arena_half_width_m: f64,
     /// How near a helper must be, m.
@@ -284,6 +292,7 @@ impl Default for Scenario {
             drive_force_n: default_drive_force_n(),
             start_m: None,
             battery: None,
+            load: None,
         };
         let task = |name: &str, needs: [&str; 2]| Task::new(name, needs.map(String::from).to_vec());
         Self {
@@ -299,6 +308,7 @@ impl Default for Scenario {
             arrivals: vec![],
             obstacles: vec![],
             stations: vec![],
+            depots: vec![],
             arena_half_width_m: 1.0,
             rescue_radius_m: 0.15,
             spawn_clearance_m: 0.2,

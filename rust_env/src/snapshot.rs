@@ -71,8 +71,9 @@ pub fn most_bytes(rules: &Rules, num_envs: usize) -> usize {
     let places = 8 * (2 * robots + rules.solids.len()) + (1 + 3 * 5 + 8 + 5) * slots;
     let faults = 2 * 5 * rules.faults.len() + NUM_KINDS * (10 + 4 * robots) + robots * (11 + 4 * width);
     let charges = if rules.energy.is_some() { 10 + 8 * robots } else { 0 };
+    let loads = if rules.supplies.is_some() { 10 + 5 * robots } else { 0 };
     let head = MAGIC.len() + 2 * 10 + rules.scenario.to_json().len() + CHECKSUM_BYTES;
-    head + num_envs * (counts + places + faults + charges)
+    head + num_envs * (counts + places + faults + charges + loads)
 }
 
 /// The image of `worlds`, which were made by `rules`.
@@ -91,6 +92,9 @@ pub fn save<'a>(rules: &Rules, num_envs: usize, worlds: impl Iterator<Item = &'a
         }
         if rules.energy.is_some() {
             bytes = postcard::to_extend(&world.charges, bytes).expect("plain data serialises");
+        }
+        if rules.supplies.is_some() {
+            bytes = postcard::to_extend(&world.loads, bytes).expect("plain data serialises");
         }
         bytes
     };
@@ -148,6 +152,9 @@ pub fn load(rules: &Rules, num_envs: usize, bytes: &[u8]) -> Result<Vec<World>> 
         if rules.energy.is_some() {
             (world.charges, later) = postcard::take_from_bytes(later).map_err(|_| unread())?;
         }
+        if rules.supplies.is_some() {
+            (world.loads, later) = postcard::take_from_bytes(later).map_err(|_| unread())?;
+        }
         if let Some(what) = misfit(rules, &world) {
             return refuse(format!("env {env} does not fit the scenario: its {what}"));
         }
@@ -196,6 +203,7 @@ fn misfit(rules: &Rules, world: &World) -> Option<&'static str> {
         ("obstacles", rules.spawn.may_be_obstacles(&world.obstacles)),
         ("victims", rules.spawn.may_be_victims(&world.victims, world.step, world.appeared)),
         ("services", world.victims.iter().flatten().all(served)),
+        ("loads", rules.supplies.as_ref().is_none_or(|supplies| supplies.may_be(&world.loads))),
         ("charges", rules.energy.as_ref().is_none_or(|energy| energy.may_be(&world.charges))),
         ("faults", world.faults.fits(rules, world.now())),
     ];

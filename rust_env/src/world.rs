@@ -1,5 +1,7 @@
 //! One world: how an episode begins and what a step does. Its state is plain numbers.
 
+mod victims;
+
 use std::iter::repeat_n;
 
 use serde::{Deserialize, Serialize};
@@ -15,7 +17,7 @@ use crate::rng::{Purpose, Stream};
 use crate::robot::Commands;
 use crate::rules::Rules;
 use crate::scenario::{MAX_ROBOTS, Shaping, Unavailable};
-use crate::tasks::{Events, Loss, Rescue, Victim};
+use crate::tasks::{Events, Victim};
 
 /// Whether and how an episode ended with a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,6 +67,9 @@ pub struct World {
     /// Charges of the robots, J; none where no robot has a battery. Images have them apart.
     #[serde(skip)]
     pub charges: Vec<f64>,
+    /// Loads of the robots; none where no robot has one. Images have them apart.
+    #[serde(skip)]
+    pub loads: Vec<u32>,
     /// Places of the obstacles, m.
     pub obstacles: Vec<Vec2>,
     /// Victims by slot.
@@ -91,6 +96,7 @@ impl World {
             positions: vec![Vec2::zeros(); rules.team.len()],
             velocities: vec![Vec2::zeros(); rules.team.len()],
             charges: vec![],
+            loads: vec![],
             obstacles: vec![Vec2::zeros(); rules.solids.len()],
             victims: vec![None; rules.scenario.num_victims()],
             faults: FaultState::default(),
@@ -107,8 +113,9 @@ impl World {
         let victims = rules.scenario.num_victims() * size_of::<Option<Victim>>();
         let struck = if faults == 0 { 0 } else { FaultState::most_bytes(robots, rules.layout.width()) };
         let charges = if rules.energy.is_some() { robots * size_of::<f64>() } else { 0 };
+        let loads = if rules.supplies.is_some() { robots * size_of::<u32>() } else { 0 };
         // Allocators round up, and keep a little beside each list.
-        size_of::<Self>() + (places + victims + struck + charges + 8 * faults) * 9 / 8 + 8 * 16
+        size_of::<Self>() + (places + victims + struck + charges + loads + 8 * faults) * 9 / 8 + 8 * 16
     }
 
     /// Starts `episode`: places everything anew from that episode's streams.
@@ -125,44 +132,15 @@ impl World {
         if let Some(energy) = &rules.energy {
             energy.fill(&mut self.charges);
         }
+        if let Some(supplies) = &rules.supplies {
+            supplies.fill(&mut self.loads);
+        }
         let mut stream = Stream::new(self.seed, self.stream, episode, Purpose::Start);
         rules.spawn.place_start(&mut stream, &mut self.obstacles, &mut self.positions);
         let now = self.now();
         self.faults.begin(rules, now);
         self.fill_slots(rules, self.absent(rules));
         self.freeze(rules);
-    }
-
-    /// Lets the victims appear that the situation wants now, or that arrive, away from all robots but those
-    /// `absent`. Returns how many of these found all slots of their task taken.
-    fn fill_slots(&mut self, rules: &Rules, absent: u64) -> usize {
-        let Self { seed, stream, episode, step, positions, obstacles, victims, .. } = self;
-        let arrivals = rules.arrivals.iter();
-        let mut due = arrivals.flat_map(|one| one.due(*step, *seed, *stream, *episode)).peekable();
-        if !rules.spawn.wants_victims(victims) && due.peek().is_none() {
-            return 0;
-        }
-        let there = positions.iter().enumerate().filter(|(robot, _)| absent >> robot & 1 == 0);
-        let robots: Vec<Vec2> = there.map(|(_, at)| *at).collect();
-        let mut words = Stream::new(*seed, *stream, *episode, Purpose::Victims).resume(self.victim_words);
-        let (appeared, mut turned_away) = (&mut self.appeared, 0);
-        if rules.arrivals.is_some() {
-            turned_away =
-                rules.spawn.place_arrivals(&mut words, due, *step, appeared, &robots, obstacles, victims);
-        } else {
-            rules.spawn.place_victims(&mut words, *step, appeared, &robots, obstacles, victims);
-        }
-        self.victim_words = words.words();
-        self.set_deadlines(rules);
-        turned_away
-    }
-
-    /// Says of every victim when it is lost.
-    pub fn set_deadlines(&mut self, rules: &Rules) {
-        let Some(deadlines) = &rules.deadlines else { return };
-        for victim in self.victims.iter_mut().flatten() {
-            victim.deadline_step = deadlines.step_of(victim, self.seed, self.stream, self.episode);
-        }
     }
 
     /// Does one control step of world number `env` of a batch, whose `commands` are E × R. Adds what becomes
@@ -179,8 +157,8 @@ impl World {
         reward: &mut [f32],
     ) -> Ending {
         let shaping = rules.weights.shaping;
-        let (away, absent) = (self.away(rules), self.absent(rules));
-        let distance_before = if shaping == Shaping::None { 0.0 } else { self.distance(rules, away) };
+        let (away, unable, absent) = (self.away(rules), self.unable(rules), self.absent(rules));
+        let distance_before = if shaping == Shaping::None { 0.0 } else { self.distance(rules, unable) };
         let mut effort = [0.0; MAX_ROBOTS];
         let damping = rules.scenario.damping as f32;
         for (robot, body) in rules.team.iter().enumerate() {
@@ -206,10 +184,14 @@ impl World {
         if let (Some(energy), Some(before)) = (&rules.energy, &before) {
             energy.account(before, &self.positions, absent, &mut self.charges);
         }
-        let mut distance_after = if shaping == Shaping::Progress { self.distance(rules, away) } else { 0.0 };
+        let mut distance_after =
+            if shaping == Shaping::Progress { self.distance(rules, unable) } else { 0.0 };
 
         let earlier = (events.rescues.len(), events.losses.len());
         self.settle(rules, env, &mut events.rescues);
+        if let Some(supplies) = &rules.supplies {
+            supplies.refill(&self.positions, absent, &mut self.loads);
+        }
         if rules.deadlines.is_some() {
             self.lose(env, &mut events.losses);
         }
@@ -227,7 +209,7 @@ impl World {
         };
         self.over = ending.over();
         if shaping == Shaping::Potential && !ending.terminated {
-            distance_after = self.distance(rules, self.away(rules));
+            distance_after = self.distance(rules, self.unable(rules));
         }
         let happened = Happened {
             rescues: &events.rescues[earlier.0..],
@@ -241,66 +223,21 @@ impl World {
         ending
     }
 
-    /// Serves and rescues victims by the rescue rule, slot by slot; no robot helps twice in one step. Who has
-    /// to wait is decided before anybody is rescued.
-    fn settle(&mut self, rules: &Rules, env: usize, rescues: &mut Vec<Rescue>) {
-        let radius = rules.scenario.rescue_radius_m as f32;
-        let mut busy = self.away(rules);
-        let blocked = rules.order.as_ref().map_or(0, |order| order.blocked(&self.victims));
-        for (slot, place) in self.victims.iter_mut().enumerate() {
-            let Some(victim) = place else { continue };
-            let service = rules.services[victim.task as usize];
-            let needs = &rules.tasks[victim.task as usize];
-            let waits = blocked >> slot & 1 == 1;
-            let helpers = || needs.helpers(victim.position, &rules.team, &self.positions, radius, busy);
-            let Some(helpers) = (!waits).then(helpers).flatten() else {
-                service.interrupt(victim);
-                continue;
-            };
-            helpers.iter().flatten().for_each(|robot| busy |= 1 << robot);
-            if !service.serve(victim) {
-                continue;
-            }
-            self.rescued += 1;
-            rescues.push(Rescue {
-                env: env as u32,
-                episode: self.episode,
-                step: self.step,
-                slot: slot as u32,
-                victim: victim.id,
-                task: victim.task,
-                helpers,
-            });
-            *place = None;
-        }
-    }
-
-    /// Takes away the victims whose deadline comes with the end of this step.
-    fn lose(&mut self, env: usize, losses: &mut Vec<Loss>) {
-        for (slot, place) in self.victims.iter_mut().enumerate() {
-            let Some(victim) = place.filter(|victim| victim.deadline_step <= self.step + 1) else { continue };
-            *place = None;
-            self.lost += 1;
-            losses.push(Loss {
-                env: env as u32,
-                episode: self.episode,
-                step: self.step,
-                slot: slot as u32,
-                victim: victim.id,
-                task: victim.task,
-            });
-        }
-    }
-
     /// Robots that neither drive nor help now, as bits: unavailable ones, and those whose battery is empty.
     fn away(&self, rules: &Rules) -> u64 {
         let empty = rules.energy.as_ref().map_or(0, |energy| energy.empty(&self.charges));
         self.faults.unavailable() | empty
     }
 
-    /// Distance of victims from the robots that are not `away`, as rewards count it, m.
-    fn distance(&self, rules: &Rules, away: u64) -> f32 {
-        total_distance(self.victims.iter().flatten(), &rules.tasks, &rules.team, &self.positions, away)
+    /// Robots that do not help now, as bits: those that are away, and those whose load is used up.
+    fn unable(&self, rules: &Rules) -> u64 {
+        let used_up = rules.supplies.as_ref().map_or(0, |supplies| supplies.used_up(&self.loads));
+        self.away(rules) | used_up
+    }
+
+    /// Distance of victims from the robots that are not `unable` to help, as rewards count it, m.
+    fn distance(&self, rules: &Rules, unable: u64) -> f32 {
+        total_distance(self.victims.iter().flatten(), &rules.tasks, &rules.team, &self.positions, unable)
     }
 
     /// Writes the observations of all robots into `rows` (R × D).
@@ -378,6 +315,7 @@ impl World {
             positions: &self.positions,
             velocities: &self.velocities,
             charges: &self.charges,
+            loads: &self.loads,
             victims: &self.victims,
             step: self.step,
         }

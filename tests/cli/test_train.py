@@ -149,7 +149,7 @@ def test_every_key_is_an_option(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["train", "--help-all"])
     text = capsys.readouterr().out.replace("_", "-")
-    lists = ("robots", "tasks", "obstacles", "stations", "faults", "arrivals")
+    lists = ("robots", "tasks", "obstacles", "stations", "depots", "faults", "arrivals")
     in_a_file = {f"scenario.{name}" for name in lists}
     in_a_file.add("train.schedule")
     for section, table in load_run_config().model_dump().items():

@@ -250,6 +250,7 @@ ADDED_SINCE = {
         "arrivals",
         "unavailable_robots",
         "stations",
+        "depots",
     ),
     "network": ("swapped_robots", "shared_gradients", "joint_critic", "symmetry"),
     "train": (
@@ -268,7 +269,7 @@ def test_a_digest_is_that_of_the_values_in_use() -> None:
         for name in names:
             del values[section][name]  # at its default
     for robot in values["scenario"]["robots"]:
-        del robot["start_m"], robot["battery"]
+        del robot["start_m"], robot["battery"], robot["load"]
     for task in values["scenario"]["tasks"]:
         for name in ("service_s", "service", "deadline_s", "after", "arrival_rate_hz"):
             del task[name]

@@ -108,7 +108,7 @@ def test_ranges_are_those_that_the_compiled_module_checks(part: str, name: str) 
     holder = scenario[part][0] if part else scenario
     arrival = {"at_s": 1.0, "task": "task_1", "position_m": [0.5, 0.5]}
     station = {"position_m": [0.5, 0.5], "recharge_w": 5.0}
-    others = {"arrivals": arrival, "stations": station}
+    others = {"arrivals": arrival, "stations": station, "depots": {"position_m": [0.5, 0.5]}}
     absent = others.get(name, {"shape": "disc", "radius_m": 0.05})
     some = [*(holder[name] or [absent])][:1] if of_list else []
     beyond = [high + 1, low - 1] if of_list or key["type"] == "integer" else [1.1 * high, low - 1.0]

@@ -26,7 +26,7 @@ DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], dtype=np.float
 @dataclass
 class State:
     """E worlds: places and velocities (E, R, 2), obstacles (E, O, 2), victims (E, V) and faults
-    (E, R) structured, steps done (E,), charges as shares (E, R)."""
+    (E, R) structured, steps done (E,), charges and loads as shares (E, R)."""
 
     positions: Array
     velocities: Array
@@ -35,6 +35,7 @@ class State:
     faults: NDArray[np.void]
     steps: NDArray[np.int64]
     charge: Array
+    load: Array
 
     @property
     def available(self) -> Bools:
@@ -79,6 +80,7 @@ class Stepper:
         self.capacity = np.array([one.capacity_j if one else 1.0 for one in batteries])
         self.per_m = np.array([one.per_m_j if one else 0.0 for one in batteries])
         self.idle = np.array([one.idle_w if one else 0.0 for one in batteries])
+        self.full = np.array([robot.load or 0 for robot in robots])
         everyone = range(len(robots))
         self.others = np.array([[j for j in everyone if j != i] for i in everyone], dtype=int)
 
@@ -121,6 +123,22 @@ class Stepper:
         unsure |= (abs(joules + given) < 1e-5 * self.capacity) & (before.charge > 0)
         changes = self.powered & self.there(before)
         return np.where(changes, share, before.charge), (unsure & changes).any(-1)
+
+    def reloaded(
+        self, before: State, after: Array, rescues: list[tuple[int, ...]]
+    ) -> tuple[Array, Bools]:
+        """Loads after a step with these rescues that ends at these places, (E, R), and where
+        rounding might decide whether a robot stands at a depot, (E,)."""
+        loads = np.rint(before.load * np.maximum(self.full, 1))
+        for env, _slot, *helpers in rescues:
+            loads[env, helpers] -= self.full[helpers] > 0
+        here = unsure = np.zeros(loads.shape, dtype=bool)
+        for depot in self.scenario.depots:
+            distance = np.linalg.norm(after - depot.position_m, axis=-1)
+            here = here | (distance <= depot.radius_m)
+            unsure = unsure | (abs(distance - depot.radius_m) < 1e-5)
+        loads = np.where(here & self.there(before), self.full, loads)
+        return np.where(self.full > 0, loads / np.maximum(self.full, 1), 1.0), unsure.any(-1)
 
     def drive(self, actions: NDArray[Any]) -> Array:
         """Directions whose length is the share of full force, (E, R, 2)."""
@@ -171,7 +189,7 @@ class Stepper:
     def total_distance(self, state: State, positions: Array) -> Array:
         """Σ over present victims and their needs of the nearest able robots' distances, (E,)."""
         distances = self.distances(state, positions)
-        distances = np.where(state.able[:, None], distances, np.inf)
+        distances = np.where((state.able & (state.load > 0))[:, None], distances, np.inf)
         total = np.zeros(len(positions))
         for task, counts in enumerate(self.counts):
             mine = state.present & (state.victims["task"] == task)
@@ -193,9 +211,8 @@ class Stepper:
     def met(
         self, state: State, positions: Array, charge: Array
     ) -> tuple[list[tuple[int, ...]], Bools]:
-        """(env, slot, helpers...) of all victims whose needs are met by robots with a
-        charge (E, R); worlds in which rounding
-        might decide, (E,)."""
+        """(env, slot, helpers...) of all victims whose needs are met by robots with a charge
+        (E, R) and a load; worlds in which rounding might decide, (E,)."""
         radius = self.scenario.rescue_radius_m
         distances = self.distances(state, positions)
         close = abs(distances - radius) < 1e-5
@@ -203,7 +220,8 @@ class Stepper:
         tied = (np.diff(in_order, axis=-1) < 1e-5) & (in_order[..., 1:] < radius)
         unsure = (state.present & (close.any(-1) | tied.any(-1))).any(-1)
         found: list[tuple[int, ...]] = []
-        near = (distances <= radius) & (state.available & (charge > 0))[:, None]
+        able = state.available & (charge > 0) & (state.load > 0)
+        near = (distances <= radius) & able[:, None]
         waiting = self.waiting(state)
         for env in np.flatnonzero((state.present & near.any(-1)).any(-1)):
             busy: set[int] = set()
@@ -320,18 +338,20 @@ class Stepper:
             flags += [state.faults[kind][..., None] for kind in shown]
         if self.powered.any():
             flags.append(state.charge[..., None])
+        if self.full.any():
+            flags.append(state.load[..., None])
         there = self.there(state)[..., None]
         known = np.concatenate(flags, axis=-1) * there
         dark = (state.faults["blackout"] == 1)[..., None]
         deaf = (state.faults["lost_communication"] == 1)[..., None]
         motion = np.concatenate([state.positions, state.velocities], axis=-1)
         blocks = [np.where(dark, 0.0, motion), known]
-        if self.scenario.stations:
-            stations = np.array([one.position_m for one in self.scenario.stations])
-            ways = stations - state.positions[:, :, None]
-            nearest = np.linalg.norm(ways, axis=-1).argmin(-1)
-            way = np.take_along_axis(ways, nearest[..., None, None], 2)[:, :, 0]
-            blocks.append(np.where(dark, 0.0, way))
+        for spots in (self.scenario.stations, self.scenario.depots):
+            if spots:
+                ways = np.array([one.position_m for one in spots]) - state.positions[:, :, None]
+                nearest = np.linalg.norm(ways, axis=-1).argmin(-1)
+                way = np.take_along_axis(ways, nearest[..., None, None], 2)[:, :, 0]
+                blocks.append(np.where(dark, 0.0, way))
         if robots > 1:
             relative = (motion[:, self.others] - motion[:, :, None]) * there[:, self.others]
             teammates = np.concatenate([relative, known[:, self.others]], axis=-1)

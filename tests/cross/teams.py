@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from innerattn.config import Arrival, Battery, Obstacle, Robot, Scenario, Station, Task
+from innerattn.config import Arrival, Battery, Depot, Obstacle, Robot, Scenario, Station, Task
 
 SIZES = (1, 2, 3, 4, 4, 5, 8, 12, 20, 64)
 
@@ -176,3 +176,21 @@ def with_batteries(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     ]
     fixed = [one for one in scenario.obstacles if one.position_m is None]
     return scenario.replace(robots=tuple(robots), stations=tuple(stations), obstacles=tuple(fixed))
+
+
+def with_loads(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, where most robots have a load, and there are up to three depots."""
+    robots = [
+        robot.replace(load=int(rng.integers(1, 4))) if index == 0 or rng.random() < 0.7 else robot
+        for index, robot in enumerate(scenario.robots)
+    ]
+    reach = scenario.arena_half_width_m - max(robot.radius_m for robot in robots)
+    depots = [
+        Depot(
+            position_m=tuple(rng.uniform(-reach, reach, 2).tolist()),
+            radius_m=float(rng.uniform(0.2, 0.8)),
+        )
+        for _ in range(rng.integers(4))
+    ]
+    fixed = [one for one in scenario.obstacles if one.position_m is None]
+    return scenario.replace(robots=tuple(robots), depots=tuple(depots), obstacles=tuple(fixed))

@@ -8,7 +8,17 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from innerattn import _core
-from innerattn.config import Arrival, Battery, Fault, Obstacle, Robot, Scenario, Station, Task
+from innerattn.config import (
+    Arrival,
+    Battery,
+    Depot,
+    Fault,
+    Obstacle,
+    Robot,
+    Scenario,
+    Station,
+    Task,
+)
 from innerattn.config.model import Told
 from innerattn.envs.batch import FAULT_KINDS
 
@@ -18,6 +28,7 @@ TASK = {"name": "task", "needs": ["food"]}
 FAULT = {"robot": "food_0", "kind": "motor_gain", "value": 0.5}
 ARRIVAL = {"at_s": 1.5, "task": "task_1", "position_m": [0.25, -0.5]}
 STATION = {"position_m": [0.25, -0.5], "recharge_w": 5.0}
+DEPOT = {"position_m": [0.25, -0.5]}
 BATTERY = {"capacity_j": 10.0, "per_m_j": 2.0}
 TEAM = Scenario().model_dump(mode="json")["robots"]
 NESTED = {
@@ -27,6 +38,7 @@ NESTED = {
     "faults": (Fault, FAULT),
     "arrivals": (Arrival, ARRIVAL),
     "stations": (Station, STATION),
+    "depots": (Depot, DEPOT),
 }
 CHOICES = [
     (name, get_args(field.annotation))
@@ -44,6 +56,8 @@ def within(key: str, item: dict) -> dict:
     listed = {"situation": "listed"} if key == "arrivals" else {}
     if key == "stations":
         listed = {"robots": [{**TEAM[0], "battery": BATTERY}, *TEAM[1:]]}
+    if key == "depots":
+        listed = {"robots": [{**TEAM[0], "load": 2}, *TEAM[1:]]}
     return {key: [*TEAM, item] if key == "robots" else [item], **listed}
 
 
@@ -159,7 +173,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         "robots": [
             *TEAM[1:],
             {**TEAM[0], "radius_m": 0.04, "drive_force_n": 3.5, "start_m": [0.25, -0.5]},
-            {**TEAM[0], "name": "last", "battery": {**BATTERY, "idle_w": 0.25}},
+            {**TEAM[0], "name": "last", "battery": {**BATTERY, "idle_w": 0.25}, "load": 4},
         ],
         "tasks": [
             {
@@ -175,6 +189,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         "max_victims": 7,
         "obstacles": [{"shape": "box", "half_extents_m": [0.1, 0.2], "position_m": [0.3, 0.4]}],
         "stations": [{**STATION, "radius_m": 0.25}],
+        "depots": [{**DEPOT, "radius_m": 0.375}],
         "arena_half_width_m": 2.0,
         "rescue_radius_m": 0.25,
         "spawn_clearance_m": 0.125,
@@ -231,16 +246,19 @@ def test_models_are_all_mirrored() -> None:
     ("model", "name"),
     [
         (model, name)
-        for model in (Battery, Station)
+        for model in (Battery, Station, Depot)
         for name, field in model.model_fields.items()
         if field.metadata
     ],
 )
-def test_batteries_and_stations_are_in_their_told_ranges(model: type[BaseModel], name: str) -> None:
+def test_batteries_stations_and_depots_are_in_their_told_ranges(
+    model: type[BaseModel], name: str
+) -> None:
     (told,) = (one for one in model.model_fields[name].metadata if isinstance(one, Told))
     for value in (0.9 * told.low if told.low else -0.1, 1.1 * told.high):
         battery = BATTERY | ({name: value} if model is Battery else {})
         station = STATION | ({name: value} if model is Station else {})
-        team = [{**TEAM[0], "battery": battery}, *TEAM[1:]]
+        depot = DEPOT | ({name: value} if model is Depot else {})
+        team = [{**TEAM[0], "battery": battery, "load": 2}, *TEAM[1:]]
         with pytest.raises(ValueError, match=rf"{name} = .*: must be in \S+\.\.=\S+"):
-            compiled({"robots": team, "stations": [station]})
+            compiled({"robots": team, "stations": [station], "depots": [depot]})

@@ -12,6 +12,7 @@ from teams import (
     with_arrivals,
     with_batteries,
     with_list,
+    with_loads,
     with_order,
     with_times,
 )
@@ -36,6 +37,7 @@ def state_of(env: BatchEnv) -> State:
         env.fault_state(),
         env.step_counts(),
         env.charge().astype(np.float64),
+        env.load().astype(np.float64),
     )
 
 
@@ -44,11 +46,18 @@ def assert_close(found: np.ndarray, wanted: np.ndarray, what: str, scale: float 
 
 
 def random_actions(rng: np.random.Generator, scenario: Scenario, state: State) -> np.ndarray:
-    """Half of the robots wander, half head for some victim, so that there are rescues."""
+    """Half of the robots wander, half head for some victim, so that there are rescues.
+
+    Those whose load is used up head for a depot, if there is one.
+    """
     shape = state.positions.shape[:2]
     slot = rng.integers(state.victims.shape[1], size=shape)
     goal = np.take_along_axis(state.places, slot[..., None], axis=1) - state.positions
     toward = rng.random(shape) < 0.5
+    for depot in scenario.depots[:1]:
+        used_up = state.load == 0
+        goal = np.where(used_up[..., None], depot.position_m - state.positions, goal)
+        toward |= used_up
     if scenario.actions == "continuous":
         wander = rng.uniform(-1, 1, (*shape, 2))
         return np.where(toward[..., None], np.clip(3 * goal, -1, 1), wander).astype(np.float32)
@@ -192,6 +201,10 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
             (int(row["env"]), int(row["slot"]), *(h for h in row.tolist()[6:] if h >= 0))
             for row in result.rescues
         ]
+        load, unsure_load = plain.reloaded(before, after.positions, found)
+        assert_close(after.load[~unsure_load], load[~unsure_load], "loads")
+        seen["refilled"] += int((after.load > before.load).sum())
+        seen["used up"] += int(((after.load == 0) & (before.load > 0)).sum())
         sure = [row for row in found if not unsure[row[0]]]
         assert sure == [row for row in expected if not unsure[row[0]]]
         for row in result.rescues:
@@ -364,6 +377,20 @@ def test_worlds_with_batteries_are_as_the_plain_stepper_says(chunk: int) -> None
 
     total = compare_some(rng, changed)
     for what in ("rescues", "appeared", "charged", "ran empty"):
+        assert total[what] > 50, (what, total)
+
+
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_with_loads_are_as_the_plain_stepper_says(chunk: int) -> None:
+    rng = np.random.default_rng(700 + chunk)
+
+    def changed(scenario: Scenario) -> Scenario:
+        for other in (with_amounts, with_batteries, with_times):
+            scenario = other(scenario, rng) if rng.random() < 0.3 else scenario
+        return with_loads(scenario, rng).replace(episode_steps=60, end_when_rescued=None)
+
+    total = compare_some(rng, changed)
+    for what in ("rescues", "appeared", "refilled", "used up"):
         assert total[what] > 50, (what, total)
 
 

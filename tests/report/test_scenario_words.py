@@ -83,6 +83,20 @@ def test_batteries_have_words() -> None:
     )
 
 
+def test_loads_have_words() -> None:
+    robots = [robot.model_dump() for robot in Scenario().robots]
+    robots[0]["load"], robots[3]["load"] = 1, 3
+    made = Scenario.model_validate({"robots": robots})
+    assert scenario_words(made).splitlines()[2:] == [
+        "food_0: helps with 1 rescue, then with none: there is no depot",
+        "medical_0: helps with 3 rescues, then with none: there is no depot",
+    ]
+    with_depot = made.replace(depots=[{"position_m": (0.0, 0.0)}])
+    assert scenario_words(with_depot).splitlines()[3] == (
+        "medical_0: helps with 3 rescues, then it goes to a depot"
+    )
+
+
 def test_what_is_doubtful() -> None:
     scenario = Scenario.model_validate(
         {

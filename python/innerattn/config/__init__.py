@@ -10,7 +10,7 @@ from innerattn.lazy import lazy_names
 
 if TYPE_CHECKING:
     from innerattn.config.algorithm import Algorithm, AlgorithmConfig
-    from innerattn.config.battery import Battery, Station
+    from innerattn.config.battery import Battery, Depot, Station
     from innerattn.config.load import load_run_config, read_toml, write_toml
     from innerattn.config.ppo import PPOConfig
     from innerattn.config.registry import register_algorithm, register_attention
@@ -32,6 +32,7 @@ __all__ = [
     "AlgorithmConfig",
     "Arrival",
     "Battery",
+    "Depot",
     "EvaluateConfig",
     "Fault",
     "ImitationConfig",
@@ -61,6 +62,7 @@ __getattr__ = lazy_names(
         "Arrival": "task",
         "BUDGETS": "run",
         "Battery": "battery",
+        "Depot": "battery",
         "EvaluateConfig": "sections",
         "Fault": "scenario",
         "ImitationConfig": "sections",

@@ -1,4 +1,4 @@
-"""Batteries of robots, and the stations that charge them."""
+"""What robots use up: their batteries and loads, and the stations and depots that fill these."""
 
 from __future__ import annotations
 
@@ -37,13 +37,26 @@ class Station(Model):
     )
 
 
-def refuse_batteries(scenario: Scenario, why: str) -> None:
-    """Refuse a team with batteries, for what cannot bear one.
+class Depot(Model):
+    """A place that refills the loads of the robots that stand on it; nothing touches it."""
+
+    position_m: tuple[float, float] = Field(description="its centre, inside the walls [m]")
+    radius_m: Annotated[float, Told(0.001, 10.0)] = Field(
+        0.15, description="how near to it the centre of a robot must be [m]"
+    )
+
+
+def refuse_stores(scenario: Scenario, who: str) -> None:
+    """Refuse a team with batteries or loads, for policies (``who``) that know neither.
 
     Raises:
-        ConfigError: a robot has a battery; the message ends with ``why``.
+        ConfigError: a robot has a battery or a load.
     """
     for index, robot in enumerate(scenario.robots):
+        key = f"scenario.robots[{index}]"
         if robot.battery is not None:
-            found = f"scenario.robots[{index}].battery.capacity_j = {robot.battery.capacity_j:g}"
-            raise ConfigError(f"{found}: there must be no battery; {why}")
+            found = f"{key}.battery.capacity_j = {robot.battery.capacity_j:g}"
+            raise ConfigError(f"{found}: there must be no battery; {who} see no charges")
+        if robot.load is not None:
+            found = f"{key}.load = {robot.load}"
+            raise ConfigError(f"{found}: there must be no load; {who} see no loads")

@@ -15,7 +15,7 @@ from pydantic import Field, PrivateAttr, ValidationError, field_validator
 
 from innerattn import _core
 from innerattn.config.amounts import Amounts, list_or_table
-from innerattn.config.battery import Battery, Station
+from innerattn.config.battery import Battery, Depot, Station
 from innerattn.config.files import preset_names, preset_table, toml_table
 from innerattn.config.model import ADDED_LATER, Model, Told, config_error
 from innerattn.config.near import did_you_mean
@@ -56,6 +56,10 @@ class Robot(Model):
         None,
         description="its battery, such as { capacity_j = 100.0, per_m_j = 20.0, idle_w = 1.0 }; "
         "None: it needs no energy",
+    )
+    load: Annotated[Count | None, ADDED_LATER, Told(1, 1_000)] = Field(
+        None,
+        description="how many rescues it can help with before a depot refills it; None: any number",
     )
 
     _check_abilities = field_validator("abilities", mode="before")(list_or_table)
@@ -197,6 +201,9 @@ class Scenario(Model, Shown):
     )
     stations: Annotated[tuple[Station, ...], ADDED_LATER, Told(0, 64)] = Field(
         (), description="places that charge batteries"
+    )
+    depots: Annotated[tuple[Depot, ...], ADDED_LATER, Told(0, 64)] = Field(
+        (), description="places that refill loads"
     )
     arena_half_width_m: Annotated[float, Told(0.2, 100.0)] = Field(
         1.0, description="half the side of the square arena [m]"
@@ -373,6 +380,11 @@ class Scenario(Model, Shown):
     def has_batteries(self) -> bool:
         """Whether some robots have a battery."""
         return any(robot.battery is not None for robot in self.robots)
+
+    @property
+    def has_loads(self) -> bool:
+        """Whether some robots can help with so many rescues alone before a depot refills them."""
+        return any(robot.load is not None for robot in self.robots)
 
     @property
     def robots_leave(self) -> bool:

@@ -189,6 +189,13 @@ class BatchEnv(Shown):
         """
         return self._core.charge()
 
+    def load(self) -> NDArray[np.float32]:
+        """Loads of the robots, (E, R) float32, shares of their full load.
+
+        It is 1 for a robot without a load. At 0 a robot drives, but does not help.
+        """
+        return self._core.load()
+
     def obstacles(self) -> NDArray[np.float32]:
         """Centres of the obstacles in scenario order, (E, O, 2) float32, m."""
         return self._core.obstacles()
@@ -239,7 +246,7 @@ class BatchEnv(Shown):
         """The whole of each world, (E, S) float32, world frame, for centralised critics.
 
         Columns are `state_names`: for each robot x, y [m] and x, y velocity [m/s], and its charge
-        as a share where some robots have a battery; for each victim
+        and load as shares where some robots have a battery and a load; for each victim
         slot one column per task (1 where such a victim is present), x, y [m], and where the
         scenario has them the share of its service that it has had, the time that it has left as a
         share of the longest deadline, and 1 if it has to wait for others; for each obstacle x, y
@@ -253,6 +260,7 @@ class BatchEnv(Shown):
             self.step_counts(),
             self.scenario,
             self.charge(),
+            self.load(),
         )
 
     def state_names(self) -> list[str]:

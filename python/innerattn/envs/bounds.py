@@ -45,7 +45,7 @@ def state_bounds(scenario: Scenario) -> Bounds:
     columns: list[Range] = []
     for speed in _most_speeds(scenario):
         columns += [place, place, _both_ways(speed), _both_ways(speed)]
-        columns += [_FLAG] * scenario.has_batteries
+        columns += [_FLAG] * (scenario.has_batteries + scenario.has_loads)
     for _ in range(scenario.num_victims):
         columns += [_FLAG] * len(scenario.tasks) + [place, place]
         columns += [_FLAG] * _columns_by_choice(scenario)
@@ -67,9 +67,10 @@ def _observation_columns(scenario: Scenario, own: int, speeds: list[float]) -> I
         yield _FLAG  # availability
         if scenario.observe_faults:
             yield from (bounds for kind, bounds in _FAULT_RANGES.items() if kind != "unavailable")
-        yield from [_FLAG] * scenario.has_batteries
-        if robot == own and scenario.stations:
-            yield from [_both_ways(2 * half + far)] * 2
+        yield from [_FLAG] * (scenario.has_batteries + scenario.has_loads)
+        if robot == own:
+            spots = bool(scenario.stations) + bool(scenario.depots)
+            yield from [_both_ways(2 * half + far)] * (2 * spots)
     for _ in range(scenario.num_victims):
         yield _FLAG
         for ability in abilities:

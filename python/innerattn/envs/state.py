@@ -19,6 +19,7 @@ def state_names(scenario: Scenario) -> list[str]:
         for quantity in (
             *("position.x", "position.y", "velocity.x", "velocity.y"),
             *["charge"] * scenario.has_batteries,
+            *["load"] * scenario.has_loads,
         )
     ]
     columns = [*(f"task.{task.name}" for task in scenario.tasks), "position.x", "position.y"]
@@ -43,6 +44,7 @@ def world_states(
     step_counts: NDArray[np.int64],
     scenario: Scenario,
     charge: NDArray[np.float32],
+    load: NDArray[np.float32],
 ) -> NDArray[np.float32]:
     """The states of E worlds.
 
@@ -54,6 +56,7 @@ def world_states(
         step_counts: (E,) steps done in the episodes.
         scenario: the worlds' description.
         charge: (E, R) charges of the robots, shares.
+        load: (E, R) loads of the robots, shares.
 
     Returns:
         (E, S) float32, columns `state_names`.
@@ -69,9 +72,9 @@ def world_states(
         times.append((left * present)[..., None])
     if scenario.has_order:
         times.append(victims["blocked"][..., None])
-    charges = [charge[..., None]] * scenario.has_batteries
+    stores = [charge[..., None]] * scenario.has_batteries + [load[..., None]] * scenario.has_loads
     parts = [
-        np.concatenate([positions, velocities, *charges], axis=2),
+        np.concatenate([positions, velocities, *stores], axis=2),
         np.concatenate([is_task & present[..., None], places, *times], axis=2),
         obstacles,
     ]

@@ -21,6 +21,7 @@ class WorldState(NamedTuple):
         faults: (E, R) structured, the fields of `BatchEnv.fault_state`.
         step_counts: (E,) int64 steps done in the episodes; deadlines are counted in them.
         charge: (E, R) float32 charges as shares; None where no robot has a battery.
+        load: (E, R) float32 loads as shares; None where no robot has one.
     """
 
     positions: NDArray[np.float32]
@@ -29,6 +30,7 @@ class WorldState(NamedTuple):
     faults: NDArray[np.void]
     step_counts: NDArray[np.int64]
     charge: NDArray[np.float32] | None = None
+    load: NDArray[np.float32] | None = None
 
     @classmethod
     def of(cls, env: BatchEnv) -> Self:
@@ -40,6 +42,7 @@ class WorldState(NamedTuple):
             env.fault_state(),
             env.step_counts(),
             env.charge() if env.scenario.has_batteries else None,
+            env.load() if env.scenario.has_loads else None,
         )
 
 

@@ -22,10 +22,10 @@ _WHAT = {
 
 
 def scenario_words(scenario: Scenario) -> str:
-    """Sentences, a line each: tasks and who can do them, batteries, doubts, and the faults."""
+    """Sentences, a line each: tasks and who can do them, batteries, loads, doubts, the faults."""
     faults = map(_fault, scenario.faults)
     gone = ["Robots that are out are not in the arena."] if scenario.robots_leave else []
-    return "\n".join([*_tasks(scenario), *_batteries(scenario), *_doubts(scenario), *faults, *gone])
+    return "\n".join([*_tasks(scenario), *_stores(scenario), *_doubts(scenario), *faults, *gone])
 
 
 def _tasks(scenario: Scenario) -> Iterator[str]:
@@ -63,10 +63,14 @@ def _times(task: Task) -> str:
     return words
 
 
-def _batteries(scenario: Scenario) -> Iterator[str]:
+def _stores(scenario: Scenario) -> Iterator[str]:
+    until = "it goes to a depot" if scenario.depots else "with none: there is no depot"
     for robot in scenario.robots:
         if robot.battery is not None:
             yield f"{robot.name}: drives {_reach_m(robot):.3g} m with a full battery"
+        if robot.load is not None:
+            rescues = "1 rescue" if robot.load == 1 else f"{robot.load} rescues"
+            yield f"{robot.name}: helps with {rescues}, then {until}"
 
 
 def _reach_m(robot: Robot) -> float:

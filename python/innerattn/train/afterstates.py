@@ -29,5 +29,5 @@ def afterstates(
     victims["present"] &= ~new[worlds]
     moving = env.positions()[worlds], env.velocities()[worlds]
     others = env.obstacles()[worlds], env.step_counts()[worlds]
-    charge = env.charge()[worlds]
-    return worlds, world_states(*moving, victims, *others, env.scenario, charge)
+    stores = env.charge()[worlds], env.load()[worlds]
+    return worlds, world_states(*moving, victims, *others, env.scenario, *stores)

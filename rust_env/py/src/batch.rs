@@ -178,14 +178,13 @@ impl Batch {
     }
 
     fn charge<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let (rules, envs) = (self.worlds.rules(), self.worlds.num_envs());
-        let robots = rules.team.len();
-        let of = |world: &'_ World| {
-            let share = |robot| rules.energy.as_ref().map_or(1.0, |one| one.share(robot, &world.charges));
-            (0..robots).map(share).collect::<Vec<_>>()
-        };
-        let shares = gather(envs * robots, self.worlds.worlds().flat_map(of))?;
-        shares.into_pyarray(py).reshape([envs, robots])
+        let energy = self.worlds.rules().energy.as_ref();
+        self.shares(py, |world, robot| energy.map_or(1.0, |one| one.share(robot, &world.charges)))
+    }
+
+    fn load<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let supplies = self.worlds.rules().supplies.as_ref();
+        self.shares(py, |world, robot| supplies.map_or(1.0, |one| one.share(robot, &world.loads)))
     }
 
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
@@ -323,6 +322,17 @@ impl Batch {
     fn mask(&self, mask: Option<Bound<PyAny>>) -> PyResult<Option<Vec<bool>>> {
         let shape = [self.worlds.num_envs()];
         mask.map(|mask| Door::flags("mask", &shape).read_flags(&mask)).transpose()
+    }
+
+    /// A number of each robot, (E, R).
+    fn shares<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&World, usize) -> f32,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let shape = [self.worlds.num_envs(), self.worlds.rules().team.len()];
+        let of = |world| (0..shape[1]).map(|robot| of(world, robot)).collect::<Vec<_>>();
+        gather(shape.iter().product(), self.worlds.worlds().flat_map(of))?.into_pyarray(py).reshape(shape)
     }
 
     fn vectors<'py>(

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::check::{broken, counts, within};
-use super::{MAX_STATIONS, Obstacle, Robot, Scenario, Shape, Situation};
+use super::check::{broken, within};
+use super::spot::default_radius_m;
+use super::{Robot, Scenario, Situation};
 use crate::error::Result;
 
 /// Largest capacity of a battery, J.
@@ -38,10 +39,6 @@ pub struct Station {
     pub recharge_w: f64,
 }
 
-fn default_radius_m() -> f64 {
-    0.15
-}
-
 impl Scenario {
     /// Whether some robots have a battery.
     #[must_use]
@@ -54,15 +51,11 @@ impl Scenario {
         for index in 0..self.robots.len() {
             self.validate_battery(index)?;
         }
-        counts("stations (their number)", self.stations.len(), 0, MAX_STATIONS)?;
-        if !self.stations.is_empty() && !self.has_batteries() {
-            return broken(
-                "stations (their number)",
-                &self.stations.len(),
-                "must be 0: no robot has a battery",
-            );
+        for (index, station) in self.stations.iter().enumerate() {
+            within(&format!("stations[{index}].recharge_w"), station.recharge_w, 1e-3, MAX_RATE, "W")?;
         }
-        (0..self.stations.len()).try_for_each(|index| self.validate_station(index))
+        let spots: Vec<_> = self.stations.iter().map(|one| (one.position_m, one.radius_m)).collect();
+        self.validate_spots("stations", &spots, |robot| robot.battery.is_some(), "battery")
     }
 
     fn validate_battery(&self, index: usize) -> Result<()> {
@@ -109,39 +102,5 @@ impl Scenario {
             _ => self.spawn_clearance_m,
         };
         (nearest - self.rescue_radius_m).max(0.0)
-    }
-
-    fn validate_station(&self, index: usize) -> Result<()> {
-        let Station { position_m, radius_m, recharge_w } = self.stations[index];
-        let key = |name: &str| format!("stations[{index}].{name}");
-        let half = self.arena_half_width_m;
-        for (axis, value) in position_m.iter().enumerate() {
-            within(&key(&format!("position_m[{axis}]")), *value, -half, half, "m")?;
-        }
-        within(&key("radius_m"), radius_m, 0.001, 10.0, "m")?;
-        within(&key("recharge_w"), recharge_w, 1e-3, MAX_RATE, "W")?;
-        let value = format!("{position_m:?}");
-        if let Some(obstacle) = self.obstacles.iter().position(|one| holds(one, position_m)) {
-            return broken(&key("position_m"), &value, &format!("is inside obstacles[{obstacle}]"));
-        }
-        let powered = self.robots.iter().filter(|robot| robot.battery.is_some());
-        let smallest = powered.map(|robot| robot.radius_m).fold(f64::INFINITY, f64::min);
-        let beyond = |at: f64| (at.abs() - (half - smallest)).max(0.0);
-        if beyond(position_m[0]).hypot(beyond(position_m[1])) > radius_m {
-            let rule =
-                "is farther than radius_m from where robots with a battery can be; walls keep them off";
-            return broken(&key("position_m"), &value, rule);
-        }
-        Ok(())
-    }
-}
-
-/// Whether an obstacle with a given place covers a point.
-fn holds(obstacle: &Obstacle, at: [f64; 2]) -> bool {
-    let Some([x, y]) = obstacle.position_m else { return false };
-    let (x, y) = ((at[0] - x).abs(), (at[1] - y).abs());
-    match obstacle.shape {
-        Shape::Disc => obstacle.radius_m.is_some_and(|radius| x.hypot(y) < radius),
-        Shape::Box => obstacle.half_extents_m.is_some_and(|[wide, high]| x < wide && y < high),
     }
 }

@@ -25,7 +25,8 @@ impl Scenario {
         self.validate_starts()?;
         self.validate_victim_places()?;
         self.validate_arrivals()?;
-        self.validate_batteries()
+        self.validate_batteries()?;
+        self.validate_loads()
     }
 
     fn validate_numbers(&self) -> Result<()> {

@@ -109,9 +109,12 @@ fn an_image_from_before_a_key_was_added_is_taken() {
     let keys = r#","after":[],"arrival_rate_hz":0.0"#;
     let older = older.replace(keys, "").replace(r#","arrivals":[]"#, "");
     let older = older.replace(r#","battery":null"#, "").replace(r#","stations":[]"#, "");
+    let older = older.replace(r#","load":null"#, "").replace(r#","depots":[]"#, "");
     for key in [
         "battery",
         "stations",
+        "load",
+        "depots",
         "arriv",
         "after",
         "victim_places_m",
@@ -159,6 +162,25 @@ fn services_and_losses_are_kept_and_checked() {
         change(&mut forged);
         let error = load(&rules, 1, &bytes(&forged)).expect_err("a forged image").to_string();
         assert_eq!(error, format!("snapshot: env 0 does not fit the scenario: its {what}"));
+    }
+}
+
+#[test]
+fn loads_are_kept_and_checked() {
+    let mut scenario = Scenario::default();
+    scenario.robots[1].load = Some(3);
+    let rules = rules(scenario);
+    let bytes = |loads: &[u32]| {
+        let mut world = World::new(&rules, 5, 7);
+        world.loads = loads.to_vec();
+        save(&rules, 1, [world].iter())
+    };
+    let back = load(&rules, 1, &bytes(&[0, 2, 0, 0])).expect("a state of these rules");
+    assert_eq!(back[0].loads, [0, 2, 0, 0]);
+    assert!(bytes(&[0, 2, 0, 0]).len() <= most_bytes(&rules, 1));
+    for loads in [[0, 4, 0, 0].as_slice(), &[1, 3, 0, 0], &[0, 3, 0], &[0, 3, 0, 0, 0]] {
+        let error = load(&rules, 1, &bytes(loads)).expect_err("forged loads").to_string();
+        assert_eq!(error, "snapshot: env 0 does not fit the scenario: its loads");
     }
 }
 

@@ -9,8 +9,8 @@ use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
-    Abilities, Actions, Arrival, Battery, Deadline, Engine, Interrupted, Obstacle, Robot, Scenario, Shape,
-    Situation, Station, Unavailable,
+    Abilities, Actions, Arrival, Battery, Deadline, Depot, Engine, Interrupted, Obstacle, Robot, Scenario,
+    Shape, Situation, Station, Unavailable,
 };
 use innerattn_env::tasks::{Loss, Rescue};
 
@@ -224,6 +224,15 @@ pub fn with_batteries(mut scenario: Scenario) -> Scenario {
     }
     let station = |x: f64, recharge_w| Station { position_m: [x, -0.2], radius_m: 0.2, recharge_w };
     Scenario { stations: vec![station(-0.3, 20.0), station(0.3, 4.0)], rescue_radius_m: 0.4, ..scenario }
+}
+
+/// The same with loads of one to three rescues, and two depots; one robot never runs out.
+pub fn with_loads(mut scenario: Scenario) -> Scenario {
+    for (robot, load) in scenario.robots[1..].iter_mut().zip([1, 2, 3].into_iter().cycle()) {
+        robot.load = Some(load);
+    }
+    let depot = |y| Depot { position_m: [0.2, y], radius_m: 0.15 };
+    Scenario { depots: vec![depot(-0.3), depot(0.3)], rescue_radius_m: 0.4, ..scenario }
 }
 
 /// A disc at a random place, a box at a random place, and a box that stays.

@@ -80,6 +80,7 @@ fn extreme(source: &mut Stream) -> Scenario {
             drive_force_n: scaled(source, 0.001, 1e5),
             start_m: None,
             battery: None,
+            load: None,
         })
         .collect();
     if engine == Engine::Rapier {

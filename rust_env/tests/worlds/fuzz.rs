@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
-    with_amounts, with_arrivals, with_batteries, with_leaving, with_list, with_order, with_times,
+    with_amounts, with_arrivals, with_batteries, with_leaving, with_list, with_loads, with_order, with_times,
 };
 
 const ENVS: usize = 2;
@@ -57,6 +57,7 @@ fn scenarios() -> Vec<Scenario> {
             with_list(Scenario { engine, ..tight.clone() }),
             with_leaving(Scenario { engine, ..tight.clone() }),
             with_batteries(Scenario { engine, ..tight.clone() }),
+            with_loads(Scenario { engine, ..tight.clone() }),
         ]
     };
     ENGINES.into_iter().flat_map(with).collect()

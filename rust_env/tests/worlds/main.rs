@@ -15,6 +15,7 @@ mod extremes;
 mod faults;
 mod fuzz;
 mod leaving;
+mod loads;
 mod order;
 mod snapshot;
 mod speed;

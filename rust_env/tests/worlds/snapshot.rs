@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use crate::common::{
     Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_amounts,
-    with_arrivals, with_batteries, with_leaving, with_list, with_order, with_times,
+    with_arrivals, with_batteries, with_leaving, with_list, with_loads, with_order, with_times,
 };
 
 const ENVS: usize = 6;
@@ -33,6 +33,8 @@ fn scenarios() -> Vec<Scenario> {
         with_leaving(tight.clone()),
         with_batteries(with_leaving(tight.clone())),
         with_batteries(tight.clone()),
+        with_loads(with_leaving(tight.clone())),
+        with_loads(with_batteries(tight.clone())),
         with_times(tight),
     ]
 }

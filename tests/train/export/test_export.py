@@ -226,6 +226,16 @@ def test_a_run_without_weights_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "export").exists()
 
 
+def test_a_team_with_loads_is_trained_and_not_exported(tmp_path: Path) -> None:
+    robots = [robot.model_dump() for robot in Scenario().robots]
+    robots[1]["load"] = 2
+    values = {"scenario.robots": robots, "scenario.depots": [{"position_m": [0.5, 0.0]}]}
+    run = make_run(tmp_path / "run", run_config("ppo-inner", **FRAMED, **values))
+    with pytest.raises(ConfigError, match=r"robots\[1\].load = 2: there must be no load; exported"):
+        export_run(run, tmp_path / "export")
+    assert not (tmp_path / "export").exists()
+
+
 def test_a_team_with_batteries_is_trained_and_not_exported(tmp_path: Path) -> None:
     robots = [robot.model_dump() for robot in Scenario().robots]
     robots[1]["battery"] = {"capacity_j": 10.0, "per_m_j": 2.0}
