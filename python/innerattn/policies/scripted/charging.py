@@ -37,7 +37,7 @@ class Charging:
         self._radii = np.array([one.radius_m for one in scenario.stations])
         self._recharge_w = np.array([one.recharge_w for one in scenario.stations])
         self._stations = np.array([one.position_m for one in scenario.stations]).reshape(-1, 2)
-        self._along_axes = scenario.actions == "discrete"
+        self._steering = steering
 
     def within_reach(self, state: WorldState, places: Array) -> NDArray[np.bool_]:
         """Which places robots can drive to and, from there, to the nearest station.
@@ -54,10 +54,10 @@ class Charging:
             (E, R, V) bool.
         """
         charge = self._charge_j(state)[..., None]
-        way = self._way(places[:, None] - state.positions[:, :, None].astype(np.float64))
+        way = self._steering.way(places[:, None] - state.positions[:, :, None].astype(np.float64))
         starts = self._start_j[:, None]
         if len(self._stations):
-            back = self._way(places[:, :, None] - self._stations).min(-1)
+            back = self._steering.way(places[:, :, None] - self._stations).min(-1)
             way, starts = way + back[:, None], 2.0 * starts
         free = ~self._is_charging(state)[..., None]
         return np.asarray((self._per_m[:, None] * way + starts <= charge) & (charge > 0.0) & free)
@@ -66,7 +66,7 @@ class Charging:
         """Which places (E, V, 2) a full battery reaches from their nearest station, (E, R, V)."""
         if not len(self._stations):
             return np.zeros((len(places), len(self._capacity), places.shape[1]), np.bool_)
-        way = 2.0 * self._way(places[:, :, None] - self._stations).min(-1)
+        way = 2.0 * self._steering.way(places[:, :, None] - self._stations).min(-1)
         needed = self._per_m[:, None] * way[:, None] + 2.0 * self._start_j[:, None]
         return np.asarray(needed <= self._capacity[:, None])
 
@@ -81,7 +81,7 @@ class Charging:
         if not len(self._stations):
             return targets
         at = state.positions.astype(np.float64)
-        nearest = self._way(self._stations - at[:, :, None]).argmin(-1)
+        nearest = self._steering.way(self._stations - at[:, :, None]).argmin(-1)
         charges = (chosen < 0) & (self._charge_j(state) < self._capacity) & self._has_battery
         return np.asarray(np.where(charges[..., None], self._stations[nearest], targets))
 
@@ -103,9 +103,3 @@ class Charging:
         if state.charge is None:
             raise ValueError("state.charge = None: must be given where robots have a battery")
         return np.where(self._has_battery, state.charge * self._capacity, np.inf)
-
-    def _way(self, apart: Array) -> Array:
-        """Lengths of ways (..., 2) as robots drive them [m]: with discrete actions along axes."""
-        if self._along_axes:
-            return np.asarray(np.abs(apart).sum(-1))
-        return np.asarray(np.sqrt((apart * apart).sum(-1)))

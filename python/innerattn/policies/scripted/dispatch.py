@@ -19,6 +19,7 @@ from innerattn.policies.policy import Policy, PolicyInput, WorldState
 from innerattn.policies.scripted.assignment import Needs, assign, can_be_rescued, pair_costs
 from innerattn.policies.scripted.charging import Charging
 from innerattn.policies.scripted.coalitions import Coalitions
+from innerattn.policies.scripted.loading import Loading
 from innerattn.policies.scripted.steering import Steering
 from innerattn.policies.scripted.timing import Timing
 
@@ -66,11 +67,13 @@ class _Dispatcher(ABC):
         self._timing = Timing(scenario)
         self._coalitions = Coalitions(scenario)
         self._charging = Charging(scenario, self.steering)
+        self._loading = Loading(scenario, self.steering, self._charging)
 
     def act(self, view: PolicyInput) -> NDArray[Any]:
         """See `Policy.act`; robots without a victim are drawn to the centre.
 
-        Where there are stations, those of them that are not full are drawn to the nearest one.
+        Where there are depots or stations, those of them whose load or battery is not full are
+        drawn to the nearest one, for a load first.
         """
         state = view.known_state
         places = np.stack([state.victims["x"], state.victims["y"]], -1).astype(np.float64)
@@ -79,6 +82,8 @@ class _Dispatcher(ABC):
         targets = np.where(chosen[..., None] >= 0, targets, 0.0)
         if self._charging.is_needed:
             targets = self._charging.targets(state, targets, chosen)
+        if self._loading.is_needed:
+            targets = self._loading.targets(state, targets, chosen)
         faults = self._faults(state)
         return self.steering.actions(state.positions, state.velocities, targets, faults)
 
@@ -104,6 +109,8 @@ class GreedyPolicy(_Dispatcher):
         permitted = self.needs.permitted(state.victims["present"], state.victims["task"])
         if self._charging.is_needed:
             permitted &= self._charging.within_reach(state, places)[..., None]
+        if self._loading.is_needed:
+            permitted &= self._loading.can_help(state)[..., None, None]
         helpful = permitted.any(-1)
         way = places[:, None] - state.positions[:, :, None]
         distance = np.where(helpful, (way * way).sum(-1), np.inf)
@@ -138,6 +145,10 @@ class HungarianPolicy(_Dispatcher):
             reached = self._charging.within_reach(state, places)
             ever = permitted & (reached | self._charging.within_full_reach(places))[..., None]
             permitted &= reached[..., None] & can_be_rescued(ever, needed)[:, None, :, None]
+        if self._loading.is_needed:
+            permitted &= self._loading.can_help(state)[..., None, None]
+            if not (self._loading.has_depots or self._coalitions.is_needed):
+                permitted &= can_be_rescued(permitted, needed)[:, None, :, None]
         times = self.steering.arrival_times(state.positions, state.velocities, places, faults)
         blocked = state.victims["blocked"] if self._timing.has_order else None
         if self._coalitions.is_needed:

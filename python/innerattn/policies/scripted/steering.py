@@ -64,6 +64,12 @@ class Steering:
             self._known = (cases, *found)
         return self._known[1:]
 
+    def way(self, apart: Array) -> Array:
+        """Lengths of ways (..., 2) as robots drive them [m]: with discrete actions along axes."""
+        if self._continuous:
+            return np.asarray(np.sqrt((apart * apart).sum(-1)))
+        return np.asarray(np.abs(apart).sum(-1))
+
     def arrival_times(
         self, positions: Any, velocities: Any, places: Any, faults: NDArray[np.void] | None = None
     ) -> Array:
