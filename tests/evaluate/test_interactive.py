@@ -210,3 +210,15 @@ def test_charges_are_told_where_robots_have_a_battery() -> None:
     assert charge is not None
     assert charge.tolist() == pytest.approx([0.8, 1.0, 1.0, 1.0])
     assert world(plain).moment().charge is None
+
+
+def test_loads_are_told_where_robots_have_one() -> None:
+    plain = Scenario.preset("mixed").replace(rescue_radius_m=3.0)
+    loaded = plain.replace(robots=(plain.robots[0].replace(load=4), *plain.robots[1:]))
+    found = world(loaded)
+    while found.moment().helped[0] < 3:
+        found.step()
+    load = found.moment().load
+    assert load is not None
+    assert load.tolist() == [0.25, 1.0, 1.0, 1.0]
+    assert world(plain).moment().load is None

@@ -142,7 +142,9 @@ def test_without_attention_none_is_recorded_or_reported(tmp_path: Path) -> None:
     assert (summary["policy"], summary["method"]) == ("plain", "mappo")
     assert summary["attention_entropy"] == summary["attention_entropy_share"] == {}
     recorded = read_records(tmp_path / "evaluation")[0]
-    assert list(recorded.steps) == [name for name in FIELDS if name not in ("charge", "attention")]
+    assert list(recorded.steps) == [
+        name for name in FIELDS if name not in ("charge", "load", "attention")
+    ]
 
 
 def test_a_policy_is_not_measured_against_itself() -> None:

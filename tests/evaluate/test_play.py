@@ -35,7 +35,9 @@ def assert_equal(one: Record, other: Record) -> None:
 def test_record_against_a_plain_loop() -> None:
     scenario = Scenario.preset("double").replace(episode_steps=12)
     record = record_of("hungarian", scenario, 6, record=FIELDS)
-    assert list(record.steps) == [name for name in FIELDS if name not in ("charge", "attention")]
+    assert list(record.steps) == [
+        name for name in FIELDS if name not in ("charge", "load", "attention")
+    ]
     policy = scripted_policy("hungarian", scenario)
     env = BatchEnv(scenario, 6, seed=SEED, copy=True)
     obs = env.reset()

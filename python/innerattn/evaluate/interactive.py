@@ -79,6 +79,7 @@ class InteractiveWorld:
             victims=env.victims()[0],
             faults=env.fault_state()[0],
             charge=env.charge()[0] if env.scenario.has_batteries else None,
+            load=env.load()[0] if env.scenario.has_loads else None,
             obstacles=env.obstacles()[0],
             blocked=self._blocked,
             attention=self._attention,

@@ -50,6 +50,7 @@ class Moment:
         victims: (V,) structured, the fields of `BatchEnv.victims`.
         faults: (R,) structured, the fields of `BatchEnv.fault_state`.
         charge: (R,) float32, shares of batteries; none: no robot has one.
+        load: (R,) float32, shares of full loads; none: no robot has one.
         obstacles: (O, 2) float32 [m].
         blocked: (R,) bool, whether something stopped the robot in the last step.
         attention: (H, R, R) float32 for the actions that come next; none: there is none.
@@ -69,6 +70,7 @@ class Moment:
     victims: NDArray[np.void]
     faults: NDArray[np.void]
     charge: NDArray[np.float32] | None
+    load: NDArray[np.float32] | None
     obstacles: NDArray[np.float32]
     blocked: NDArray[np.bool_]
     attention: NDArray[np.float32] | None

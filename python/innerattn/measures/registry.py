@@ -15,6 +15,7 @@ from innerattn.measures import (
     dispatch_quality,
     energy,
     helpers,
+    loads,
     rescues,
     waiting,
 )
@@ -34,6 +35,7 @@ _BUILT_IN = (
     *arrivals.MEASURES,
     *helpers.MEASURES,
     *energy.MEASURES,
+    *loads.MEASURES,
 )
 
 

@@ -100,8 +100,9 @@ def _ranges(record: Record) -> Iterator[tuple[str, NDArray[Any], float, float]]:
             yield name, steps[name], -size, size
     if "attention" in steps:
         yield "attention", steps["attention"], -_ROUNDING, 1.0 + _ROUNDING
-    if "charge" in steps:
-        yield "charge", steps["charge"], 0.0, 1.0
+    for name in ("charge", "load"):
+        if name in steps:
+            yield name, steps[name], 0.0, 1.0
     if "actions" in steps:
         low, high = (-1, 1) if scenario.actions == "continuous" else (0, NUM_DISCRETE_ACTIONS - 1)
         yield "actions", steps["actions"], low, high

@@ -31,6 +31,7 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
                 "amounts": robot.abilities if isinstance(robot.abilities, dict) else {},
                 "radius_m": robot.radius_m,
                 "has_battery": robot.battery is not None,
+                "load": robot.load,
             }
             for robot in scenario.robots
         ],
@@ -40,6 +41,9 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
         ],
         "stations": [
             {"position_m": one.position_m, "radius_m": one.radius_m} for one in scenario.stations
+        ],
+        "depots": [
+            {"position_m": one.position_m, "radius_m": one.radius_m} for one in scenario.depots
         ],
         "obstacles": [
             {"radius_m": one.radius_m, "half_extents_m": one.half_extents_m}

@@ -160,6 +160,28 @@ def test_charges_of_batteries_are_shown(browser: Browser, tmp_path: Path) -> Non
         assert "battery empty" in notes.nth(0).inner_text()
 
 
+def test_loads_are_shown(browser: Browser, tmp_path: Path) -> None:
+    plain = Scenario.preset("mixed").replace(rescue_radius_m=3.0)
+    depots = [{"position_m": (0.9, 0.9), "radius_m": 0.1}]
+    robots = (plain.robots[0].replace(load=3), *plain.robots[1:])
+    record = watched(plain.replace(robots=robots, depots=depots), episodes=1)
+    used_up = int((record.steps["load"][0, :, 0] == 0.0).argmax())
+    assert 0 < used_up < record.lengths[0]
+    with visit(browser, written(tmp_path, {"a": record})) as seen:
+        page = seen.page
+        ready(page)
+        notes = page.locator("#robots button")
+        slider = page.get_by_role("slider", name="Step")
+        slider.fill("0")
+        assert "load 3 of 3" in notes.nth(0).inner_text()
+        assert "load" not in notes.nth(1).inner_text()
+        slider.fill(str(used_up - 1))
+        assert "load 1 of 3" in notes.nth(0).inner_text()
+        slider.fill(str(used_up))
+        assert "load used up" in notes.nth(0).inner_text()
+        assert "a depot that refills loads" in (page.locator("body").text_content() or "")
+
+
 def test_attention_that_a_robot_receives(browser: Browser, tmp_path: Path) -> None:
     faults = [{"robot": "medical_0", "kind": "unavailable", "value": 1.0, "onset_step": 3}]
     record = watched(Scenario.preset("mixed").replace(faults=faults), episodes=1)

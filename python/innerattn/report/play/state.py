@@ -43,6 +43,7 @@ def state_document(moment: Moment) -> dict[str, Any]:
         "blocked": moment.blocked.tolist(),
         "faults": [_wrong(robot) for robot in moment.faults],
         "charge": None if moment.charge is None else np.round(moment.charge, _DECIMALS).tolist(),
+        "load": None if moment.load is None else np.round(moment.load, _DECIMALS).tolist(),
         "victims": [
             {"slot": slot, "id": int(one["id"]), "task": int(one["task"])}
             | _times(one)

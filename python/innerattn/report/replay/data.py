@@ -169,6 +169,9 @@ def _run(record: Record, name: str, arrays: _Arrays) -> dict[str, Any]:
     if "charge" in kept:
         charge = np.ceil(255 * kept["charge"])  # only an empty battery is 0
         found["charge"] = arrays.add(charge.astype(np.uint8))
+    if "load" in kept:
+        full = np.array([robot.load or 0 for robot in record.scenario.robots])
+        found["load"] = arrays.add(np.rint(kept["load"] * full).astype(np.int16))
     if "attention" in kept and record.scenario.num_robots > 1:
         found["attention"] = arrays.add(_quantised(kept["attention"], 1 / 255, "uint8"))
     if "rewards" in kept:

@@ -35,6 +35,12 @@ function drawGround(scene) {
     const [atX, atY] = scene.at(x - size, y + size);
     context.strokeRect(atX, atY, 2 * size * scale, 2 * size * scale);
   }
+  for (const { position_m: [x, y], radius_m: size } of worlds.depots ?? []) {
+    context.beginPath();
+    for (const [dx, dy] of [[size, 0], [0, size], [-size, 0], [0, -size]]) context.lineTo(...scene.at(x + dx, y + dy));
+    context.closePath();
+    context.stroke();
+  }
   worlds.obstacles.forEach((shape, index) => drawObstacle(scene, shape, index));
   context.strokeStyle = paint.wall;
   context.lineWidth = 3;

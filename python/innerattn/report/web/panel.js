@@ -22,9 +22,12 @@ class RobotList {
       if (run.isBlocked(episode, step, index)) faults.push("blocked");
       const charge = run.charge(episode, step, index);
       if (robot.has_battery && charge === 0) faults.push("battery empty");
+      const load = run.load(episode, step, index);
+      if (robot.load && load === 0) faults.push("load used up");
       note.className = faults.length ? "bad" : "";
       const parts = faults.length ? faults : [`offers ${listed(withAmounts(robot.abilities, robot.amounts))}`];
       if (robot.has_battery && charge > 0) parts.push(`battery ${percent(charge)}`);
+      if (robot.load && load > 0) parts.push(`load ${load} of ${robot.load}`);
       if (run.attention && look.robot >= 0 && index !== look.robot) {
         const weight = percent(chosenWeight(run, episode, step, look, index)), { name } = this.worlds.robots[look.robot];
         parts.push(look.received ? `gives ${name} ${weight}` : `${weight} of ${name}'s attention`);
@@ -121,6 +124,9 @@ function fillLegend(list, worlds) {
   }
   if ((worlds.stations ?? []).length) {
     row(symbol(svg("rect", { x: -7, y: -7, width: 14, height: 14, fill: "none", stroke: "var(--quiet)" })), "square: a station that charges batteries");
+  }
+  if ((worlds.depots ?? []).length) {
+    row(symbol(svg("path", { d: "M0 -9L9 0L0 9L-9 0Z", fill: "none", stroke: "var(--quiet)" })), "diamond: a depot that refills loads");
   }
   if (worlds.has_deadlines) {
     row(symbol(eventMark("lost", 0, 0)), "a victim is lost; seconds below a victim: until it is");

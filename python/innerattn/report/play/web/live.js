@@ -144,6 +144,10 @@ class LiveRun {
     return this.now.charge?.[robot] ?? 1;
   }
 
+  load(episode, step, robot) {
+    return Math.round((this.now.load?.[robot] ?? 1) * this.worlds.robots[robot].load);
+  }
+
   isAway(episode, step, robot) {
     return this.now.faults[robot].unavailable >= 1;
   }

@@ -47,6 +47,7 @@ class Run {
     this.shares = described.served ? view(buffer, described.served) : null;
     this.waiting = described.waits ? view(buffer, described.waits) : null;
     this.charges = described.charge ? view(buffer, described.charge) : null;
+    this.loads = described.load ? view(buffer, described.load) : null;
     this.slots = (described.served ?? described.waits)?.shape[2] ?? 0;
     this.victims = lists(described.victims, ([, id, task, from, to, x, y, slot, deadline]) => (
       { id, task, from, to, x: x * worlds.unit, y: y * worlds.unit, slot, deadline }
@@ -130,6 +131,13 @@ class Run {
     if (!this.charges) return 1;
     const at = Math.min(Math.floor(step), this.lengths[episode] - 1);
     return this.charges[(episode * this.steps + at) * this.size + robot] / 255;
+  }
+
+  /** How many rescues more a robot can help with; 0 of all where there are no loads. */
+  load(episode, step, robot) {
+    if (!this.loads) return 0;
+    const at = Math.min(Math.floor(step), this.lengths[episode] - 1);
+    return this.loads[(episode * this.steps + at) * this.size + robot];
   }
 
   isAway(episode, step, robot) {
