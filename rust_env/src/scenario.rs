@@ -242,6 +242,8 @@ pub struct Scenario {
     pub episode_steps: u32,
     /// Terminates the episode after so many rescues; never if absent.
     pub end_when_rescued: Option<u32>,
+    /// Terminates the episode when all victims of the list have come and gone.
+    pub end_when_done: bool,
     /// Control period, s.
     pub dt_s: f64,
     /// Physics substeps of a control period.
@@ -317,6 +319,7 @@ impl Default for Scenario {
             victim_places_m: vec![],
             episode_steps: 25,
             end_when_rescued: None,
+            end_when_done: false,
             dt_s: 0.1,
             substeps: 6,
             damping: 0.25,

@@ -179,7 +179,9 @@ fn misfit(rules: &Rules, world: &World) -> Option<&'static str> {
     let (scenario, slots) = (&rules.scenario, rules.scenario.num_victims() as u64);
     let turns = u64::from(world.step) + 1;
     let time_is_up = world.step >= scenario.episode_steps;
-    let goal_is_reached = scenario.end_when_rescued.is_some_and(|goal| world.rescued >= goal);
+    let must_be_over = time_is_up || world.goal_is_reached(rules);
+    // Callers may let victims appear in a world that is done; it stays over.
+    let is_over = must_be_over || world.over && world.may_be_done(rules);
     let present = world.victims.iter().flatten().count() as u64;
     let (arena, robots) = (scenario.arena_half_width_m as f32, rules.team.len());
     let within = |vectors: &[Vec2], most: f32| {
@@ -191,7 +193,7 @@ fn misfit(rules: &Rules, world: &World) -> Option<&'static str> {
     let checks = [
         ("episode", world.episode < MOST_EPISODES),
         ("step", world.step <= scenario.episode_steps),
-        ("over", world.over == (time_is_up || goal_is_reached)),
+        ("over", world.over == is_over),
         ("fresh", !world.fresh || (world.episode == 0 && world.step == 0)),
         ("rescued", u64::from(world.rescued) <= slots * u64::from(world.step)),
         ("lost", u64::from(world.lost) <= slots * u64::from(world.step)),

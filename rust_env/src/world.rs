@@ -204,7 +204,7 @@ impl World {
         self.come_and_go(rules, absent);
         self.freeze(rules);
         let ending = Ending {
-            terminated: rules.scenario.end_when_rescued.is_some_and(|goal| self.rescued >= goal),
+            terminated: self.goal_is_reached(rules),
             truncated: self.step >= rules.scenario.episode_steps,
         };
         self.over = ending.over();

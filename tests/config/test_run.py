@@ -251,6 +251,7 @@ ADDED_SINCE = {
         "unavailable_robots",
         "stations",
         "depots",
+        "end_when_done",
     ),
     "network": ("swapped_robots", "shared_gradients", "joint_critic", "symmetry"),
     "train": (

@@ -107,6 +107,11 @@ class Stepper:
         all_of = [one for one in self.scenario.arrivals if one.task == name]
         return [one.position_m for one in all_of if self._periods(one.at_s) == step]
 
+    def is_done(self, state: State) -> Bools:
+        """Whether all victims of the list have come and gone, (E,)."""
+        last = max((self._periods(one.at_s) for one in self.scenario.arrivals), default=0)
+        return np.asarray((state.steps >= last) & ~state.present.any(1))
+
     def charged(self, before: State, after: Array) -> tuple[Array, Bools]:
         """Charges after a step that ends at these places, (E, R), and where rounding might decide
         whether a robot stands at a station or is empty, (E,)."""
@@ -162,25 +167,6 @@ class Stepper:
         factor = np.where(too_fast, most / np.where(too_fast, speed, 1.0), 1.0)
         velocities = velocities * factor[..., None]
         return state.positions + velocities * dt, velocities
-
-    def may_touch(self, state: State, velocities: Array) -> Bools:
-        """Whether anything comes near anything in the period, (E,); errs towards yes."""
-        dt, at = self.scenario.dt_s, state.positions
-        end = at + velocities * dt
-        wall = self.scenario.arena_half_width_m - self.radii
-        there = self.there(state)
-        near = ((np.maximum(abs(at), abs(end)).max(-1) > wall - 1e-4) & there).any(-1)
-        apart = at[:, :, None] - at[:, None]
-        closing = (velocities[:, :, None] - velocities[:, None]) * dt
-        reach = self.radii[:, None] + self.radii + 1e-4 - 10 * np.eye(len(self.radii))
-        both = there[:, :, None] & there[:, None]
-        near |= ((closest(apart, closing) < reach) & both).any((-1, -2))
-        for index, obstacle in enumerate(self.scenario.obstacles):
-            size = obstacle.radius_m or np.hypot(*(obstacle.half_extents_m or (0.0, 0.0)))
-            apart = at - state.obstacles[:, None, index]
-            close = closest(apart, velocities * dt) < self.radii + size + 0.05
-            near |= (close & there).any(-1)
-        return np.asarray(near)
 
     def distances(self, state: State, positions: Array) -> Array:
         """Distances of robots from victims, (E, V, R)."""
@@ -398,11 +384,3 @@ class Stepper:
         if any(task.after for task in self.scenario.tasks):
             found.append(self.waiting(state).astype(np.float64))
         return found
-
-
-def closest(apart: Array, motion: Array) -> Array:
-    """Least distance from the origin on the way from `apart` to `apart + motion`."""
-    length = (motion**2).sum(-1)
-    share = -(apart * motion).sum(-1) / np.where(length > 0, length, 1.0)
-    nearest = apart + np.clip(share, 0.0, 1.0)[..., None] * motion
-    return np.asarray(np.linalg.norm(nearest, axis=-1))

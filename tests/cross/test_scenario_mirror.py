@@ -215,8 +215,9 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         "observe_faults": True,
         "unavailable_robots": "leave",
     }
-    # Friction needs one engine, an area excludes a list of places, and a rate one of arrivals.
-    others = {"engine", "victim_places_m", "arrivals"}
+    # Friction needs one engine, an area excludes a list of places, and a rate one of arrivals
+    # and its end.
+    others = {"engine", "victim_places_m", "arrivals", "end_when_done"}
     assert changed.keys() == Scenario.model_fields.keys() - others
     scenario = Scenario.model_validate(changed)
     default = Scenario()
@@ -228,8 +229,10 @@ def test_every_value_survives_the_way_there_and_back() -> None:
     assert compiled(listed) == Scenario.model_validate(listed).model_dump(mode="json")
     assert compiled(listed)["victim_places_m"] == listed["victim_places_m"]
     arriving = {"situation": "listed", "arrivals": [ARRIVAL, {**ARRIVAL, "task": "task_2"}]}
+    arriving["end_when_done"] = True
     assert compiled(arriving) == Scenario.model_validate(arriving).model_dump(mode="json")
     assert compiled(arriving)["arrivals"] == arriving["arrivals"]
+    assert compiled(arriving)["end_when_done"]
 
 
 def test_models_are_all_mirrored() -> None:

@@ -16,11 +16,12 @@ from teams import (
     with_order,
     with_times,
 )
+from touching import may_touch
+from who_appears import EXACT, check_arrivals, check_victims
 
 from innerattn.config import Scenario, Task
 from innerattn.envs import BatchEnv
 
-EXACT = 1e-6
 CHUNKS = 8
 LEAST = 104_000
 """Transitions of all chunks together, half of which are for `make test-slow`."""
@@ -82,81 +83,6 @@ def random_faults(rng: np.random.Generator, healthy: np.ndarray) -> np.ndarray:
     return faults
 
 
-def check_victims(
-    env: BatchEnv, before: State, after: State, gone: np.ndarray, given: np.ndarray
-) -> int:
-    """Checks who is there after a step in which the victims of `gone` (E, V) were rescued or lost.
-
-    Before it, `given` (E,) victims had appeared in the episode. Returns how many are new.
-    """
-    scenario = env.scenario
-    old, new = before.victims, after.victims
-    stays = old["present"] & ~gone
-    for name in ("id", "task", "appeared_step", "x", "y", "deadline_step"):
-        if name in new.dtype.names:
-            assert (new[name][stays] == old[name][stays]).all()
-    empty = ~stays.any(1) if scenario.situation == "mixed" else (~stays).any(1)
-    assert (new["present"][~empty] == stays[~empty]).all()
-    fresh = new["present"] & ~stays
-    if scenario.has_arrivals:
-        check_arrivals(env, new, stays, env.turned_away())
-    elif scenario.situation == "mixed":
-        size = new["present"][empty].sum(1)
-        assert (size >= 1).all()
-        assert (new["present"][empty] == (np.arange(new.shape[1]) < size[:, None])).all()
-    else:
-        assert new["present"].all()
-    if scenario.situation == "double":
-        assert (new["task"] == np.arange(len(scenario.tasks))).all()
-    assert np.isin(new["task"][new["present"]], np.arange(len(scenario.tasks))).all()
-    envs = np.nonzero(fresh)[0]
-    assert (new["appeared_step"][fresh] == env.step_counts()[envs]).all()
-    # Numbers go on from the last one given, in order of slots, or of a list.
-    order = np.cumsum(fresh, axis=1)[fresh] - 1
-    ids = new["id"][fresh]
-    ids = ids[np.lexsort((ids, envs))] if scenario.arrivals else ids
-    assert (ids == given[envs] + order).all()
-    if scenario.has_deadlines:
-        plain = Stepper(scenario)
-        for victim in new[fresh]:
-            waits = int(victim["deadline_step"] - victim["appeared_step"])
-            low, high = plain.deadline_range(victim["task"]) or (0, 0)
-            assert low <= waits <= high if high else victim["deadline_step"] == -1
-    at = after.places[fresh]
-    assert (abs(at) <= scenario.arena_half_width_m - scenario.wall_clearance_m + EXACT).all()
-    apart = np.linalg.norm(after.positions[envs] - at[:, None], axis=-1)
-    apart = np.where(Stepper(scenario).there(before)[envs], apart, np.inf)
-    assert (apart >= scenario.spawn_clearance_m - EXACT).all() or scenario.arrivals
-    return int(fresh.sum())
-
-
-def check_arrivals(
-    env: BatchEnv, victims: np.ndarray, stays: np.ndarray, turned_away: np.ndarray
-) -> None:
-    """Checks the slots (E, V) of those that arrived, and how many (E,) found none."""
-    scenario, plain_world = env.scenario, Stepper(env.scenario)
-    there, full = victims["present"], np.zeros(len(victims), dtype=bool)
-    without = np.zeros(len(victims), dtype=int)
-    for task, plain in enumerate(scenario.tasks):
-        own = slice(task * scenario.max_victims, (task + 1) * scenario.max_victims)
-        assert (victims["task"][:, own][there[:, own]] == task).all()
-        listed = any(one.task == plain.name for one in scenario.arrivals)
-        full |= there[:, own].all(1) & (plain.arrival_rate_hz > 0 or listed)
-        fresh = there[:, own] & ~stays[:, own]
-        assert not fresh.any() or plain.arrival_rate_hz > 0 or listed
-        # They take the first of the empty slots.
-        empty = np.cumsum(~stays[:, own], axis=1) * ~stays[:, own]
-        assert (fresh == ((empty > 0) & (empty <= fresh.sum(1)[:, None]))).all()
-        for world, step in enumerate(env.step_counts() if listed else ()):
-            due, new = plain_world.due(task, step), victims[world, own][fresh[world]]
-            assert len(new) == min(len(due), int((empty[world] > 0).sum()))
-            places = np.stack([new["x"], new["y"]], -1)
-            np.testing.assert_array_equal(places, np.reshape(due, (-1, 2))[: len(new)].astype("f4"))
-            without[world] += len(due) - len(new)
-    assert full[turned_away > 0].all()
-    assert scenario.situation != "listed" or (turned_away == without).all()
-
-
 def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = False) -> Counter[str]:
     """Steps worlds of one scenario and compares every transition; counts what was seen.
 
@@ -186,7 +112,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         drive = plain.drive(actions)
 
         positions, velocities = plain.fly(before, drive)
-        free = ~plain.may_touch(before, velocities)
+        free = ~may_touch(plain, before, velocities)
         assert_close(after.positions[free], positions[free], "positions")
         assert_close(after.velocities[free], velocities[free], "velocities", scale=3.0)
 
@@ -242,6 +168,9 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
 
         goal = scenario.end_when_rescued
         terminated = rescued >= goal if goal else np.zeros(num_envs, dtype=bool)
+        if scenario.end_when_done:
+            terminated = terminated | plain.is_done(after)
+            seen["done"] += int(plain.is_done(after).sum())
         assert (result.terminated == terminated).all()
         assert (result.truncated == (steps + 1 >= scenario.episode_steps)).all()
 
@@ -391,6 +320,20 @@ def test_worlds_with_loads_are_as_the_plain_stepper_says(chunk: int) -> None:
 
     total = compare_some(rng, changed)
     for what in ("rescues", "appeared", "refilled", "used up"):
+        assert total[what] > 50, (what, total)
+
+
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_that_end_when_all_is_done_are_as_the_plain_stepper_says(chunk: int) -> None:
+    rng = np.random.default_rng(800 + chunk)
+
+    def changed(scenario: Scenario) -> Scenario:
+        scenario = with_times(with_list(scenario, rng), rng)
+        arrivals = scenario.arrivals[: rng.integers(1, 8)]
+        return scenario.replace(arrivals=arrivals, end_when_done=True, episode_steps=60)
+
+    total = compare_some(rng, changed)
+    for what in ("rescues", "appeared", "lost", "done"):
         assert total[what] > 50, (what, total)
 
 

@@ -197,6 +197,8 @@ def test_an_endless_world_ends_at_last_and_goes_on() -> None:
         found.step()
     assert (found.moment().episode, found.moment().step) == (1, 1)
     assert endless(scenario.replace(end_when_rescued=1)).end_when_rescued is None
+    listed = scenario.replace(situation="listed", end_when_done=True)
+    assert not endless(listed).ends_early
 
 
 def test_charges_are_told_where_robots_have_a_battery() -> None:

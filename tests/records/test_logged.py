@@ -24,6 +24,11 @@ def test_where_rescues_end_episodes_all_env_steps_count() -> None:
     assert logged_rescues(config, LINE) == pytest.approx(0.02 * 25)
     assert logged_rescues(config, {"rescues_per_episode": 2.0}) == 2.0  # of an older run
     assert unit_of_rescues(config) == "25 steps"
+    done = load_run_config(
+        overrides={"scenario.situation": "listed", "scenario.end_when_done": True}
+    )
+    assert logged_rescues(done, LINE) == pytest.approx(0.02 * 25)
+    assert unit_of_rescues(done) == "25 steps"
 
 
 def test_scripts_are_counted_in_the_same_way() -> None:

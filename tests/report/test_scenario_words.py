@@ -83,6 +83,18 @@ def test_batteries_have_words() -> None:
     )
 
 
+def test_an_end_when_all_is_done_has_words() -> None:
+    arrivals = [Arrival(at_s=at_s, task="task_1", position_m=(0.5, 0.5)) for at_s in (0.0, 2.0)]
+    made = Scenario().replace(situation="listed", arrivals=arrivals, end_when_done=True)
+    assert scenario_words(made).splitlines()[2:] == [
+        "2 victims in all; an episode ends when each was rescued, lost or turned away"
+    ]
+    late = made.replace(episode_steps=10)
+    assert scenario_words(late).splitlines()[3:] == [
+        "end_when_done: a victim arrives after 2 s, and time is up at 1 s"
+    ]
+
+
 def test_loads_have_words() -> None:
     robots = [robot.model_dump() for robot in Scenario().robots]
     robots[0]["load"], robots[3]["load"] = 1, 3

@@ -231,6 +231,10 @@ class Scenario(Model, Shown):
     end_when_rescued: Annotated[Count | None, Told(1, 1_000_000)] = Field(
         None, description="end an episode after so many rescues; None: never"
     )
+    end_when_done: Annotated[bool, ADDED_LATER] = Field(
+        False,
+        description="end an episode when all victims of arrivals were rescued, lost or turned away",
+    )
     dt_s: Annotated[float, Told(0.001, 1.0)] = Field(0.1, description="control period [s]")
     substeps: Annotated[Count, Told(1, 1_000)] = Field(
         6, description="physics steps per control period"
@@ -395,6 +399,11 @@ class Scenario(Model, Shown):
     def has_arrivals(self) -> bool:
         """Whether victims arrive whatever becomes of others, so that some may find no slot."""
         return self.situation in ("poisson", "listed")
+
+    @property
+    def ends_early(self) -> bool:
+        """Whether an episode may end before its time is up, as its goal is reached."""
+        return self.end_when_rescued is not None or self.end_when_done
 
     @property
     def only_places_m(self) -> tuple[tuple[float, float], ...]:

@@ -29,7 +29,9 @@ HEALTHY = {name: healthy for name, _, _, _, healthy, _ in _core.FAULT_KINDS}
 
 def endless(scenario: Scenario) -> Scenario:
     """The same world, in which an episode goes on until somebody begins another one."""
-    return scenario.replace(episode_steps=LONGEST_EPISODE, end_when_rescued=None)
+    return scenario.replace(
+        episode_steps=LONGEST_EPISODE, end_when_rescued=None, end_when_done=False
+    )
 
 
 class InteractiveWorld:

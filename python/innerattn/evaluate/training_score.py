@@ -39,7 +39,7 @@ def scripted_rescues(config: RunConfig) -> ScriptedRescues:
 def training_rescues(config: RunConfig, script: str, episodes: int, threads: int | None) -> float:
     """Mean rescues of a script in episodes as long as those of a run's training, in such worlds.
 
-    Where rescues end an episode, all are counted over its longest length, as
+    Where reaching a goal ends an episode, all are counted over its longest length, as
     `innerattn.records.logged.logged_rescues` does.
 
     Args:
@@ -51,6 +51,6 @@ def training_rescues(config: RunConfig, script: str, episodes: int, threads: int
     scenario, seed = config.training_scenario, config.train.seed
     policy = scripted_policy(script, scenario, seed)
     record = run_episodes(policy, scenario, episodes, seed, num_threads=threads, purpose="training")
-    if scenario.end_when_rescued is None:
+    if not scenario.ends_early:
         return len(record.rescues) / episodes
     return len(record.rescues) / float(record.lengths.sum()) * scenario.episode_steps

@@ -16,6 +16,7 @@ from innerattn.measures import (
     energy,
     helpers,
     loads,
+    makespan,
     rescues,
     waiting,
 )
@@ -33,6 +34,7 @@ _BUILT_IN = (
     *waiting.MEASURES,
     *deadlines.MEASURES,
     *arrivals.MEASURES,
+    *makespan.MEASURES,
     *helpers.MEASURES,
     *energy.MEASURES,
     *loads.MEASURES,

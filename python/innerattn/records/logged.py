@@ -35,7 +35,7 @@ def logged_lines(data: bytes) -> Iterator[dict[str, Any]]:
 def logged_rescues(config: RunConfig, line: Mapping[str, Any]) -> float | None:
     """Rescues per training episode.
 
-    Where rescues end an episode, the episodes that ended are the lucky ones; all rescues are taken
+    Where a goal ends an episode, the episodes that ended are the lucky ones; all rescues are taken
     then, of as many env-steps of a world as its longest episode has.
 
     Args:
@@ -47,7 +47,7 @@ def logged_rescues(config: RunConfig, line: Mapping[str, Any]) -> float | None:
         episodes that ended.
     """
     rate = line.get("rescues_per_env_step")
-    if config.training_scenario.end_when_rescued is None or rate is None:
+    if not config.training_scenario.ends_early or rate is None:
         found = line["rescues_per_episode"]
         return None if found is None else float(found)
     return float(rate) * config.training_scenario.episode_steps
@@ -71,7 +71,6 @@ def still_rises(rescues: Sequence[float]) -> bool:
 
 
 def unit_of_rescues(config: RunConfig) -> str:
-    """What `logged_rescues` is counted over: "episode", or "N steps" where rescues end episodes."""
+    """What `logged_rescues` is counted over: "episode", or "N steps" where a goal ends episodes."""
     scenario = config.training_scenario
-    ends_early = scenario.end_when_rescued is not None
-    return f"{scenario.episode_steps} steps" if ends_early else "episode"
+    return f"{scenario.episode_steps} steps" if scenario.ends_early else "episode"

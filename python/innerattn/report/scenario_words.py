@@ -25,7 +25,9 @@ def scenario_words(scenario: Scenario) -> str:
     """Sentences, a line each: tasks and who can do them, batteries, loads, doubts, the faults."""
     faults = map(_fault, scenario.faults)
     gone = ["Robots that are out are not in the arena."] if scenario.robots_leave else []
-    return "\n".join([*_tasks(scenario), *_stores(scenario), *_doubts(scenario), *faults, *gone])
+    return "\n".join(
+        [*_tasks(scenario), *_end(scenario), *_stores(scenario), *_doubts(scenario), *faults, *gone]
+    )
 
 
 def _tasks(scenario: Scenario) -> Iterator[str]:
@@ -48,6 +50,14 @@ def _tasks(scenario: Scenario) -> Iterator[str]:
                 number = f"{task.arrival_rate_hz:g} a second"
             arrivals = f"; {number} arrive, at most {scenario.max_victims} wait at once"
         yield f"{task.name}: {' and '.join(helpers)}, {near}{_times(task)}{arrivals}"
+
+
+def _end(scenario: Scenario) -> Iterator[str]:
+    if scenario.end_when_done:
+        yield (
+            f"{len(scenario.arrivals)} victims in all; an episode ends when each was rescued, "
+            "lost or turned away"
+        )
 
 
 def _times(task: Task) -> str:
@@ -98,6 +108,10 @@ def _doubts(scenario: Scenario) -> Iterator[str]:
     for index, station in enumerate(scenario.stations):
         if station.recharge_w <= min(idle):
             yield f"stations[{index}]: gives no more than the {min(idle):g} W that robots there use"
+    last_s = max((one.at_s for one in scenario.arrivals), default=0.0)
+    time_s = scenario.episode_steps * scenario.dt_s
+    if scenario.end_when_done and last_s > time_s:
+        yield f"end_when_done: a victim arrives after {last_s:g} s, and time is up at {time_s:g} s"
     for task in scenario.tasks:
         radii = sorted(
             robot.radius_m for robot in scenario.robots if set(task.needs) & set(robot.abilities)

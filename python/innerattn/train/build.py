@@ -103,7 +103,7 @@ def team_of(config: RunConfig, env: BatchEnv) -> Team:
         action_width=2 if env.continuous else 0,
         state_width=len(env.state_names()) if config.algorithm.needs_afterstates else 0,
         swapped=_swapped(config),
-        terminates=env.scenario.end_when_rescued is not None,
+        terminates=env.scenario.ends_early,
     )
 
 

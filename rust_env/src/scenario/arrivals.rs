@@ -38,6 +38,9 @@ impl Scenario {
         if self.situation != Situation::Listed && !self.arrivals.is_empty() {
             return broken(key, &self.arrivals.len(), "must be 0 but where situation = \"listed\"");
         }
+        if self.situation != Situation::Listed && self.end_when_done {
+            return broken("end_when_done", &true, "must be false but where situation = \"listed\"");
+        }
         let somewhere = self.obstacles.iter().position(|obstacle| obstacle.position_m.is_none());
         if let (Situation::Listed, Some(index)) = (self.situation, somewhere) {
             let rule = "must be given where situation = \"listed\", or it might be where a victim arrives";

@@ -46,6 +46,8 @@ fn numbers_out_of_range_are_named() {
     assert!(refusal(|scenario| scenario.substeps = 0).contains("scenario.substeps = 0: must be in 1..=1000"));
     assert!(refusal(|scenario| scenario.max_victims = 33).contains("must be in 1..=32"));
     assert!(refusal(|scenario| scenario.end_when_rescued = Some(0)).contains("end_when_rescued = 0"));
+    let refused = refusal(|scenario| scenario.end_when_done = true);
+    assert!(refused.contains("end_when_done = true: must be false but where situation = \"listed\""));
     assert!(
         refusal(|scenario| scenario.robots[3].radius_m = f64::INFINITY).contains("robots[3].radius_m = inf")
     );

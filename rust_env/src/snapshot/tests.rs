@@ -1,7 +1,7 @@
 //! Images that were forged, with a right checksum.
 
 use super::*;
-use crate::scenario::{Deadline, Obstacle, Scenario, Shape, Situation};
+use crate::scenario::{Arrival, Deadline, Obstacle, Scenario, Shape, Situation};
 
 fn rules(scenario: Scenario) -> Rules {
     Rules::new(scenario).expect("a valid scenario")
@@ -110,11 +110,13 @@ fn an_image_from_before_a_key_was_added_is_taken() {
     let older = older.replace(keys, "").replace(r#","arrivals":[]"#, "");
     let older = older.replace(r#","battery":null"#, "").replace(r#","stations":[]"#, "");
     let older = older.replace(r#","load":null"#, "").replace(r#","depots":[]"#, "");
+    let older = older.replace(r#","end_when_done":false"#, "");
     for key in [
         "battery",
         "stations",
         "load",
         "depots",
+        "end_when_done",
         "arriv",
         "after",
         "victim_places_m",
@@ -163,6 +165,27 @@ fn services_and_losses_are_kept_and_checked() {
         let error = load(&rules, 1, &bytes(&forged)).expect_err("a forged image").to_string();
         assert_eq!(error, format!("snapshot: env 0 does not fit the scenario: its {what}"));
     }
+}
+
+#[test]
+fn a_world_that_is_done_is_over() {
+    let arrivals = vec![Arrival { at_s: 0.3, task: "task_2".into(), position_m: [0.5, 0.5] }];
+    let rules = rules(Scenario {
+        situation: Situation::Listed,
+        arrivals,
+        end_when_done: true,
+        ..Scenario::default()
+    });
+    let is_taken = |step, over, waits: bool| {
+        let mut world = World::new(&rules, 5, 7);
+        (world.step, world.over, world.fresh) = (step, over, false);
+        (world.appeared, world.rescued) = (u32::from(step >= 3), u32::from(step >= 3 && !waits));
+        world.victims[2] = (step >= 3 && waits).then(|| Victim::new(0, 1, 3, Vec2::new(0.5, 0.5)));
+        load(&rules, 1, &save(&rules, 1, [world].iter())).is_ok()
+    };
+    assert!(is_taken(2, false, false) && !is_taken(2, true, false), "it has not arrived");
+    assert!(is_taken(4, true, false) && !is_taken(4, false, false), "nobody is left");
+    assert!(is_taken(4, false, true) && is_taken(4, true, true), "it waits, or was put there afterwards");
 }
 
 #[test]

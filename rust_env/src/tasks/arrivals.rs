@@ -53,6 +53,12 @@ impl Arrivals {
         let listed = self.listed[earlier..].iter().take_while(move |(then, _)| *then == step);
         random.chain(listed.map(|(_, due)| *due))
     }
+
+    /// Whether all of a list have arrived with the last of `step` steps of an episode.
+    #[must_use]
+    pub fn all_came(&self, step: u32) -> bool {
+        self.listed.last().is_none_or(|(then, _)| *then <= step)
+    }
 }
 
 /// The arrivals of a scenario's list, in order of time.
@@ -161,6 +167,7 @@ mod tests {
         assert_eq!(all[0], [(1, 0.2)]);
         assert_eq!(all[3], [(0, 0.3)]);
         assert_eq!(all[4], [(1, 0.1), (0, 0.4)], "the first step that reaches the time, in the list's order");
+        assert!((0..9).all(|step| arrivals.all_came(step) == (step >= 4)));
         assert!([1, 2, 5, 6, 7, 8].iter().all(|step| all[*step] == empty));
     }
 }

@@ -92,4 +92,18 @@ impl World {
             });
         }
     }
+
+    /// Whether the scenario's goal is reached: enough rescues, or nothing left of its list.
+    #[must_use]
+    pub fn goal_is_reached(&self, rules: &Rules) -> bool {
+        let enough = rules.scenario.end_when_rescued.is_some_and(|goal| self.rescued >= goal);
+        enough || self.may_be_done(rules) && self.victims.iter().all(Option::is_none)
+    }
+
+    /// Whether an episode may end with this step since all of its list have arrived.
+    #[must_use]
+    pub fn may_be_done(&self, rules: &Rules) -> bool {
+        let came = || rules.arrivals.as_ref().is_some_and(|arrivals| arrivals.all_came(self.step));
+        rules.scenario.end_when_done && self.step > 0 && came()
+    }
 }

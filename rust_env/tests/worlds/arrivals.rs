@@ -6,7 +6,7 @@ use innerattn_env::scenario::{Arrival, Scenario, Situation};
 use innerattn_env::tasks::Victim;
 use proptest::prelude::*;
 
-use crate::common::{Table, chance, options, random_drive, with_arrivals, with_times};
+use crate::common::{Table, chance, options, random_drive, with_an_end, with_arrivals, with_times};
 
 const STILL: [f32; 2] = [0.0, 0.0];
 
@@ -167,4 +167,41 @@ proptest! {
             }
         }
     }
+
+    /// An episode ends with the first step after which each of the list was rescued, lost or turned away.
+    #[test]
+    fn an_episode_ends_when_all_is_done(seed in 0..10_000_u64, goal in 0..12_u32, slots in 1..4_usize) {
+        let end_when_rescued = (goal > 0).then_some(goal);
+        let half = Scenario { arena_half_width_m: 0.7, max_victims: slots, ..Scenario::default() };
+        let scenario = Scenario { end_when_rescued, ..with_an_end(half) };
+        let (number, steps) = (scenario.arrivals.len(), scenario.episode_steps);
+        let mut table = Table::new(scenario, options(4, seed));
+        let (mut gone, mut chance) = ([0; 4], chance(seed));
+        for _ in 0..120 {
+            let before: Vec<_> = table.batch.worlds().map(|world| (world.step, world.rescued)).collect();
+            table.step(&(0..16).map(|_| random_drive(&mut chance)).collect::<Vec<_>>());
+            for (env, (step, rescued)) in before.into_iter().enumerate() {
+                let of = |one: u32| usize::from(one as usize == env);
+                let rescues: usize = table.rescues.iter().map(|one| of(one.env)).sum();
+                let losses: usize = table.losses.iter().map(|one| of(one.env)).sum();
+                let turned_away: usize = table.turned_away.iter().map(|one| of(*one)).sum();
+                gone[env] += rescues + losses + turned_away;
+                let enough = end_when_rescued.is_some_and(|goal| rescued + rescues as u32 >= goal);
+                prop_assert_eq!(table.terminated[env], enough || gone[env] == number);
+                prop_assert_eq!(table.truncated[env], step + 1 == steps);
+                if table.terminated[env] || table.truncated[env] {
+                    gone[env] = 0;
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn an_empty_list_is_done_after_one_step() {
+    let situation = Situation::Listed;
+    let mut table =
+        Table::new(Scenario { situation, end_when_done: true, ..Scenario::default() }, options(2, 1));
+    table.step(&[STILL; 8]);
+    assert_eq!(table.terminated, [true; 2]);
 }

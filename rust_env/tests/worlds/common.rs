@@ -206,6 +206,13 @@ pub fn with_list(scenario: Scenario) -> Scenario {
     Scenario { situation: Situation::Listed, arrivals, rescue_radius_m: 0.4, ..scenario }
 }
 
+/// The same whose episodes end when all victims of a list were rescued or lost.
+pub fn with_an_end(scenario: Scenario) -> Scenario {
+    let mut scenario = with_list(with_times(scenario));
+    scenario.arrivals.truncate(12);
+    Scenario { end_when_done: true, episode_steps: 40, ..scenario }
+}
+
 /// The same with robots that leave while they are not available.
 pub fn with_leaving(scenario: Scenario) -> Scenario {
     let leaves = |robot: &Robot| Fault {

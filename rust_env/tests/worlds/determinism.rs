@@ -6,7 +6,8 @@ use innerattn_env::scenario::{Actions, Scenario, Shaping, Situation};
 
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
-    with_amounts, with_arrivals, with_batteries, with_leaving, with_list, with_loads, with_order, with_times,
+    with_amounts, with_an_end, with_arrivals, with_batteries, with_leaving, with_list, with_loads,
+    with_order, with_times,
 };
 
 const STEPS: usize = 150;
@@ -37,6 +38,7 @@ fn scenarios() -> Vec<Scenario> {
         with_order(tight.clone()),
         with_arrivals(tight.clone()),
         with_list(tight.clone()),
+        with_an_end(tight.clone()),
         with_leaving(tight.clone()),
         with_batteries(with_leaving(tight.clone())),
         with_batteries(tight.clone()),

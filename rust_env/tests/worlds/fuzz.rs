@@ -14,7 +14,8 @@ use serde_json::{Value, json};
 
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
-    with_amounts, with_arrivals, with_batteries, with_leaving, with_list, with_loads, with_order, with_times,
+    with_amounts, with_an_end, with_arrivals, with_batteries, with_leaving, with_list, with_loads,
+    with_order, with_times,
 };
 
 const ENVS: usize = 2;
@@ -55,6 +56,7 @@ fn scenarios() -> Vec<Scenario> {
             with_order(Scenario { engine, ..tight.clone() }),
             with_arrivals(Scenario { engine, ..tight.clone() }),
             with_list(Scenario { engine, ..tight.clone() }),
+            with_an_end(Scenario { engine, ..tight.clone() }),
             with_leaving(Scenario { engine, ..tight.clone() }),
             with_batteries(Scenario { engine, ..tight.clone() }),
             with_loads(Scenario { engine, ..tight.clone() }),
