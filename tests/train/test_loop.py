@@ -19,13 +19,29 @@ from innerattn.learn.types import Learner
 from innerattn.policies import scripted_policy
 from innerattn.records.run_folder import read_info
 from innerattn.train import Progress, load_policy, parts, prepare, train
-from innerattn.train.build import build_learner, thread_count
+from innerattn.train.build import build_learner, team_of, thread_count
 
 Configure = Callable[..., RunConfig]
 
 
 def files(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    ("changed", "wanted"),
+    [
+        ({}, False),
+        ({"scenario.end_when_rescued": 3}, True),
+        ({"scenario.situation": "listed"}, False),
+        ({"scenario.situation": "listed", "scenario.end_when_done": True}, True),
+    ],
+)
+def test_learners_know_whether_episodes_may_end_early(
+    changed: dict[str, object], wanted: bool
+) -> None:
+    config = load_run_config(overrides=changed)
+    assert team_of(config, BatchEnv(config.scenario, 1)).terminates == wanted
 
 
 def test_a_finished_run_holds_what_is_promised(finished_run: Path) -> None:

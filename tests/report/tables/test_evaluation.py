@@ -112,6 +112,28 @@ def test_victims_turned_away_have_a_table_where_they_arrive() -> None:
     assert rows["td-inner"] == ["0.00"] * 2
 
 
+def test_ends_of_all_have_a_table_where_episodes_end_with_them() -> None:
+    listed = Scenario().replace(situation="listed", end_when_done=True)
+    share, none = Estimate(0.75, 0.6, 0.9), Estimate(0.0, 0.0, 0.1)
+    some: dict[str, Value] = {
+        "makespan_s": Estimate(12.5, 12.0, 13.0),
+        "done": share,
+        "turned_away": 0,
+    }
+    never: dict[str, Value] = {"makespan_s": None, "done": none, "turned_away": 0}
+    of_policy: dict[str, dict[str, Value]] = {
+        "random": never,
+        **dict.fromkeys(("greedy", "hungarian", "td-inner"), some),
+    }
+    lengths = {
+        name: replace(figures(steps), measures=of_policy)
+        for name, steps in (("standard", 25), ("long", 100))
+    }
+    rows = {row[0]: row[1:] for row in printed(replace(summary(), **lengths), listed) if row}
+    assert rows["td-inner"] == ["12.50 ± 0.50", "0.75"] * 2
+    assert rows["random"] == ["-", "0.00"] * 2
+
+
 def test_a_warm_start_is_named() -> None:
     warm = replace(summary(), warm_start="greedy")
     text = " ".join(cell for row in printed(warm) for cell in row)

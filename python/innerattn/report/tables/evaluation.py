@@ -46,6 +46,8 @@ def print_summary(console: Console, summary: Summary, scenario: Scenario) -> Non
         print_table(console, _in_time(summary))
     if scenario.has_arrivals:
         print_table(console, _turned_away(summary))
+    if scenario.end_when_done:
+        print_table(console, _makespan(summary))
     if any(summary.cooperation.values()):
         print_table(console, _cooperation(summary, scenario))
     if summary.attention_entropy:
@@ -149,6 +151,18 @@ def _turned_away(summary: Summary) -> Table:
     )
 
 
+def _makespan(summary: Summary) -> Table:
+    """In what share of the episodes all victims were done while each policy played, and when."""
+    lengths = (summary.standard, summary.long)
+    heads = [head for one in lengths for head in (f"{one.episode_steps} steps", "done")]
+    return Table(
+        columns(["policy"], heads),
+        (section(_by_policy(summary, _makespan_cells)),),
+        "Time until all victims were done [s]",
+        ("done: share of the episodes in which they were; the time is the mean of these alone",),
+    )
+
+
 def _by_policy(summary: Summary, cells: Callable[[Performance, str], tuple[str, ...]]) -> list[Row]:
     """Rows of the scripts and of what is measured, with cells of both lengths of episodes."""
     scripts = [name for name in summary.standard.scripted if name != summary.method]
@@ -165,6 +179,14 @@ def _turned_away_cells(measured: Performance, name: str) -> tuple[str]:
     turned_away = measured.measures[name]["turned_away"]
     assert isinstance(turned_away, int)
     return (number(turned_away / measured.episodes),)
+
+
+def _makespan_cells(measured: Performance, name: str) -> tuple[str, str]:
+    found = measured.measures[name]
+    makespan, done = found["makespan_s"], found["done"]
+    assert isinstance(makespan, Estimate | None)
+    assert isinstance(done, Estimate)
+    return plus_minus(makespan), number(done.mean)
 
 
 def _lost_cells(measured: Performance, name: str) -> tuple[str, str]:
