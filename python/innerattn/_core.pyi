@@ -89,6 +89,66 @@ class Instance:
         """
 
 @final
+class Dispatcher:
+    """The team and the tasks of a scenario, ready to be planned for. It never changes.
+
+    R robots, A abilities, V victim slots. A robot is (final speed [m/s], lag of a start [s], its
+    battery, its load, amounts of the A abilities); a battery (capacity [J], energy for a metre
+    [J/m] and for a start [J], idle power [W]). Needs of a type of victims are (abilities, amounts):
+    an ability for each robot, or A amounts that helpers have together. A station is (place [m],
+    radius [m], power [W]), a depot (place [m], radius [m]). `aim` has the weights of the sum of the
+    times of rescues and of the last one, and `orders` is how many orders of a world's victims are
+    tried.
+
+    Raises:
+        ValueError: too many robots or abilities, or no order.
+    """
+
+    def __new__(
+        cls,
+        robots: Sequence[
+            tuple[
+                float,
+                float,
+                tuple[float, float, float, float] | None,
+                int | None,
+                Sequence[float],
+            ]
+        ],
+        needs: Sequence[tuple[Sequence[int], Sequence[float] | None]],
+        stations: Sequence[tuple[Sequence[float], float, float]],
+        depots: Sequence[tuple[Sequence[float], float]],
+        radius: float,
+        along_axes: bool,
+        aim: tuple[float, float],
+        orders: int,
+    ) -> Dispatcher: ...
+    def choose(
+        self,
+        positions: NDArray[np.float64],
+        charges: NDArray[np.float64],
+        loads: NDArray[np.int64],
+        times: NDArray[np.float64],
+        numbers: NDArray[np.int64],
+        victims: NDArray[np.float64],
+    ) -> NDArray[np.int64]:
+        """The slot to which each robot goes first in the best plan, (E, R); -1 for none.
+
+        Args:
+            positions: (E, R, 2) [m].
+            charges: (E, R) [J].
+            loads: (E, R) rescues that robots can still help with.
+            times: (E, R, V) when robots could be at victims [s].
+            numbers: (E, V, 2) type of the victim, -1 for none, and the slots of those for which it
+                has to wait, as bits.
+            victims: (E, V, 4) place [m], how long helpers stay [s] and time until it is lost [s].
+
+        Raises:
+            TypeError: not arrays of such numbers.
+            ValueError: wrong shapes, an unknown type, or victims wait for each other in a circle.
+        """
+
+@final
 class Batch:
     """Many rescue worlds of one scenario.
 

@@ -1,19 +1,23 @@
 //! Which robots work on a task together: a distinct one for each need.
 
-use crate::instance::{Group, Instance, MAX_ROBOTS, Robot, Task};
+use std::ops::Range;
+
+use crate::instance::{MAX_ROBOTS, MAX_SKILLS};
 
 /// Robots and the needs that they fill. Sets of robots that can fill needs at the same time form a matroid
 /// (Edmonds & Fulkerson 1965), so taking robots one by one, the best first, gives the best coalition.
 struct Matching<'a> {
-    task: &'a Task,
-    robots: &'a [Robot],
+    /// A skill for each robot that is needed.
+    needs: &'a [u8],
+    /// For each robot, the mask of its skills.
+    skills: &'a [u32],
     /// For each need, the robot that fills it.
     by: Vec<Option<usize>>,
 }
 
 impl<'a> Matching<'a> {
-    fn new(task: &'a Task, robots: &'a [Robot]) -> Self {
-        Self { task, robots, by: vec![None; task.needs.len()] }
+    fn new(needs: &'a [u8], skills: &'a [u32]) -> Self {
+        Self { needs, skills, by: vec![None; needs.len()] }
     }
 
     /// Takes a robot, if all that were taken can still fill needs. Returns whether it did.
@@ -24,7 +28,7 @@ impl<'a> Matching<'a> {
     /// Finds a need for a robot along an augmenting path (Kuhn).
     fn place(&mut self, robot: usize, tried: &mut u64) -> bool {
         for need in 0..self.by.len() {
-            if self.robots[robot].skills >> self.task.needs[need] & 1 == 0 || *tried >> need & 1 == 1 {
+            if self.skills[robot] >> self.needs[need] & 1 == 0 || *tried >> need & 1 == 1 {
                 continue;
             }
             *tried |= 1 << need;
@@ -40,15 +44,16 @@ impl<'a> Matching<'a> {
         self.by.iter().all(Option::is_some)
     }
 
-    fn mask(&self) -> u64 {
-        self.by.iter().flatten().fold(0, |mask, robot| mask | 1 << robot)
+    /// The robots that were taken.
+    fn taken(&self) -> impl Iterator<Item = usize> {
+        self.by.iter().flatten().copied()
     }
 }
 
-/// Whether these distinct robots can fill all needs of a task.
+/// Whether these distinct robots, of a team with such skills, can fill all needs of a task.
 #[must_use]
-pub fn fills(task: &Task, robots: &[Robot], chosen: &[usize]) -> bool {
-    let mut matching = Matching::new(task, robots);
+pub fn fills(needs: &[u8], skills: &[u32], chosen: &[usize]) -> bool {
+    let mut matching = Matching::new(needs, skills);
     for robot in chosen {
         matching.take(*robot);
     }
@@ -57,57 +62,130 @@ pub fn fills(task: &Task, robots: &[Robot], chosen: &[usize]) -> bool {
 
 /// The coalition of the first robots in a list that can fill all needs of a task, as a mask.
 #[must_use]
-pub fn first_of(task: &Task, robots: &[Robot], list: &[usize]) -> u64 {
-    let mut matching = Matching::new(task, robots);
+pub fn first_of(needs: &[u8], skills: &[u32], list: &[usize]) -> u64 {
+    let mut matching = Matching::new(needs, skills);
     for robot in list {
         matching.take(*robot);
     }
-    matching.mask()
+    matching.taken().fold(0, |mask, robot| mask | 1 << robot)
 }
 
-/// What the robots that can fill needs of a task offer, in the order of `Instance::able`.
+/// Robots that can fill the needs of one skill of a task, and how many of them it needs.
+#[derive(Debug, Clone, PartialEq)]
+struct Group {
+    /// Their places among the candidates.
+    places: Range<usize>,
+    count: usize,
+}
+
+/// What a task needs, and the robots of a team that can fill any of its needs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidates {
+    /// A skill for each robot that is needed.
+    needs: Vec<u8>,
+    /// The robots, by number, or group by group.
+    robots: Vec<u8>,
+    /// For each of them, the mask of its skills.
+    skills: Vec<u32>,
+    /// The needs by skill; none where a robot can fill needs of two skills.
+    groups: Vec<Group>,
+}
+
+impl Candidates {
+    /// Those of a team with such skills.
+    #[must_use]
+    pub fn new(needs: &[u8], skills: &[u32]) -> Self {
+        let with =
+            |mask: u32| (0..skills.len() as u8).filter(move |robot| skills[usize::from(*robot)] & mask != 0);
+        let needed = needs.iter().fold(0, |mask, skill| mask | 1 << skill);
+        let (mut robots, mut groups) = (vec![], vec![]);
+        if with(needed).any(|robot| (skills[usize::from(robot)] & needed).count_ones() > 1) {
+            robots.extend(with(needed));
+        } else {
+            for skill in (0..MAX_SKILLS as u8).filter(|skill| needed >> skill & 1 == 1) {
+                let first = robots.len();
+                robots.extend(with(1 << skill));
+                let count = needs.iter().map(|need| usize::from(*need == skill)).sum();
+                groups.push(Group { places: first..robots.len(), count });
+            }
+        }
+        let skills = robots.iter().map(|robot| skills[usize::from(*robot)]).collect();
+        Self { needs: needs.to_vec(), robots, skills, groups }
+    }
+
+    /// The robots that can fill any need, in the order of [`Offers`].
+    #[must_use]
+    pub fn robots(&self) -> &[u8] {
+        &self.robots
+    }
+
+    /// The coalition that can begin soonest, and of those the one whose ranks are best, as a mask.
+    ///
+    /// Returns the time of the beginning with it; it is infinite where not enough robots ever come.
+    #[must_use]
+    pub fn soonest(&self, offers: &Offers) -> (f64, u64) {
+        if self.groups.is_empty() { self.soonest_of_any(offers) } else { self.soonest_apart(offers) }
+    }
+
+    /// As [`Self::soonest`], where each robot can fill needs of one skill at most.
+    fn soonest_apart(&self, offers: &Offers) -> (f64, u64) {
+        let mut start = 0.0_f64;
+        for group in &self.groups {
+            let mut taken = 0_u64;
+            for _ in 0..group.count {
+                let (place, arrival) = least(group, taken, |place| offers.arrivals[place]);
+                taken |= 1 << place;
+                start = start.max(arrival);
+            }
+        }
+        if start.is_infinite() {
+            return (start, 0);
+        }
+        let in_time = |place: usize| offers.arrivals[place] <= start;
+        let cost = |place: usize| if in_time(place) { -offers.ranks[place] } else { f64::INFINITY };
+        let (mut taken, mut mask) = (0_u64, 0_u64);
+        for group in &self.groups {
+            for _ in 0..group.count {
+                let (place, _) = least(group, taken, cost);
+                taken |= 1 << place;
+                mask |= 1 << self.robots[place];
+            }
+        }
+        (start, mask)
+    }
+
+    /// As [`Self::soonest`], whatever robots can do.
+    fn soonest_of_any(&self, offers: &Offers) -> (f64, u64) {
+        let mut places: Vec<usize> = (0..self.robots.len()).collect();
+        places.sort_by(|a, b| offers.arrivals[*a].total_cmp(&offers.arrivals[*b]));
+        let mut matching = Matching::new(&self.needs, &self.skills);
+        let mut start = 0.0;
+        for place in &places {
+            if matching.take(*place) {
+                start = offers.arrivals[*place];
+            }
+        }
+        if !matching.is_full() {
+            return (f64::INFINITY, 0);
+        }
+        places.retain(|place| offers.arrivals[*place] <= start);
+        places.sort_unstable();
+        places.sort_by(|a, b| offers.ranks[*b].total_cmp(&offers.ranks[*a]));
+        let mut matching = Matching::new(&self.needs, &self.skills);
+        for place in places {
+            matching.take(place);
+        }
+        (start, matching.taken().fold(0, |mask, place| mask | 1 << self.robots[place]))
+    }
+}
+
+/// What the robots that can fill needs of a task offer, in the order of [`Candidates::robots`].
 #[derive(Debug)]
 pub struct Offers {
     /// When they could be there.
     pub arrivals: [f64; MAX_ROBOTS],
     /// The larger, the rather a robot goes that comes in time; equals by their order.
     pub ranks: [f64; MAX_ROBOTS],
-}
-
-/// The coalition that can begin soonest, and of those the one whose ranks are best, as a mask.
-///
-/// Returns the time of the beginning with it.
-#[must_use]
-pub fn soonest(instance: &Instance, task: usize, offers: &Offers) -> (f64, u64) {
-    let (able, groups) = (&instance.able[task], &instance.groups[task]);
-    if groups.is_empty() {
-        return soonest_of_any(&instance.tasks[task], &instance.robots, able, offers);
-    }
-    soonest_apart(groups, able, offers)
-}
-
-/// As [`soonest`], where each robot can fill needs of one skill at most.
-fn soonest_apart(groups: &[Group], able: &[u8], offers: &Offers) -> (f64, u64) {
-    let mut start = 0.0_f64;
-    for group in groups {
-        let mut taken = 0_u64;
-        for _ in 0..group.count {
-            let (place, arrival) = least(group, taken, |place| offers.arrivals[place]);
-            taken |= 1 << place;
-            start = start.max(arrival);
-        }
-    }
-    let in_time = |place: usize| offers.arrivals[place] <= start;
-    let cost = |place: usize| if in_time(place) { -offers.ranks[place] } else { f64::INFINITY };
-    let (mut taken, mut mask) = (0_u64, 0_u64);
-    for group in groups {
-        for _ in 0..group.count {
-            let (place, _) = least(group, taken, cost);
-            taken |= 1 << place;
-            mask |= 1 << able[place];
-        }
-    }
-    (start, mask)
 }
 
 /// The place in a group, not among `taken`, with the least value, and this value; the first of equals.
@@ -120,44 +198,24 @@ fn least(group: &Group, taken: u64, value: impl Fn(usize) -> f64) -> (usize, f64
     best
 }
 
-/// As [`soonest`], whatever robots can do.
-fn soonest_of_any(task: &Task, robots: &[Robot], able: &[u8], offers: &Offers) -> (f64, u64) {
-    let mut places: Vec<usize> = (0..able.len()).collect();
-    places.sort_by(|a, b| offers.arrivals[*a].total_cmp(&offers.arrivals[*b]));
-    let mut matching = Matching::new(task, robots);
-    let mut start = 0.0;
-    for place in &places {
-        if matching.take(usize::from(able[*place])) {
-            start = offers.arrivals[*place];
-        }
-    }
-    places.retain(|place| offers.arrivals[*place] <= start);
-    places.sort_unstable();
-    places.sort_by(|a, b| offers.ranks[*b].total_cmp(&offers.ranks[*a]));
-    let list: Vec<usize> = places.into_iter().map(|place| usize::from(able[place])).collect();
-    (start, first_of(task, robots, &list))
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
-    use super::{Offers, soonest_apart, soonest_of_any};
+    use super::Offers;
     use crate::instance::{Instance, MAX_ROBOTS, Robot, Task};
 
     /// What a robot offers: when it could be there, and its rank.
     fn offer(instance: &Instance, offers: &Offers, robot: usize) -> (f64, f64) {
-        let place = instance.able[0].iter().position(|able| usize::from(*able) == robot).unwrap();
+        let place =
+            instance.candidates[0].robots().iter().position(|able| usize::from(*able) == robot).unwrap();
         (offers.arrivals[place], offers.ranks[place])
-    }
-
-    fn any(instance: &Instance, offers: &Offers) -> (f64, u64) {
-        soonest_of_any(&instance.tasks[0], &instance.robots, &instance.able[0], offers)
     }
 
     /// The best coalition, by trying all: begins soonest, then has the best ranks, the best first.
     fn tried(instance: &Instance, offers: &Offers) -> (f64, u64) {
         let count = instance.tasks[0].needs.len();
+        let skills: Vec<u32> = instance.robots.iter().map(|robot| robot.skills).collect();
         let masks = (0_u64..1 << instance.robots.len()).filter(|mask| mask.count_ones() as usize == count);
         let robots = |mask: u64| (0..64).filter(move |robot| mask >> robot & 1 == 1).collect::<Vec<usize>>();
         let key = |mask: &u64| {
@@ -169,7 +227,7 @@ mod tests {
             (start, ranks)
         };
         masks
-            .filter(|mask| super::fills(&instance.tasks[0], &instance.robots, &robots(*mask)))
+            .filter(|mask| super::fills(&instance.tasks[0].needs, &skills, &robots(*mask)))
             .map(|mask| (key(&mask), mask))
             .min_by(|a, b| a.0.partial_cmp(&b.0).unwrap())
             .map(|((start, _), mask)| (start, mask))
@@ -196,14 +254,14 @@ mod tests {
     proptest! {
         #[test]
         fn robots_of_several_skills_form_the_best_coalition((instance, offers) in case(0_u32..8)) {
-            prop_assert_eq!(any(&instance, &offers), tried(&instance, &offers));
+            prop_assert_eq!(instance.candidates[0].soonest_of_any(&offers), tried(&instance, &offers));
         }
 
         #[test]
         fn robots_of_one_skill_do_so_on_the_short_way(
             (instance, offers) in case((0_u32..3).prop_map(|skill| 1 << skill))
         ) {
-            let found = soonest_apart(&instance.groups[0], &instance.able[0], &offers);
+            let found = instance.candidates[0].soonest_apart(&offers);
             prop_assert_eq!(found, tried(&instance, &offers));
         }
     }

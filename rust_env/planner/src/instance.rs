@@ -1,9 +1,7 @@
 //! Instances: where robots and tasks are, who can do what, and how long it takes to get anywhere. Checked
 //! once; everything else in the crate trusts it.
 
-use std::ops::Range;
-
-use crate::coalition::fills;
+use crate::coalition::{Candidates, fills};
 use crate::error::{Error, Result};
 
 /// Most robots: sets of them are masks of 64 bits.
@@ -37,14 +35,6 @@ pub struct Task {
     pub duration: f64,
 }
 
-/// Robots that can fill the needs of one skill of a task, and how many of them it needs.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Group {
-    /// Their places in the task's list of able robots.
-    pub places: Range<usize>,
-    pub count: usize,
-}
-
 /// A valid instance.
 #[derive(Debug, Clone)]
 pub struct Instance {
@@ -52,10 +42,8 @@ pub struct Instance {
     pub robots: Vec<Robot>,
     /// What is to be done.
     pub tasks: Vec<Task>,
-    /// For each task, the robots that can fill any of its needs, by number, or group by group.
-    pub(crate) able: Vec<Vec<u8>>,
-    /// For each task, its needs by skill; none where a robot of the team can fill needs of two skills.
-    pub(crate) groups: Vec<Vec<Group>>,
+    /// For each task, the robots that can fill its needs.
+    pub(crate) candidates: Vec<Candidates>,
     /// Time to each task from each place. Places are the depots of all robots, then all tasks.
     travel: Vec<f64>,
 }
@@ -69,6 +57,7 @@ impl Instance {
         within("speed".into(), speed, LEAST_SPEED, MOST)?;
         counted("robots", robots.len(), MAX_ROBOTS)?;
         counted("tasks", tasks.len(), MAX_TASKS)?;
+        let skills: Vec<u32> = robots.iter().map(|robot| robot.skills).collect();
         for (index, robot) in robots.iter().enumerate() {
             for coordinate in robot.depot {
                 within(format!("robots[{index}].depot"), coordinate, -MOST, MOST)?;
@@ -79,7 +68,7 @@ impl Instance {
                 within(format!("tasks[{index}].position"), coordinate, -MOST, MOST)?;
             }
             within(format!("tasks[{index}].duration"), task.duration, 0.0, MOST)?;
-            check_needs(index, task, &robots)?;
+            check_needs(index, &task.needs, &skills)?;
         }
         let depots = robots.iter().map(|robot| robot.depot);
         let places: Vec<[f64; 2]> = depots.chain(tasks.iter().map(|task| task.position)).collect();
@@ -87,8 +76,8 @@ impl Instance {
             places.iter().map(|from| distance(*from, task.position) / speed).collect::<Vec<_>>()
         };
         let travel = tasks.iter().flat_map(times).collect();
-        let (able, groups) = tasks.iter().map(|task| able_robots(task, &robots)).unzip();
-        Ok(Self { robots, tasks, able, groups, travel })
+        let candidates = tasks.iter().map(|task| Candidates::new(&task.needs, &skills)).collect();
+        Ok(Self { robots, tasks, candidates, travel })
     }
 
     /// Time from a place to a task; see [`Self::place_of`].
@@ -115,45 +104,24 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (x * x + y * y).sqrt()
 }
 
-/// The robots that can fill needs of a task, and its groups.
-fn able_robots(task: &Task, robots: &[Robot]) -> (Vec<u8>, Vec<Group>) {
-    let with = |mask: u32| {
-        (0..robots.len() as u8).filter(move |robot| robots[usize::from(*robot)].skills & mask != 0)
-    };
-    let needed = task.needs.iter().fold(0, |mask, skill| mask | 1 << skill);
-    let able: Vec<u8> = with(needed).collect();
-    if able.iter().any(|robot| (robots[usize::from(*robot)].skills & needed).count_ones() > 1) {
-        return (able, vec![]);
-    }
-    let (mut able, mut groups) = (vec![], vec![]);
-    for skill in (0..MAX_SKILLS as u8).filter(|skill| needed >> skill & 1 == 1) {
-        let first = able.len();
-        able.extend(with(1 << skill));
-        let count = task.needs.iter().map(|need| usize::from(*need == skill)).sum();
-        groups.push(Group { places: first..able.len(), count });
-    }
-    (able, groups)
-}
-
-fn check_needs(index: usize, task: &Task, robots: &[Robot]) -> Result<()> {
+fn check_needs(index: usize, needs: &[u8], skills: &[u32]) -> Result<()> {
     let place = format!("tasks[{index}].skills");
-    let refused = |rule: String| {
-        Err(Error::Instance { place: place.clone(), value: format!("{:?}", task.needs), rule })
-    };
-    if task.needs.is_empty() || task.needs.len() > robots.len() {
+    let refused =
+        |rule: String| Err(Error::Instance { place: place.clone(), value: format!("{:?}", needs), rule });
+    if needs.is_empty() || needs.len() > skills.len() {
         return refused(format!(
             "must be 1 to {} skills, one for each robot that the task needs",
-            robots.len()
+            skills.len()
         ));
     }
-    if let Some(skill) = task.needs.iter().find(|skill| usize::from(**skill) >= MAX_SKILLS) {
+    if let Some(skill) = needs.iter().find(|skill| usize::from(**skill) >= MAX_SKILLS) {
         return refused(format!("skill {skill} must be 0 to {}", MAX_SKILLS - 1));
     }
-    let team = robots.iter().fold(0_u32, |mask, robot| mask | robot.skills);
-    if let Some(skill) = task.needs.iter().find(|skill| team >> **skill & 1 == 0) {
+    let team = skills.iter().fold(0_u32, |mask, skills| mask | skills);
+    if let Some(skill) = needs.iter().find(|skill| team >> **skill & 1 == 0) {
         return refused(format!("no robot has skill {skill}"));
     }
-    if !fills(task, robots, (0..robots.len()).collect::<Vec<_>>().as_slice()) {
+    if !fills(needs, skills, (0..skills.len()).collect::<Vec<_>>().as_slice()) {
         return refused("the team has not enough robots to fill all these needs at once".into());
     }
     Ok(())

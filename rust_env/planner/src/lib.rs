@@ -18,3 +18,9 @@ pub mod order;
 pub mod simple;
 
 pub mod search;
+
+pub mod ways;
+
+pub mod moment;
+
+pub mod dispatch;

@@ -4,7 +4,7 @@
 //!
 //! Such a schedule never ends in a deadlock: robots meet tasks in one common order.
 
-use crate::coalition::{Offers, soonest};
+use crate::coalition::Offers;
 use crate::instance::{Instance, MAX_ROBOTS};
 use crate::schedule::Schedule;
 
@@ -52,12 +52,12 @@ impl Trace {
         let (free, places) = (&self.free[rows.clone()], &self.places[rows]);
         let travel = instance.travel_to(task);
         let offers = self.offers.arrivals.iter_mut().zip(&mut self.offers.ranks);
-        for (robot, (arrival, rank)) in instance.able[task].iter().zip(offers) {
+        for (robot, (arrival, rank)) in instance.candidates[task].robots().iter().zip(offers) {
             let robot = usize::from(*robot);
             *arrival = free[robot] + travel[places[robot] as usize];
             *rank = *arrival - WAY_HOME * travel[robot];
         }
-        soonest(instance, task, &self.offers)
+        instance.candidates[task].soonest(&self.offers)
     }
 
     /// Lets the robots of a mask work on `task` from `start` on, after `done` others.

@@ -59,6 +59,7 @@ fn check(instance: &Instance, schedule: &Schedule) -> Result<()> {
     if schedule.len() != instance.robots.len() {
         return refused(format!("has {} robots: must have {}", schedule.len(), instance.robots.len()));
     }
+    let skills: Vec<u32> = instance.robots.iter().map(|robot| robot.skills).collect();
     let mut served: Vec<Vec<usize>> = vec![vec![]; instance.tasks.len()];
     for (robot, tasks) in schedule.iter().enumerate() {
         for task in tasks {
@@ -73,7 +74,7 @@ fn check(instance: &Instance, schedule: &Schedule) -> Result<()> {
         }
     }
     for (index, (task, robots)) in instance.tasks.iter().zip(&served).enumerate() {
-        if robots.len() != task.needs.len() || !fills(task, &instance.robots, robots) {
+        if robots.len() != task.needs.len() || !fills(&task.needs, &skills, robots) {
             let needs = &task.needs;
             return refused(format!("robots {robots:?} go to task {index}: must fill its needs {needs:?}"));
         }

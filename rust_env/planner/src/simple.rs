@@ -34,10 +34,11 @@ pub fn greedy_order(instance: &Instance) -> Vec<usize> {
 #[must_use]
 pub fn random_schedule(instance: &Instance, seed: u64) -> Schedule {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let skills: Vec<u32> = instance.robots.iter().map(|robot| robot.skills).collect();
     let mut schedule = vec![vec![]; instance.robots.len()];
     for task in shuffled(instance.tasks.len(), &mut random) {
         let robots = shuffled(instance.robots.len(), &mut random);
-        add(&mut schedule, first_of(&instance.tasks[task], &instance.robots, &robots), task);
+        add(&mut schedule, first_of(&instance.tasks[task].needs, &skills, &robots), task);
     }
     schedule
 }

@@ -54,11 +54,12 @@ fn least(instance: &Instance) -> f64 {
 
 fn least_after(instance: &Instance, order: &[usize], schedule: &Schedule) -> f64 {
     let Some((task, rest)) = order.split_first() else { return makespan(instance, schedule) };
+    let skills: Vec<u32> = instance.robots.iter().map(|robot| robot.skills).collect();
     let mut best = f64::INFINITY;
     for mask in 0_u64..1 << instance.robots.len() {
         let chosen: Vec<usize> = (0..64).filter(|robot| mask >> robot & 1 == 1).collect();
         let wanted = &instance.tasks[*task];
-        if chosen.len() == wanted.needs.len() && fills(wanted, &instance.robots, &chosen) {
+        if chosen.len() == wanted.needs.len() && fills(&wanted.needs, &skills, &chosen) {
             let mut more = schedule.clone();
             add(&mut more, mask, *task);
             best = best.min(least_after(instance, rest, &more));

@@ -61,6 +61,14 @@ impl<'a> Door<'a> {
         Ok(())
     }
 
+    /// What is given as float64, C order.
+    pub fn read_f64(&self, given: &Bound<PyAny>, into: &mut Vec<f64>) -> PyResult<()> {
+        if self.copied(given, into)? {
+            return Ok(());
+        }
+        self.cast::<f64>(&self.checked(given)?, "float64", into)
+    }
+
     /// What is given as truth values; any byte but 0 is true, as it is to numpy.
     pub fn read_flags(&self, given: &Bound<PyAny>) -> PyResult<Vec<bool>> {
         let mut bytes = Vec::new();

@@ -3,6 +3,7 @@
 
 mod arrays;
 mod batch;
+mod dispatch;
 mod door;
 mod instance;
 mod rules;
@@ -57,6 +58,7 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("FAULT_KINDS", fault_kinds(module.py())?)?;
     module.add("REWARD_COMPONENTS", reward_components(module.py())?)?;
     module.add_class::<rules::Rules>()?;
+    module.add_class::<dispatch::Dispatcher>()?;
     module.add_class::<instance::Instance>()?;
     module.add_class::<batch::Batch>()
 }
