@@ -67,7 +67,6 @@ def test_wrong_words(tmp_path: Path, capsys: Captured) -> None:
     bad = tmp_path / "bad.json"
     bad.write_text("[{}]")
     cases = [
-        (2, "planner", "planner: needs --instances"),
         (2, "greedy --time-limit-ms 3", "--time-limit-ms: needs --instances"),
         (2, "gredy --instances ral", "gredy: with --instances must be one of planner, greedy, ra"),
         (2, "planner --instances ral --episodes 3", "--episodes: has no meaning with --instances"),
@@ -141,7 +140,6 @@ def test_a_schedule_is_replayed(
 def test_wrong_words_for_a_replay(tmp_path: Path, capsys: Captured) -> None:
     most = 86_400_000
     cases = [
-        (2, "planner", "planner: needs --instance"),
         (2, "greedy --time-limit-ms 3", "--time-limit-ms: needs --instance"),
         (2, "gredy --instance ral", "gredy: with --instance must be one of planner, greedy, rand"),
         (2, "greedy random --instance ral", "2 policies: with --instance must be one"),

@@ -14,8 +14,12 @@ from innerattn.cli.progress import (
     SeveralRuns,
     Training,
 )
-from innerattn.config import RunConfig, load_run_config
-from innerattn.evaluate.training_score import ScriptedRescues, scripted_rescues
+from innerattn.config import RunConfig, Scenario, load_run_config
+from innerattn.evaluate.training_score import (
+    ScriptedRescues,
+    scripted_rescues,
+    training_rescues,
+)
 from innerattn.experiments.side_by_side import Run
 from innerattn.train import Progress
 
@@ -102,7 +106,7 @@ def test_the_score_is_between_scripts_which_are_played_once() -> None:
 
     def scripts() -> ScriptedRescues:
         played.append(True)
-        return ScriptedRescues(random=0.5, hungarian=2.5)
+        return ScriptedRescues(random=0.5, best=2.5)
 
     console = Console(file=(out := io.StringIO()), width=120)
     seconds = iter([0.0, 10.0, 20.0, 30.0])
@@ -133,7 +137,17 @@ def test_scripts_are_played_as_long_as_training_episodes() -> None:
     config = load_run_config(overrides={"train.episode_steps": 50, "train.threads": 1})
     longer = scripted_rescues(config)
     shorter = scripted_rescues(RunConfig())
-    assert longer.random < 0.1 < 1.5 * shorter.hungarian < longer.hungarian
+    assert longer.random < 0.1 < 1.5 * shorter.best < longer.best
+
+
+def test_a_training_is_scored_by_planner_where_plans_are_asked_for() -> None:
+    timed = [task.replace(deadline_s=1.5) for task in Scenario().tasks]
+    longer = {"train.episode_steps": 50, "train.threads": 1}
+    config = load_run_config(
+        overrides={**longer, "scenario.tasks": [t.model_dump() for t in timed]}
+    )
+    scripts = {name: training_rescues(config, name, 100, 1) for name in ("hungarian", "planner")}
+    assert scripted_rescues(config).best == scripts["planner"] != scripts["hungarian"]
 
 
 def test_no_score_where_hungarian_is_no_better_than_random() -> None:

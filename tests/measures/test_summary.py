@@ -77,6 +77,22 @@ def test_figures_by_hand() -> None:
     assert summary.attention_entropy == summary.attention_entropy_share == {}
 
 
+def test_a_score_of_1_is_as_good_as_planner_where_plans_are_asked_for() -> None:
+    task = SCENARIO.tasks[0].replace(deadline_s=3.0)
+    timed = SCENARIO.replace(tasks=(task, SCENARIO.tasks[1]))
+    planned = [record("planner", [(e % 4, *HELP_1) for e in range(24)], 4)]
+    records = {
+        name: [replace(part, scenario=timed) for part in parts]
+        for name, parts in {**STANDARD, "planner": planned}.items()
+    }
+    recorded = replace(RECORDED, scenario=timed)
+    found = summarise("runs/x", recorded, records, records).standard
+    assert list(found.scripted) == ["random", "greedy", "hungarian", "planner"]
+    assert found.score is not None
+    assert found.score.mean == pytest.approx(1.5 / 6)
+    assert found.script_score("hungarian") == pytest.approx(0.5)
+
+
 def test_attention_is_reported_by_robot_and_head() -> None:
     weights = np.broadcast_to((1 - np.eye(4)) / 3, (2, 25, 4, 4, 4)).astype(np.float32)
     summary = summarise("x", replace(RECORDED, steps={"attention": weights}), STANDARD, STANDARD)

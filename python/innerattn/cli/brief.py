@@ -41,7 +41,10 @@ BRIEF: Mapping[str, Brief] = {
             ("--scenario FILE", "TOML file with a scenario of your own, instead"),
             ("--method NAME", "td-inner, td-uniform, ppo-inner, ppo-uniform, mappo ({method})"),
             ("--budget NAME", "fast, quick, short, strong or paper ({budget})"),
-            ("--warm-start NAME", "script to imitate first: hungarian or greedy ({warm_start})"),
+            (
+                "--warm-start NAME",
+                "script to imitate: hungarian, planner or greedy ({warm_start})",
+            ),
             ("--seed N", "seed of everything random ({seed})"),
             ("--seeds LIST", "one run for each seed: 0..4, or 0,3,7"),
             ("--family any|FILE", "one policy for many teams: built-in or ranges"),
@@ -63,7 +66,7 @@ BRIEF: Mapping[str, Brief] = {
             (
                 "RUN|POLICY",
                 "a run (folder, latest, zoo:NAME, or how its name begins), or a "
-                "script: random, greedy, hungarian",
+                "script: random, greedy, hungarian, planner, oracle",
             ),
             ("--scenario FILE", "TOML file with the scenario to measure in"),
             ("--situation NAME", "single, double or mixed (that of the run)"),
@@ -122,7 +125,10 @@ BRIEF: Mapping[str, Brief] = {
     "play": Brief(
         "[OPTIONS] RUN|POLICY",
         (
-            ("RUN|POLICY", "a run (also zoo:NAME), or random, greedy, hungarian, oracle"),
+            (
+                "RUN|POLICY",
+                "a run (also zoo:NAME), or a script: random, greedy, hungarian, planner, oracle",
+            ),
             ("--scenario FILE", "TOML file with the scenario to play in (that of the run)"),
             ("--seed N", "seed of the world"),
             ("--port N", "port of 127.0.0.1; 0: any that is free ({port})"),
@@ -162,7 +168,7 @@ BRIEF: Mapping[str, Brief] = {
             (
                 "RUN|POLICY|FILE",
                 "up to four: runs (also zoo:NAME), scripts (random, greedy, hungarian, "
-                "oracle) or episodes.parquet files",
+                "planner, oracle) or episodes.parquet files",
             ),
             ("-o, --output FILE", "what to write: .html, .gif or .mp4 ({output})"),
             ("--episodes N", "play N new episodes instead of showing recorded ones"),

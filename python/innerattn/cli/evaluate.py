@@ -23,7 +23,7 @@ from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
 from innerattn.config.instances import read_instances
 from innerattn.errors import ConfigError
-from innerattn.policies import SCRIPTED
+from innerattn.policies import SCRIPTS
 from innerattn.report.table import print_table
 from innerattn.report.tables.evaluation import print_summary, result_line
 from innerattn.report.tables.instances import results_line, results_table
@@ -49,8 +49,8 @@ class Evaluate(LongCommand):
     """Measure a trained or scripted policy, or a planner on instances."""
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
-    """A run, or one of random, greedy, hungarian. A run is a folder, latest, or the beginning of
-    the name of one in runs. With --instances: planner, greedy or random."""
+    """A run, or one of random, greedy, hungarian, planner, oracle. A run is a folder, latest, or
+    the beginning of the name of one in runs. With --instances: planner, greedy or random."""
     scenario: Path | None = None
     """TOML file with the scenario to measure in; None: that of the run, or mixed."""
     situation: Literal["single", "double", "mixed"] | None = None
@@ -91,9 +91,8 @@ class Evaluate(LongCommand):
             check_target(self.json)
         if self.instances is not None:
             return self._on_instances(self.instances)
-        if self.policy == "planner" or self.time_limit_ms is not None:
-            given = "planner" if self.policy == "planner" else "--time-limit-ms"
-            raise UsageError(f"{given}: needs --instances")
+        if self.time_limit_ms is not None:
+            raise UsageError("--time-limit-ms: needs --instances")
         evaluation = self._measure()
         if self._wrote(evaluation.summary.to_json()):
             return 0
@@ -102,7 +101,7 @@ class Evaluate(LongCommand):
             evaluation.summary,
             evaluation.records[0].scenario,
         )
-        shown = self.policy if in_zoo(self.policy) else named_policy(self.policy, SCRIPTED)
+        shown = self.policy if in_zoo(self.policy) else named_policy(self.policy, SCRIPTS)
         self.say_result(f"{shown}: {result_line(evaluation.summary)}")
         return 0
 
@@ -138,8 +137,8 @@ class Evaluate(LongCommand):
         from innerattn.evaluate import evaluate_policy, evaluate_run, scripted_policy
         from innerattn.records.run_folder import read_config
 
-        policy = named_policy(self.policy, SCRIPTED)
-        if policy in SCRIPTED:
+        policy = named_policy(self.policy, SCRIPTS)
+        if policy in SCRIPTS:
             scenario = self._worlds(Scenario.preset("mixed"))
             settings = self._settings(EvaluateConfig())
             chosen = scripted_policy(policy, scenario, settings.seed)

@@ -10,7 +10,7 @@ import tyro
 
 from innerattn.cli.options import Command, UsageError
 from innerattn.cli.runs import existing_run
-from innerattn.policies import SCRIPTED
+from innerattn.policies import SCRIPTS
 from innerattn.zoo import in_zoo
 
 
@@ -34,7 +34,7 @@ class Export(Command):
                 is missing, or an exported policy that differs from the trained one.
             OSError: a file cannot be written.
         """
-        if self.run_folder in SCRIPTED:
+        if self.run_folder in SCRIPTS:
             raise UsageError(
                 f"{self.run_folder}: is a script; only trained teams have weights to export"
             )

@@ -12,13 +12,12 @@ import tyro
 from innerattn.cli.options import Command, UsageError, check_seed
 from innerattn.cli.runs import named_policy
 from innerattn.config import EvaluateConfig, Scenario
+from innerattn.policies import SCRIPTS
 
 if TYPE_CHECKING:
     from innerattn.config import RunConfig
     from innerattn.evaluate.interactive import InteractiveWorld
     from innerattn.policies import Policy
-
-SCRIPTS = ("greedy", "hungarian", "oracle", "random")
 
 
 @dataclass(kw_only=True)
@@ -26,7 +25,7 @@ class Play(Command):
     """Play with a team in a browser on this machine: move, push, break robots; Ctrl-C ends it."""
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
-    """A run, or one of random, greedy, hungarian, oracle; it acts first."""
+    """A run, or one of random, greedy, hungarian, planner, oracle; it acts first."""
     scenario: Path | None = None
     """TOML file with the scenario to play in; None: that of the run, or mixed."""
     seed: int | None = None

@@ -15,13 +15,12 @@ from innerattn.cli.runs import named_policy
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
-from innerattn.policies import SCRIPTED
+from innerattn.policies import SCRIPTS
 from innerattn.zoo import in_zoo
 
 if TYPE_CHECKING:
     from innerattn.records import Record
 
-SCRIPTS = (*SCRIPTED, "oracle")
 SUFFIXES = (".html", ".gif", ".mp4")
 _OF_WORLDS = ("episodes", "scenario", "episode", "robot")
 """Options that have no meaning for an instance."""
@@ -39,8 +38,8 @@ class Replay(Command):
     policies: Annotated[
         tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN|POLICY|FILE ...")
     ]
-    """Runs, evaluation/episodes.parquet files, or random, greedy, hungarian, oracle; up to
-    four, shown side by side. With --instance: planner, greedy or random; none: planner."""
+    """Runs, evaluation/episodes.parquet files, or random, greedy, hungarian, planner, oracle; up
+    to four, shown side by side. With --instance: planner, greedy or random; none: planner."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("replay.html")
     """File to write: .html is a page, .gif or .mp4 a moving picture of one episode."""
     episodes: int | None = None
@@ -117,9 +116,8 @@ class Replay(Command):
         return 0
 
     def _check(self) -> None:
-        if self.time_limit_ms is not None or "planner" in self.policies:
-            given = "planner" if self.time_limit_ms is None else "--time-limit-ms"
-            raise UsageError(f"{given}: needs --instance")
+        if self.time_limit_ms is not None:
+            raise UsageError("--time-limit-ms: needs --instance")
         if not 1 <= len(self.policies) <= 4:
             raise UsageError(f"{len(self.policies)} policies: must be 1 to 4 of RUN|POLICY|FILE")
         if self.output.suffix not in SUFFIXES:

@@ -381,6 +381,14 @@ class Scenario(Model, Shown):
         return any(task.after for task in self.tasks)
 
     @property
+    def asks_for_plans(self) -> bool:
+        """Whether who goes where next depends on what comes after."""
+        timed = self.has_services or self.has_deadlines or self.has_order or self.has_arrivals
+        return (
+            timed or self.has_batteries or self.has_loads or any(task.sums for task in self.tasks)
+        )
+
+    @property
     def has_batteries(self) -> bool:
         """Whether some robots have a battery."""
         return any(robot.battery is not None for robot in self.robots)

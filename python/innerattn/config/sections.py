@@ -16,8 +16,8 @@ from innerattn.config.schedule import ScheduleConfig
 
 Method = Annotated[str, OneOf(methods)]
 Attention = Annotated[str, OneOf(lambda: (*attentions(), "none"))]
-WarmStart = Literal["none", "hungarian", "greedy"]
-Script = Literal["none", "random", "greedy", "hungarian", "oracle"]
+WarmStart = Literal["none", "hungarian", "greedy", "planner"]
+Script = Literal["none", "random", "greedy", "hungarian", "planner", "oracle"]
 
 
 class NetworkConfig(Model):

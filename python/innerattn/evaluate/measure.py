@@ -17,7 +17,7 @@ from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
 from innerattn.measures.registry import needed_fields
 from innerattn.measures.summary import Summary, summarise
-from innerattn.policies import SCRIPTED, Policy, scripted_policy
+from innerattn.policies import SCRIPTS, Policy, scripted_policy, scripts_of
 from innerattn.records.parquet import write_records
 from innerattn.records.record import FIELDS, Record
 from innerattn.records.run_files import amend
@@ -81,14 +81,14 @@ def evaluate_policy(
         ValueError: the policy has the name of a scripted one, and is another.
     """
     refuse_late_faults(scenario, settings)
-    if policy.name in SCRIPTED:
+    if policy.name in SCRIPTS:
         script = type(scripted_policy(policy.name, scenario))
         if type(policy) is not script:
             raise ValueError(
-                f"policy.name = {policy.name!r}: is that of {script.__name__}, which every policy "
-                f"is measured against; a {type(policy).__name__} needs another"
+                f"policy.name = {policy.name!r}: is that of {script.__name__}, a script; a "
+                f"{type(policy).__name__} needs another"
             )
-    names = dict.fromkeys((policy.name, *SCRIPTED))
+    names = dict.fromkeys((policy.name, *scripts_of(scenario)))
     scored = max(settings.score_episodes, settings.episodes)
     total = (scored + settings.long_episodes) * len(names)
     done = 0

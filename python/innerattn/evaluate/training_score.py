@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from innerattn.config import RunConfig
 from innerattn.evaluate.play import run_episodes
-from innerattn.policies import scripted_policy
+from innerattn.policies import best_script, scripted_policy, scripts_of
 
 _EPISODES = 100
 
@@ -16,11 +16,11 @@ class ScriptedRescues:
     """Rescues per training episode of the scripts that a score is between."""
 
     random: float
-    hungarian: float
+    best: float
 
     def score(self, rescues: float) -> float | None:
-        """0 as `random`, 1 as `hungarian`; None where `hungarian` is not the better one."""
-        span = self.hungarian - self.random
+        """0 as `random`, 1 as the best script; None where that is not the better one."""
+        span = self.best - self.random
         return (rescues - self.random) / span if span > 0.0 else None
 
 
@@ -30,9 +30,10 @@ def scripted_rescues(config: RunConfig) -> ScriptedRescues:
     That is few: the standard error of a score of 1 is 0.02 to 0.03 in the built-in scenarios.
     """
     threads = config.train.threads
+    best = best_script(scripts_of(config.training_scenario))
     return ScriptedRescues(
         random=training_rescues(config, "random", _EPISODES, threads),
-        hungarian=training_rescues(config, "hungarian", _EPISODES, threads),
+        best=training_rescues(config, best, _EPISODES, threads),
     )
 
 

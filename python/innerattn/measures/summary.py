@@ -14,7 +14,7 @@ from innerattn.measures.attention import Entropy, entropy_of
 from innerattn.measures.cooperation import count_cooperation, count_pairs, pair_rates
 from innerattn.measures.measure import Value
 from innerattn.measures.registry import measures_of
-from innerattn.policies import SCRIPTED
+from innerattn.policies import best_script, scripts_of
 from innerattn.records.record import Record
 from innerattn.stats import Estimate
 from innerattn.stats.bootstrap import mean_interval, score_interval
@@ -31,7 +31,7 @@ class Performance:
         episodes: how many episodes the means are over.
         episode_steps: their length [control steps].
         rescues_per_episode: of the policy.
-        score: 0 is random play, 1 scripted dispatch; None where dispatch is not surely better.
+        score: 0 is random play, 1 the best script; None where that is not surely better.
         scripted: rescues per episode of the scripted policies, by name, in the same worlds.
         measures: of the policy and of the scripted ones, by policy and by the names of `MEASURES`.
     """
@@ -50,7 +50,7 @@ class Performance:
 
 def script_score(scripted: Mapping[str, Estimate], name: str) -> float:
     """The score of a scripted policy, from rescues per episode of all of them by name."""
-    least, most = scripted["random"].mean, scripted["hungarian"].mean
+    least, most = scripted["random"].mean, scripted[best_script(scripted)].mean
     return (scripted[name].mean - least) / (most - least)
 
 
@@ -152,12 +152,14 @@ def _performance(method: str, records: Mapping[str, Sequence[Record]], seed: int
         for name, parts in records.items()
     }
     means = {name: mean_interval(values, seed) for name, values in counts.items()}
+    scenario = records[method][0].scenario
+    scripted = {name: means[name] for name in scripts_of(scenario)}
     return Performance(
         episodes=len(counts[method]),
-        episode_steps=records[method][0].scenario.episode_steps,
+        episode_steps=scenario.episode_steps,
         rescues_per_episode=means[method],
-        score=score_interval(counts[method], counts["random"], counts["hungarian"], seed),
-        scripted={name: means[name] for name in SCRIPTED},
+        score=score_interval(counts[method], counts["random"], counts[best_script(scripted)], seed),
+        scripted=scripted,
         measures={name: measures_of(*parts) for name, parts in records.items()},
     )
 

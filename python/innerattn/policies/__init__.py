@@ -2,14 +2,23 @@
 
 from innerattn.policies.exported import Decision, Exported
 from innerattn.policies.policy import Policy, PolicyInput, WorldState
-from innerattn.policies.scripted.dispatch import SCRIPTED, scripted_policy
+from innerattn.policies.scripted.dispatch import (
+    SCRIPTED,
+    SCRIPTS,
+    best_script,
+    scripted_policy,
+    scripts_of,
+)
 
 __all__ = [
     "SCRIPTED",
+    "SCRIPTS",
     "Decision",
     "Exported",
     "Policy",
     "PolicyInput",
     "WorldState",
+    "best_script",
     "scripted_policy",
+    "scripts_of",
 ]

@@ -119,17 +119,17 @@ def mean_interval(values: ArrayLike, seed: int) -> Estimate:
 
 
 def score_interval(
-    method: ArrayLike, random: ArrayLike, hungarian: ArrayLike, seed: int
+    method: ArrayLike, random: ArrayLike, best: ArrayLike, seed: int
 ) -> Estimate | None:
     """How far a method is from random play (0) to scripted dispatch (1).
 
-    ``(mean(method) - mean(random)) / (mean(hungarian) - mean(random))``; the three are paired:
+    ``(mean(method) - mean(random)) / (mean(best) - mean(random))``; the three are paired:
     value e of each comes from the same world, and a resample takes the same worlds for all.
 
     Args:
         method: (n,) rescues by episode.
         random: (n,) rescues by episode of the random policy.
-        hungarian: (n,) rescues by episode of the hungarian policy.
+        best: (n,) rescues by episode of the best scripted policy.
         seed: seed of the resampling.
 
     Returns:
@@ -144,7 +144,7 @@ def score_interval(
         m, r, h = (sample.mean(axis) for sample in samples)
         return np.stack([m - r, h - r])
 
-    samples = _samples(method, random, hungarian)
+    samples = _samples(method, random, best)
     above, span = parts(*samples, axis=-1)
     resampled = bootstrap(samples, parts, seed, paired=True)
     if span <= 0.0 or resampled[1].min() <= 0.0:

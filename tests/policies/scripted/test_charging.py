@@ -7,7 +7,7 @@ from innerattn.config import Battery, Scenario, Station
 from innerattn.envs import BatchEnv
 from innerattn.policies import PolicyInput, WorldState, scripted_policy
 
-SCRIPTS = pytest.mark.parametrize("name", ["greedy", "hungarian", "oracle"])
+SCRIPTS = pytest.mark.parametrize("name", ["greedy", "hungarian", "planner", "oracle"])
 
 
 def powered(stations: int = 2, capacity_j: float = 12.0, **changed: object) -> Scenario:
@@ -50,6 +50,19 @@ def test_batteries_that_last_change_nothing(name: str) -> None:
 
 
 @SCRIPTS
+def test_one_robot_with_a_battery_gives_all_of_a_sum(name: str) -> None:
+    both = {"water": 1.0, "rope": 1.0}
+    robot = Scenario().robots[0].replace(abilities=both)
+    lasting = powered(stations=0).replace(
+        robots=(robot.replace(battery=Battery(capacity_j=1e6, per_m_j=1.0)),),
+        tasks=({"name": "flood", "needs": both},),
+        situation="single",
+    )
+    rescues, _ = played(name, lasting)
+    assert rescues == played(name, lasting.replace(robots=(robot,)))[0] > 100
+
+
+@SCRIPTS
 def test_who_has_too_little_for_the_way_back_goes_to_charge(name: str) -> None:
     scenario = powered(stations=1, capacity_j=20.0, situation="single")
     env = BatchEnv(scenario, 1, seed=2, num_threads=1)
@@ -70,7 +83,7 @@ def test_who_has_too_little_for_the_way_back_goes_to_charge(name: str) -> None:
             assert np.isin(actions, [2, 4]).all()
 
 
-@pytest.mark.parametrize("name", ["hungarian", "oracle"])
+@pytest.mark.parametrize("name", ["hungarian", "planner", "oracle"])
 def test_a_battery_for_one_farther_victim_at_a_time_is_enough(name: str) -> None:
     medic, food = Scenario().robots[3], Scenario().robots[0]
     scenario = Scenario().replace(

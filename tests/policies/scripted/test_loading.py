@@ -7,7 +7,7 @@ from innerattn.config import Battery, Depot, Scenario, Station
 from innerattn.envs import BatchEnv
 from innerattn.policies import PolicyInput, WorldState, scripted_policy
 
-SCRIPTS = pytest.mark.parametrize("name", ["greedy", "hungarian", "oracle"])
+SCRIPTS = pytest.mark.parametrize("name", ["greedy", "hungarian", "planner", "oracle"])
 
 
 def loaded(depots: int = 2, load: int = 2, **changed: object) -> Scenario:

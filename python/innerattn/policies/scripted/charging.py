@@ -39,6 +39,14 @@ class Charging:
         self._stations = np.array([one.position_m for one in scenario.stations]).reshape(-1, 2)
         self._steering = steering
 
+    def reckoned(self) -> list[tuple[float, float, float, float] | None]:
+        """Capacity [J], energy for a metre [J/m] and for a start [J], and idle power [W] by robot.
+
+        None for robots without a battery.
+        """
+        rows = np.stack([self._capacity, self._per_m, self._start_j, self._idle_w], -1).tolist()
+        return [(*row,) if has else None for row, has in zip(rows, self._has_battery, strict=True)]
+
     def within_reach(self, state: WorldState, places: Array) -> NDArray[np.bool_]:
         """Which places robots can drive to and, from there, to the nearest station.
 
@@ -53,7 +61,7 @@ class Charging:
         Returns:
             (E, R, V) bool.
         """
-        charge = self._charge_j(state)[..., None]
+        charge = self.charge_j(state)[..., None]
         way = self._steering.way(places[:, None] - state.positions[:, :, None].astype(np.float64))
         starts = self._start_j[:, None]
         if len(self._stations):
@@ -82,7 +90,7 @@ class Charging:
             return targets
         at = state.positions.astype(np.float64)
         nearest = self._steering.way(self._stations - at[:, :, None]).argmin(-1)
-        charges = (chosen < 0) & (self._charge_j(state) < self._capacity) & self._has_battery
+        charges = (chosen < 0) & (self.charge_j(state) < self._capacity) & self._has_battery
         return np.asarray(np.where(charges[..., None], self._stations[nearest], targets))
 
     def _is_charging(self, state: WorldState) -> NDArray[np.bool_]:
@@ -92,13 +100,13 @@ class Charging:
         apart = self._stations - state.positions[:, :, None].astype(np.float64)
         near = (apart * apart).sum(-1) <= self._radii * self._radii
         gains = (near & (self._recharge_w > self._idle_w[:, None])).any(-1)
-        return np.asarray(gains & (self._charge_j(state) < _NEARLY_FULL * self._capacity))
+        return np.asarray(gains & (self.charge_j(state) < _NEARLY_FULL * self._capacity))
 
     @property
     def _has_battery(self) -> NDArray[np.bool_]:
         return np.asarray(np.isfinite(self._capacity))
 
-    def _charge_j(self, state: WorldState) -> Array:
+    def charge_j(self, state: WorldState) -> Array:
         """Charges (E, R) [J]; infinite of robots without a battery."""
         if state.charge is None:
             raise ValueError("state.charge = None: must be given where robots have a battery")

@@ -71,7 +71,7 @@ class Coalitions:
         """
         worlds = np.arange(len(times))
         helpful = np.asarray(permitted.any(-1))
-        of_sum = self._of_sum(state)
+        of_sum = self.of_sum(state)
         free = np.ones(times.shape[:2], np.bool_)
         members = np.zeros(times.shape, np.bool_)
         open_ = of_sum.copy()
@@ -94,7 +94,7 @@ class Coalitions:
         listed[..., : needed.shape[-1]] = needed
         return slots, np.where(of_sum[..., None], slots.any(1), listed)
 
-    def _of_sum(self, state: WorldState) -> _Bools:
+    def of_sum(self, state: WorldState) -> _Bools:
         """Which victims need sums, (E, V)."""
         present = state.victims["present"]
         return np.asarray(present & self._is_sum[np.where(present, state.victims["task"], 0)])
@@ -106,7 +106,7 @@ class Coalitions:
 
         Where all candidates do not reach them, there is none.
         """
-        of_sum = self._of_sum(state)
+        of_sum = self.of_sum(state)
         task = np.where(of_sum, state.victims["task"], 0)
         least = (self._needed[task] * (1.0 - _ROUNDING))[:, None]  # (E, 1, V, A)
         order = np.where(candidates, times, np.inf).argsort(1, kind="stable")
@@ -137,4 +137,4 @@ class Coalitions:
         own = members[..., None] & (order[..., None] == np.arange(most))
         listed = np.zeros(own.shape, np.bool_)
         listed[..., : permitted.shape[-1]] = permitted
-        return np.where(self._of_sum(state)[:, None, :, None], own, listed)
+        return np.where(self.of_sum(state)[:, None, :, None], own, listed)

@@ -1,4 +1,4 @@
-"""Scripted policies to measure trained ones against: `random`, `greedy`, `hungarian` and `oracle`.
+"""Scripted policies to measure trained ones against, from `random` to `planner` and `oracle`.
 
 They see the true state of the worlds and plan for all worlds of a batch at once; none learns. Only
 `oracle` knows of faults.
@@ -7,6 +7,7 @@ They see the true state of the worlds and plan for all worlds of a batch at once
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from innerattn.policies.scripted.assignment import Needs, assign, can_be_rescued
 from innerattn.policies.scripted.charging import Charging
 from innerattn.policies.scripted.coalitions import Coalitions
 from innerattn.policies.scripted.loading import Loading
+from innerattn.policies.scripted.lookahead import Lookahead
 from innerattn.policies.scripted.steering import Steering
 from innerattn.policies.scripted.timing import Timing
 
@@ -144,11 +146,11 @@ class HungarianPolicy(_Dispatcher):
         if self._charging.is_needed:
             reached = self._charging.within_reach(state, places)
             ever = permitted & (reached | self._charging.within_full_reach(places))[..., None]
-            permitted &= reached[..., None] & can_be_rescued(ever, needed)[:, None, :, None]
+            permitted &= reached[..., None] & self._hopeful(state, ever, needed)
         if self._loading.is_needed:
             permitted &= self._loading.can_help(state)[..., None, None]
-            if not (self._loading.has_depots or self._coalitions.is_needed):
-                permitted &= can_be_rescued(permitted, needed)[:, None, :, None]
+            if not self._loading.has_depots:
+                permitted &= self._hopeful(state, permitted, needed)
         times = self.steering.arrival_times(state.positions, state.velocities, places, faults)
         blocked = state.victims["blocked"] if self._timing.has_order else None
         if self._coalitions.is_needed:
@@ -163,6 +165,34 @@ class HungarianPolicy(_Dispatcher):
             held = self._timing.held(state, times)
         need = assign(pair_costs(times, permitted, held, blocked))
         return np.where(need >= 0, need // permitted.shape[-1], -1)
+
+    def _hopeful(
+        self, state: WorldState, permitted: NDArray[np.bool_], needed: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Victims whose lists robots can fill, and all whose needs are sums (E, 1, V, 1).
+
+        Arguments as of `can_be_rescued`. One robot may give all of a sum's abilities.
+        """
+        found = can_be_rescued(permitted, needed) | self._coalitions.of_sum(state)
+        return np.asarray(found[:, None, :, None])
+
+
+class PlannerPolicy(_Dispatcher):
+    """Robots take the first step of a plan for all victims that are there, made anew every step."""
+
+    name = "planner"
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Take the team and the tasks from ``scenario``."""
+        super().__init__(scenario)
+        self._lookahead = Lookahead(
+            scenario, self.steering, self._timing, self._charging, self._loading
+        )
+
+    def choose(self, state: WorldState, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        """See `_Dispatcher.choose`."""
+        times = self.steering.arrival_times(state.positions, state.velocities, places)
+        return self._lookahead.choose(state, places, times)
 
 
 class OraclePolicy(HungarianPolicy):
@@ -179,6 +209,22 @@ class OraclePolicy(HungarianPolicy):
 SCRIPTED = ("random", "greedy", "hungarian")
 """Names of the scripted policies that every evaluation measures."""
 
+SCRIPTS = (*SCRIPTED, "planner", "oracle")
+"""Names of all scripted policies."""
+
+
+def scripts_of(scenario: Scenario) -> tuple[str, ...]:
+    """The scripted policies that evaluations in a scenario measure.
+
+    `planner` is one of them where times, energy, sums or the order of tasks ask for plans.
+    """
+    return (*SCRIPTED, "planner") if scenario.asks_for_plans else SCRIPTED
+
+
+def best_script(measured: Collection[str]) -> str:
+    """That of the measured scripts which has a score of 1."""
+    return "planner" if "planner" in measured else "hungarian"
+
 
 def scripted_policy(name: str, scenario: Scenario, seed: int = 0) -> Policy:
     """The scripted policy ``name`` for the team and tasks of ``scenario``.
@@ -192,6 +238,8 @@ def scripted_policy(name: str, scenario: Scenario, seed: int = 0) -> Policy:
         return GreedyPolicy(scenario)
     if name == "hungarian":
         return HungarianPolicy(scenario)
+    if name == "planner":
+        return PlannerPolicy(scenario)
     if name == "oracle":
         return OraclePolicy(scenario)
-    raise ConfigError(f"unknown policy {name!r}: known are {', '.join((*SCRIPTED, 'oracle'))}")
+    raise ConfigError(f"unknown policy {name!r}: known are {', '.join(SCRIPTS)}")

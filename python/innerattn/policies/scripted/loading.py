@@ -23,12 +23,17 @@ class Loading:
         """Take loads and depots from ``scenario``."""
         self.is_needed = scenario.has_loads
         self.has_depots = bool(scenario.depots)
+        self._most = np.array([robot.load or 0 for robot in scenario.robots])
         self._depots = np.array([one.position_m for one in scenario.depots]).reshape(-1, 2)
         self._steering, self._charging = steering, charging
 
     def can_help(self, state: WorldState) -> NDArray[np.bool_]:
         """Which robots have something left to help with, (E, R)."""
         return np.asarray(self._load(state) > 0.0)
+
+    def left(self, state: WorldState) -> NDArray[np.int64]:
+        """Rescues that robots can help with before they go to a depot, (E, R); 0 without a load."""
+        return np.asarray(np.rint(self._load(state) * self._most).astype(np.int64))
 
     def targets(self, state: WorldState, targets: Array, chosen: NDArray[np.int64]) -> Array:
         """Targets of all robots, where those without a victim that are not full go to a depot.

@@ -9,7 +9,7 @@ from typing import Any
 from innerattn.experiments.run import FinishedRun
 from innerattn.experiments.score_means import MeanScores, scores_over_runs
 from innerattn.measures.summary import script_score
-from innerattn.policies import SCRIPTED
+from innerattn.policies import best_script
 from innerattn.report.runs.groups import in_situations
 from innerattn.report.table import Row, Table, columns, plain_table, section
 from innerattn.stats import Estimate
@@ -65,11 +65,16 @@ def verdict(groups: Sequence[Sequence[FinishedRun]]) -> str:
     found.sort(key=lambda one: one[0], reverse=True)
     shown = [text for _, text in found[:_MOST_NAMED]]
     left = f"; and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
-    return f"Score (0 plays like random, 1 like hungarian): {'; '.join(shown)}{left}"
+    best = " or ".join(dict.fromkeys(best_script(group[0].summary["scripted"]) for group in groups))
+    return f"Score (0 plays like random, 1 like {best}): {'; '.join(shown)}{left}"
 
 
 def _score(score: Estimate | None) -> str:
-    return format_estimate(score) if score else "has none, since hungarian is not surely better"
+    return (
+        format_estimate(score)
+        if score
+        else "has none, since no script is surely better than random"
+    )
 
 
 def scores_table(groups: Sequence[Sequence[FinishedRun]]) -> Table:
@@ -90,7 +95,7 @@ def scores_table(groups: Sequence[Sequence[FinishedRun]]) -> Table:
         name = alike[0][0].folder.name
         parts.append(section(_script_rows(alike[0][0]), f"scripts, in the worlds of {name}"))
     notes = (
-        "Rescues per episode, at two lengths of episodes. Score: 0 is random, 1 is hungarian.",
+        "Rescues per episode, at two lengths of episodes. Score: 0 is random, 1 the best script.",
         "Brackets: 95 % intervals, over episodes for a run, over runs (Student's t) for a mean.",
     )
     return Table(heads, tuple(parts), notes=notes)
@@ -125,7 +130,7 @@ def _mean_cells(mean: MeanScores) -> list[str]:
 def _script_rows(run: FinishedRun) -> list[list[str]]:
     return [
         [name, *(cell for part in _lengths(run) for cell in _script_cells(part, name))]
-        for name in SCRIPTED
+        for name in run.summary["scripted"]
     ]
 
 

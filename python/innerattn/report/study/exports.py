@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from innerattn.errors import RunError
+from innerattn.policies import best_script
 from innerattn.records.logged import METRICS, MOST_METRICS_BYTES, logged_lines, logged_rescues
 from innerattn.records.run_files import RunFiles
 from innerattn.studies.aggregates import TASK, Aggregate, algorithm_of
@@ -64,7 +65,7 @@ def marl_eval_document(
 
 def _of_run(one: Result, folder: Path) -> dict[str, Any]:
     scripts = one.summary["scripted"]
-    low, high = (float(scripts[name]["mean"]) for name in ("random", "hungarian"))
+    low, high = (float(scripts[name]["mean"]) for name in ("random", best_script(scripts)))
 
     def metrics(rescues: float) -> dict[str, list[float]]:
         span = high - low

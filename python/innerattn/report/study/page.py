@@ -135,8 +135,9 @@ def left_out(results: Results) -> list[str]:
 
 
 _SCORE = (
-    "A score of 0 plays like `random`, a score of 1 like `hungarian`, in the same worlds. ± is "
-    "half the 95 % interval over seeds (Student's t); in brackets are the values of the seeds.\n"
+    "A score of 0 plays like `random`, a score of 1 like `hungarian` in the same worlds, or like "
+    "`planner` where times, energy, sums or the order of tasks ask for plans. ± is half the 95 % "
+    "interval over seeds (Student's t); in brackets are the values of the seeds.\n"
 )
 _RETAINED = (
     "Retained is the share of the rescues that a team keeps: a mean over its robots, each of which "

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from innerattn.config.amounts import in_words
+from innerattn.policies import best_script
 from innerattn.report.table import Row, Table, columns, plain_table, print_table, section
 from innerattn.report.tables.text import number, plus_minus
 from innerattn.stats import Estimate
@@ -23,10 +24,10 @@ _POLICIES = (
     "random: any action, each with the same chance",
     "greedy: each robot to the nearest victim it can help",
     "hungarian: robots assigned to victims by arrival time",
-    "score: 0 plays like random, 1 like hungarian; ± is half the 95 % interval",
 )
+_PLANNER = "planner: the first step of a plan for all victims that are there"
 _SEEDS = (
-    "score: 0 plays like random, 1 like hungarian",
+    "score: 0 plays like random, 1 like the best script",
     "mean: ± is half the 95 % interval over seeds (Student's t), in the same worlds",
 )
 _MOST_COLUMNS = 4  # that 80 columns hold beside names
@@ -119,12 +120,15 @@ def _rescues(summary: Summary) -> Table:
     own = [plus_minus(x) for one in lengths for x in (one.rescues_per_episode, one.score)]
     rows.append(Row((name, *own), strong=True))
     counts = [cell for one in lengths for cell in (f"{one.episodes:,}", "")]
+    best = best_script(summary.standard.scripted)
+    planner = (_PLANNER,) if best == "planner" else ()
+    score = f"score: 0 plays like random, 1 like {best}; ± is half the 95 % interval"
     warm = () if summary.warm_start == "none" else (_warm_start(summary),)
     return Table(
         columns(["policy"], _heads([one.episode_steps for one in lengths])),
         (section(rows), section([["episodes", *counts]])),
         f"Rescues per episode, situation {summary.situation}",
-        (*_POLICIES, *warm),
+        (*_POLICIES, *planner, score, *warm),
     )
 
 
