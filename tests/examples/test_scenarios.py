@@ -13,10 +13,11 @@ from innerattn.train.build import build_learner
 ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "examples" / "scenarios").glob("*.toml"))
 EPISODES = 60
+KEYS = {"--network.symmetry": "network.symmetry", "--warm-start": "train.warm_start"}
 
 
-def test_there_are_three() -> None:
-    assert [file.stem for file in FILES] == ["flood", "search", "warehouse"]
+def test_there_are_five() -> None:
+    assert [file.stem for file in FILES] == ["assembly", "fire", "flood", "search", "warehouse"]
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
@@ -26,9 +27,9 @@ def test_a_script_rescues_in_it(file: Path) -> None:
         name: run_episodes(scripted_policy(name, scenario, 5), scenario, EPISODES, 5, num_threads=1)
         .rescue_counts()
         .mean()
-        for name in ("random", "hungarian")
+        for name in ("random", "planner")
     }
-    assert means["hungarian"] > max(1.0, 5 * means["random"])
+    assert means["planner"] > max(1.0, 5 * means["random"])
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
@@ -42,8 +43,9 @@ def test_the_command_in_the_file_can_train(file: Path) -> None:
     assert words[:4] == ["innerattn", "train", "--scenario", f"examples/scenarios/{file.name}"]
     options = dict(zip(words[4::2], words[5::2], strict=True))
     overrides = {"network.hidden_width": 16, "train.threads": 1}
-    if "--network.symmetry" in options:
-        overrides["network.symmetry"] = options["--network.symmetry"]
+    for option, key in KEYS.items():
+        if option in options:
+            overrides[key] = options[option]
     config = load_run_config(
         method=options["--method"],
         budget=options["--budget"],
