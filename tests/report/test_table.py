@@ -58,6 +58,16 @@ def test_in_a_terminal() -> None:
     assert max(map(len, printed(TABLE, dense=True)[:-3])) < max(map(len, lines[:-3]))
 
 
+def test_columns_move_together_before_a_cell_is_wrapped() -> None:
+    def lines(last: str) -> list[str]:
+        wide = ["ppo-inner", *["11.15 ± 0.14"] * 2, last]
+        return printed(plain_table(columns(["policy"], "abc"), [wide]))
+
+    cell = "11.15 ± 0.14"
+    assert f"  ppo-inner   {cell}   {cell}   0.84 ± 0.001  " in lines("0.84 ± 0.001")
+    assert f"  ppo-inner  {cell}  {cell}  0.84 ± 0.0012345  " in lines("0.84 ± 0.0012345")
+
+
 def test_long_notes_are_wrapped() -> None:
     note = "word " * 40
     lines = [line for line in printed(plain_table(columns(["a"]), [["b"]], notes=[note])) if line]

@@ -14,9 +14,11 @@ from dataclasses import dataclass
 
 from rich import box
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table as RichTable
 
 _WIDTH, _INDENT = 80, "  "  # of notes in a terminal
+_VAST = 10_000  # a width that holds every table
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,10 @@ def print_table(console: Console, table: Table, *, dense: bool = False) -> None:
     """
     if table.title:
         console.print(table.title, style="bold", soft_wrap=True)
-    console.print(_rich(table, dense))
+    drawn = _rich(table, dense)
+    wanted = Measurement.get(console, console.options.update(width=_VAST), drawn).maximum
+    drawn.collapse_padding = wanted > console.width
+    console.print(drawn)
     for note in table.notes:
         console.print(_wrapped(note), soft_wrap=True)
     if table.notes:
