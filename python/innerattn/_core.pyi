@@ -6,7 +6,15 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["FAULT_KINDS", "REWARD_COMPONENTS", "Batch", "Instance", "Rules", "__version__"]
+__all__ = [
+    "FAULT_KINDS",
+    "REWARD_COMPONENTS",
+    "Batch",
+    "Dispatcher",
+    "Instance",
+    "Rules",
+    "__version__",
+]
 
 __version__: str
 

@@ -69,7 +69,10 @@ CALLS: dict[str, Callable[[], list[str]]] = {
     "train.method = 'td-inner' learns 'discrete' actions only": lambda: [
         *("train", "--method", "td-inner", "--scenario.actions", "continuous"),
     ],
-    "neither a run's folder nor one of random, greedy, hungarian": lambda: ["evaluate", "none"],
+    "neither a run's folder nor one of random, greedy, hungarian, planner, oracle": lambda: [
+        "evaluate",
+        "none",
+    ],
     "latest: no run is in runs yet": lambda: ["evaluate", "latest"],
     "2 runs in runs begin so": two_runs,
     "a team of the package is done, nothing to go on from": lambda: [

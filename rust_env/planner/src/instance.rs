@@ -107,7 +107,7 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
 fn check_needs(index: usize, needs: &[u8], skills: &[u32]) -> Result<()> {
     let place = format!("tasks[{index}].skills");
     let refused =
-        |rule: String| Err(Error::Instance { place: place.clone(), value: format!("{:?}", needs), rule });
+        |rule: String| Err(Error::Instance { place: place.clone(), value: format!("{needs:?}"), rule });
     if needs.is_empty() || needs.len() > skills.len() {
         return refused(format!(
             "must be 1 to {} skills, one for each robot that the task needs",

@@ -31,9 +31,9 @@ impl Sums {
     /// The robots, of those with such amounts by ability, that have some of what is needed.
     #[must_use]
     pub fn new(needed: &[f64], amounts: &[Vec<f64>]) -> Self {
-        let gives =
+        let has_some =
             |given: &[f64]| needed.iter().zip(given).any(|(most, amount)| *most > 0.0 && *amount > 0.0);
-        let able = (0..amounts.len()).filter(|robot| gives(&amounts[*robot]));
+        let able = (0..amounts.len()).filter(|robot| has_some(&amounts[*robot]));
         let (robots, given) = able.map(|robot| (robot as u8, amounts[robot].clone())).unzip();
         Self { needed: needed.to_vec(), robots, given }
     }

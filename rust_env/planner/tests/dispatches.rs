@@ -167,7 +167,7 @@ impl Case {
         let mut stands = self.moment.stands.clone();
         let mut goals = vec![Goal::Free; robots];
         let mut gone: Vec<Option<f64>> = vec![None; victims.len()];
-        let (mut sum, mut last, mut lost, mut driven) = (0.0, 0.0_f64, 0.0, 0.0);
+        let (mut sum, mut last, mut missed, mut driven) = (0.0, 0.0_f64, 0.0, 0.0);
         let mut queue: Vec<usize> = order.iter().rev().copied().collect();
         while let Some(victim) = queue.pop() {
             if gone[victim].is_some() {
@@ -188,7 +188,7 @@ impl Case {
             let done = start + victims[victim].work;
             if done.is_infinite() || done > victims[victim].left + 1e-6 {
                 gone[victim] = Some(victims[victim].left.min(1e6));
-                lost += 1e6;
+                missed += 1e6;
                 continue;
             }
             gone[victim] = Some(done);
@@ -204,7 +204,7 @@ impl Case {
                     Stand { place: victims[victim].place, free: done, charge, load: load.max(1) - 1 };
             }
         }
-        (lost + self.aim.sum * sum + self.aim.last * last + 0.01 * driven, goals)
+        (missed + self.aim.sum * sum + self.aim.last * last + 0.01 * driven, goals)
     }
 
     /// The least cost of all orders.
@@ -265,14 +265,12 @@ fn case(victims: std::ops::Range<usize>) -> impl Strategy<Value = Case> {
     let station = (place(), 0.05..0.4, 1.0..20.0);
     let station = station.prop_map(|(place, radius, power)| Station { place, radius, power });
     let left = prop_oneof![Just(f64::INFINITY), 0.5..6.0];
-    let victim = (
-        0_usize..2,
-        place(),
-        prop_oneof![Just(0.0), 0.0..1.0],
-        left,
-        0_u32..8,
-        prop::collection::vec(0.0..3.0, 4),
-    );
+    let times = (prop_oneof![Just(0.0), 0.0..1.0], left);
+    let victim = (0_usize..2, place(), times, 0_u32..8).prop_map(|(kind, place, (work, left), after)| {
+        let after = if after < 4 { after } else { 0 };
+        Victim { kind, place, work, left, after }
+    });
+    let victim = (victim, prop::collection::vec(0.0..3.0, 4));
     let depot = (place(), 0.05..0.4).prop_map(|(place, radius)| Depot { place, radius });
     let stops = (prop::collection::vec(station, 0..3), prop::collection::vec(depot, 0..3));
     let world = (prop::collection::vec(victim, victims), stops);
@@ -281,17 +279,14 @@ fn case(victims: std::ops::Range<usize>) -> impl Strategy<Value = Case> {
             let count = robots.len();
             let (moved, amounts): (Vec<(Mover, Stand)>, Vec<Vec<f64>>) = robots.into_iter().unzip();
             let (movers, stands) = moved.into_iter().unzip();
-            let victim = |(index, one): (usize, &(usize, [f64; 2], f64, f64, u32, Vec<f64>))| Victim {
-                kind: one.0,
-                place: one.1,
-                work: one.2,
-                left: one.3,
-                after: if one.4 < 4 { one.4 & ((1 << index) - 1) } else { 0 }, // only earlier ones
-            };
+            let (mut victims, arrivals): (Vec<Victim>, Vec<Vec<f64>>) = found.into_iter().unzip();
+            for (index, victim) in victims.iter_mut().enumerate() {
+                victim.after &= (1 << index) - 1; // only earlier ones
+            }
             let moment = Moment {
                 stands,
-                victims: found.iter().enumerate().map(victim).collect(),
-                arrivals: found.iter().map(|one| one.5[..count].to_vec()).collect(),
+                victims,
+                arrivals: arrivals.into_iter().map(|times| times[..count].to_vec()).collect(),
             };
             let ways = Ways { movers, stations, depots, radius: 0.15, along_axes };
             Case { amounts, wanted, ways, moment, aim: Aim { sum: 1.0, last } }

@@ -28,7 +28,7 @@ pub struct Dispatcher {
 #[pymethods]
 impl Dispatcher {
     #[new]
-    #[allow(clippy::type_complexity)]
+    #[allow(clippy::too_many_arguments)]
     fn new(
         robots: Vec<GivenRobot>,
         needs: Vec<GivenNeeds>,
@@ -84,6 +84,7 @@ impl Dispatcher {
         Ok(Self { team: Team { ways, needs: needs.collect() }, aim: Aim { sum: aim.0, last: aim.1 }, orders })
     }
 
+    #[allow(clippy::too_many_arguments)]
     fn choose<'py>(
         &self,
         py: Python<'py>,

@@ -13,6 +13,25 @@ function paints() {
   return found;
 }
 
+/** Places that give robots something, by their name in worlds: a sign of 16 by 16, and what they are. */
+const STOPS = {
+  stations: { sign: "M2 -8L-5 2L-1 2L-2 8L5 -2L1 -2Z", what: "a station that charges batteries, and its reach" },
+  depots: { sign: "M-7 -5L7 -5L7 7L-7 7ZM-7 -1L7 -1M0 -5L0 -1", what: "a depot that refills loads, and its reach" },
+};
+
+function drawStop(scene, { position_m, radius_m }, sign) {
+  const { context, paint, scale } = scene, [x, y] = scene.at(...position_m);
+  context.beginPath();
+  context.arc(x, y, radius_m * scale, 0, 7);
+  context.fillStyle = paint.grid;
+  context.strokeStyle = paint.quiet;
+  context.fill();
+  context.stroke();
+  context.translate(x, y);
+  context.stroke(new Path2D(sign));
+  context.translate(-x, -y);
+}
+
 function drawGround(scene) {
   const { context, paint, scale, worlds } = scene, half = worlds.half_width_m;
   const [left, top] = scene.at(-half, half), side = 2 * half * scale;
@@ -30,17 +49,14 @@ function drawGround(scene) {
     context.lineTo(left + side, y);
   }
   context.stroke();
-  context.strokeStyle = paint.quiet;
-  for (const { position_m: [x, y], radius_m: size } of worlds.stations ?? []) {
-    const [atX, atY] = scene.at(x - size, y + size);
-    context.strokeRect(atX, atY, 2 * size * scale, 2 * size * scale);
+  context.save();
+  context.beginPath();
+  context.rect(left, top, side, side);
+  context.clip();
+  for (const [name, { sign }] of Object.entries(STOPS)) {
+    for (const stop of worlds[name] ?? []) drawStop(scene, stop, sign);
   }
-  for (const { position_m: [x, y], radius_m: size } of worlds.depots ?? []) {
-    context.beginPath();
-    for (const [dx, dy] of [[size, 0], [0, size], [-size, 0], [0, -size]]) context.lineTo(...scene.at(x + dx, y + dy));
-    context.closePath();
-    context.stroke();
-  }
+  context.restore();
   worlds.obstacles.forEach((shape, index) => drawObstacle(scene, shape, index));
   context.strokeStyle = paint.wall;
   context.lineWidth = 3;

@@ -122,11 +122,8 @@ function fillLegend(list, worlds) {
     const arc = svg("path", { d: "M0 -8a8 8 0 1 1 -8 8", fill: "none", stroke: "var(--victim)", "stroke-width": 4 });
     row(symbol(arc), "thick arc around a victim: the share of its service that it has had");
   }
-  if ((worlds.stations ?? []).length) {
-    row(symbol(svg("rect", { x: -7, y: -7, width: 14, height: 14, fill: "none", stroke: "var(--quiet)" })), "square: a station that charges batteries");
-  }
-  if ((worlds.depots ?? []).length) {
-    row(symbol(svg("path", { d: "M0 -9L9 0L0 9L-9 0Z", fill: "none", stroke: "var(--quiet)" })), "diamond: a depot that refills loads");
+  for (const [name, { sign, what }] of Object.entries(STOPS)) {
+    if ((worlds[name] ?? []).length) row(symbol(svg("path", { d: sign, fill: "none", stroke: "var(--quiet)" })), what);
   }
   if (worlds.has_deadlines) {
     row(symbol(eventMark("lost", 0, 0)), "a victim is lost; seconds below a victim: until it is");
