@@ -57,7 +57,9 @@ def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = str(taken.getsockname()[1])
-        nobody = "nobody: neither a run's folder nor one of greedy, hungarian, oracle, random"
+        nobody = (
+            "nobody: neither a run's folder nor one of random, greedy, hungarian, planner, oracle"
+        )
         cases = [
             (1, ["nobody"], nobody),
             (1, [str(tmp_path)], f"{tmp_path}/run.json: missing"),

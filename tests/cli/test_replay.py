@@ -77,7 +77,7 @@ def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     (tmp_path / "x.parquet").write_text("no")
     file = str(run_dir / "evaluation" / "episodes.parquet")
     cases = [
-        (1, ["nobody"], "nobody: neither a run's folder nor one of random, greedy, hungarian, or"),
+        (1, ["nobody"], "nobody: neither a run's folder nor one of random, greedy, hungarian, p"),
         (2, [], "0 policies: must be 1 to 4 of RUN|POLICY|FILE"),
         (2, ["greedy"] * 5, "5 policies: must be 1 to 4"),
         (1, [str(bare)], f"{bare}: holds no recorded episodes"),

@@ -155,7 +155,7 @@ def test_potential_shaping_goes_with_the_learners_discount(method: str) -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"train.potential": "planner"}, "train.potential = 'planner': must be 'none', 'random'"),
+        ({"train.potential": "dispatch"}, "train.potential = 'dispatch': must be 'none', 'random'"),
         (
             {"train.potential_discount": 0.9},
             "train.potential_discount = 0.9: train.potential = 'none' needs None",
