@@ -76,8 +76,13 @@ def test_batteries_have_words() -> None:
         "food_0: drives 1.5 m with a full battery",
         "food_1: drives 0.5 m with a full battery",
         "food_1: its battery hardly lasts; the arena is 2 m wide",
+        # The corner is 1.273 m away, less the radii of the station and of the rescue: 0.973 m.
+        "food_0: from a victim at [-0.9, -0.9] its full battery brings it back to no station",
+        "food_1: from a victim at [-0.9, -0.9] its full battery brings it back to no station",
     ]
-    both = made.replace(robots=(made.robots[0], *others))
+    near = made.replace(victim_places_m=((0.5, 0.0), (0.0, 0.5)))  # 0.2 m
+    assert not any("back to no station" in line for line in scenario_words(near).splitlines())
+    both = near.replace(robots=(made.robots[0], *others))
     assert scenario_words(both).splitlines()[-1] == (
         "stations[0]: gives no more than the 2 W that robots there use"
     )

@@ -92,6 +92,29 @@ def _reach_m(robot: Robot) -> float:
     )
 
 
+def _too_far(scenario: Scenario) -> Iterator[str]:
+    """Robots whose full battery takes them to no station again from the farthest victims."""
+    if not scenario.stations:
+        return
+    reach = scenario.arena_half_width_m - scenario.wall_clearance_m
+    x_low, y_low, x_high, y_high = scenario.victim_area_m or (-reach, -reach, reach, reach)
+    corners = [(x, y) for x in (x_low, x_high) for y in (y_low, y_high)]
+    listed = [one.position_m for one in scenario.arrivals]
+    places = listed or list(scenario.victim_places_m) or corners
+
+    def apart(place: tuple[float, float]) -> float:
+        ways = (math.dist(place, one.position_m) - one.radius_m for one in scenario.stations)
+        return max(min(ways) - scenario.rescue_radius_m, 0.0)
+
+    x, y = farthest = max(places, key=apart)
+    for robot in scenario.robots:
+        if _reach_m(robot) < 2.0 * apart(farthest):
+            yield (
+                f"{robot.name}: from a victim at [{x:g}, {y:g}] its full battery brings it back "
+                "to no station"
+            )
+
+
 def _doubts(scenario: Scenario) -> Iterator[str]:
     needed = {need for task in scenario.tasks for need in task.needs}
     for robot in scenario.robots:
@@ -108,6 +131,7 @@ def _doubts(scenario: Scenario) -> Iterator[str]:
     for index, station in enumerate(scenario.stations):
         if station.recharge_w <= min(idle):
             yield f"stations[{index}]: gives no more than the {min(idle):g} W that robots there use"
+    yield from _too_far(scenario)
     last_s = max((one.at_s for one in scenario.arrivals), default=0.0)
     time_s = scenario.episode_steps * scenario.dt_s
     if scenario.end_when_done and last_s > time_s:
