@@ -36,7 +36,8 @@ def test_a_run_is_played(run_dir: Path) -> None:
         address = process.stdout.readline().split()[-1]
         status, opened = posted(address, "sessions", {})
         assert status == 200
-        assert opened["policies"] == [run_dir.name, "greedy", "hungarian", "oracle", "random"]
+        scripts = ["random", "greedy", "hungarian", "planner", "oracle"]
+        assert opened["policies"] == [run_dir.name, *scripts]
         assert opened["attention"]
         for name in ("oracle", run_dir.name, "random"):
             path = f"sessions/{opened['session']}"

@@ -189,6 +189,7 @@ def begun(config: RunConfig, run: Path, tmp_path: Path) -> subprocess.Popen[str]
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
 def test_no_worker_outlives_the_first(
     sent: signal.Signals, small_config: Configure, tmp_path: Path

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from innerattn.policies import best_script
 from innerattn.report.study.search import (
     SearchFound,
     search_page,
@@ -66,6 +67,7 @@ def study_page(found: Found, figures: Mapping[str, str]) -> str:
     """
     study, results, compared = found.study, found.results, found.compared
     keys = {one.run.key for one in results.finished}
+    planned = any(best_script(one.summary["scripted"]) == "planner" for one in results.finished)
     parts = [f"# {study.study.question or study.path.name}\n"]
     if found.note:
         parts.insert(0, f"> **{found.note[:1].upper()}{found.note[1:]}.**\n")
@@ -84,8 +86,8 @@ def study_page(found: Found, figures: Mapping[str, str]) -> str:
     for title, (shown, rows) in found.tables.items():
         if rows:
             of_faults = any(one.startswith(RETAINED) for one in shown.measures)
-            caption = f"{_SCORE}\n{_RETAINED}" if of_faults else _SCORE
-            parts += [f"## {title}\n", markdown(means_table(rows, shown.seeds)), caption]
+            captions = [_SCORE, *[_PLANNED] * planned, *[_RETAINED] * of_faults]
+            parts += [f"## {title}\n", markdown(means_table(rows, shown.seeds)), *captions]
     for title in found.curves:
         if title in figures:
             parts += [f"## {title}\n", f"![{title}]({figures[title]})\n", _CURVES]
@@ -135,9 +137,12 @@ def left_out(results: Results) -> list[str]:
 
 
 _SCORE = (
-    "A score of 0 plays like `random`, a score of 1 like `hungarian` in the same worlds, or like "
-    "`planner` where times, energy, sums or the order of tasks ask for plans. ± is half the 95 % "
-    "interval over seeds (Student's t); in brackets are the values of the seeds.\n"
+    "A score of 0 plays like `random`, a score of 1 like `hungarian`, in the same worlds. ± is "
+    "half the 95 % interval over seeds (Student's t); in brackets are the values of the seeds.\n"
+)
+_PLANNED = (
+    "Where times, energy, loads, sums or the order of tasks ask for plans, a score of 1 plays like "
+    "`planner`.\n"
 )
 _RETAINED = (
     "Retained is the share of the rescues that a team keeps: a mean over its robots, each of which "
