@@ -104,18 +104,13 @@ def paint_world(
 
 
 def _paint_arena(axes: Axes, scenario: Scenario, obstacles: NDArray[np.float32]) -> None:
-    from matplotlib.patches import Circle, Polygon, Rectangle
+    from matplotlib.patches import Circle, Rectangle
 
     half = scenario.arena_half_width_m
     axes.add_patch(Rectangle((-half, -half), 2 * half, 2 * half, fill=False, linewidth=2.5))
-    for station in scenario.stations:
-        (x, y), size = station.position_m, station.radius_m
-        square = Rectangle((x - size, y - size), 2 * size, 2 * size, facecolor="#d9ead3", zorder=0)
-        axes.add_patch(square)
-    for depot in scenario.depots:
-        (x, y), size = depot.position_m, depot.radius_m
-        corners = [(x + size, y), (x, y + size), (x - size, y), (x, y - size)]
-        axes.add_patch(Polygon(corners, facecolor="#fce5cd", zorder=0))
+    for stops, colour in ((scenario.stations, "#d9ead3"), (scenario.depots, "#fce5cd")):
+        for stop in stops:
+            axes.add_patch(Circle(stop.position_m, stop.radius_m, facecolor=colour, zorder=0))
     style: dict[str, Any] = {"facecolor": "#999999", "edgecolor": "#444444", "zorder": 1}
     for shape, (x, y) in zip(scenario.obstacles, obstacles.tolist(), strict=True):
         if shape.shape == "disc":
