@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scripted_play
 
 from innerattn.config import Battery, Scenario, Station
 from innerattn.envs import BatchEnv
@@ -20,16 +21,9 @@ def powered(stations: int = 2, capacity_j: float = 12.0, **changed: object) -> S
     )
 
 
-def played(name: str, scenario: Scenario, worlds: int = 16) -> tuple[int, float]:
-    """Rescues in an episode of each world, and the share of steps that robots were empty."""
-    policy = scripted_policy(name, scenario)
-    env = BatchEnv(scenario, worlds, seed=1, num_threads=1, autoreset="disabled")
-    obs, rescues, empty = env.reset(), 0, []
-    for _ in range(scenario.episode_steps):
-        step = env.step(policy.act(PolicyInput(obs, WorldState.of(env))))
-        obs, rescues = step.obs, rescues + len(step.rescues)
-        empty.append((env.charge() == 0.0).mean())
-    return rescues, float(np.mean(empty))
+def played(name: str, scenario: Scenario) -> tuple[int, float]:
+    """Rescues in an episode of each world, and the share of steps that a charge was used up."""
+    return scripted_play.played(name, scenario, BatchEnv.charge)
 
 
 @SCRIPTS

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scripted_play
 
 from innerattn.config import Battery, Depot, Scenario, Station
 from innerattn.envs import BatchEnv
@@ -19,16 +20,9 @@ def loaded(depots: int = 2, load: int = 2, **changed: object) -> Scenario:
     )
 
 
-def played(name: str, scenario: Scenario, worlds: int = 16) -> tuple[int, float]:
-    """Rescues in an episode of each world, and the share of steps that loads were used up."""
-    policy = scripted_policy(name, scenario)
-    env = BatchEnv(scenario, worlds, seed=1, num_threads=1, autoreset="disabled")
-    obs, rescues, used_up = env.reset(), 0, []
-    for _ in range(scenario.episode_steps):
-        step = env.step(policy.act(PolicyInput(obs, WorldState.of(env))))
-        obs, rescues = step.obs, rescues + len(step.rescues)
-        used_up.append((env.load() == 0.0).mean())
-    return rescues, float(np.mean(used_up))
+def played(name: str, scenario: Scenario) -> tuple[int, float]:
+    """Rescues in an episode of each world, and the share of steps that a load was used up."""
+    return scripted_play.played(name, scenario, BatchEnv.load)
 
 
 @SCRIPTS
