@@ -1,8 +1,9 @@
-//! Motion and contacts during one control period, by either of two engines; nothing else in the crate
+//! Motion and contacts during one control period, by one of three engines; nothing else in the crate
 //! knows which one runs. Each starts from positions and velocities alone and keeps nothing: a world's
 //! future depends on its own state only.
 
 mod discs;
+mod points;
 mod rapier;
 
 use crate::geometry::{Solid, Touch, Vec2};
@@ -44,6 +45,7 @@ impl Physics {
         Self(match scenario.engine {
             Choice::Rapier => Box::new(rapier::Rapier::new(scenario, team, solids)),
             Choice::Discs => Box::new(discs::Discs::new(scenario, team, solids)),
+            Choice::None => Box::new(points::Points::new(scenario, team)),
         })
     }
 

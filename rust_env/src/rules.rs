@@ -10,7 +10,7 @@ use crate::observe::Layout;
 use crate::physics::Physics;
 use crate::reward::Weights;
 use crate::robot::{Body, bodies};
-use crate::scenario::{Arrival, Scenario};
+use crate::scenario::{Arrival, Engine, Scenario};
 use crate::spawn::{Crowded, Spawn};
 use crate::supply::Supplies;
 use crate::tasks::Needs;
@@ -133,7 +133,7 @@ fn refuse_tasks_out_of_reach(scenario: &Scenario, team: &[Body], tasks: &[Needs]
     let (radius, arena) = (scenario.rescue_radius_m as f32, scenario.arena_half_width_m as f32);
     for (task, needs) in scenario.tasks.iter().zip(tasks) {
         let (apart, at_most) = least_rescue_radius(needs, team);
-        if radius < at_most {
+        if radius < at_most && scenario.engine != Engine::None {
             return Err(Error::Scenario {
                 key: "scenario.rescue_radius_m".into(),
                 value: scenario.rescue_radius_m.to_string(),
@@ -314,6 +314,8 @@ mod tests {
         assert_eq!(refused_team("0.3 0.301", r#", "rescue_radius_m": 0.301"#), "");
         assert_eq!(refused_team("0.3 0.301 0.1 0.11", narrow), ""); // two others can
         assert_ne!(refused_team("0.3 0.301 0.1", narrow), "");
+        // Without contacts all can be at one place.
+        assert_eq!(refused_team("0.3 0.301", r#", "rescue_radius_m": 0.15, "engine": "none""#), "");
     }
 
     #[test]

@@ -137,6 +137,8 @@ pub enum Engine {
     Rapier,
     /// Exact contacts of frictionless discs, walls and boxes.
     Discs,
+    /// No contacts: robots pass through each other.
+    None,
 }
 
 /// An obstacle's form.

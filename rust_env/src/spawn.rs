@@ -7,7 +7,7 @@ use crate::geometry::{Solid, Vec2};
 use crate::place::{DRAWS, Placed, Placing};
 use crate::rng::{Purpose, Stream};
 use crate::robot::Body;
-use crate::scenario::{Scenario, Situation};
+use crate::scenario::{Engine, Scenario, Situation};
 use crate::tasks::Victim;
 use crate::tasks::arrivals::Due;
 
@@ -43,6 +43,8 @@ pub struct Spawn {
     num_slots: usize,
     /// Slots of each task where victims arrive.
     slots_per_task: usize,
+    /// Whether robots pass through each other, so that they may start at the same place.
+    passing: bool,
 }
 
 impl Spawn {
@@ -60,6 +62,7 @@ impl Spawn {
             num_tasks: scenario.tasks.len(),
             num_slots: scenario.num_victims(),
             slots_per_task: scenario.max_victims,
+            passing: scenario.engine == Engine::None,
         }
     }
 
@@ -91,7 +94,7 @@ impl Spawn {
             let team = self.team.iter().zip(&self.starts).zip(&mut *robots);
             for ((body, start), robot) in team.filter(|((_, start), _)| start.is_some() == wanted) {
                 let place = self.placing.robot(stream, body, *start, &others, &solids);
-                clear &= place.clear;
+                clear &= place.clear || self.passing;
                 others.push((body, place.at));
                 *robot = place.at;
             }

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from innerattn.cli.main import main
-from innerattn.config.instances import read_instances
+from innerattn.config import Scenario
+from innerattn.config.instances import read_instances, read_worlds
 from innerattn.policies.scripted.planner import schedule_by
 
 Captured = pytest.CaptureFixture[str]
@@ -164,3 +165,67 @@ def test_wrong_words_for_a_replay(tmp_path: Path, capsys: Captured) -> None:
         assert err.startswith(f"innerattn: error: {told}"), err
         assert err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_schedules_are_played_with_bodies(tmp_path: Path, capsys: Captured) -> None:
+    path = tmp_path / "two.json"
+    entries = [one.model_dump(mode="json") for one in read_instances("ral")[:2]]
+    path.write_text(json.dumps(entries))
+    words = ("--instances", str(path))
+    points = document(capsys, "greedy", *words)
+    bodies = document(capsys, "greedy", *words, "--engine", "rapier")
+    assert (points["engine"], bodies["engine"]) == (None, "rapier")
+    for one, other in zip(points["instances"], bodies["instances"], strict=True):
+        assert one["makespan"] != other["makespan"] == pytest.approx(one["makespan"], rel=0.03)
+        assert one["is_done"]
+        assert other["is_done"]
+    assert main(["evaluate", "greedy", *words, "--engine", "discs"]) == 0
+    assert "by robots with bodies (engine discs)" in " ".join(capsys.readouterr().out.split())
+    assert main(["evaluate", "greedy", "--engine", "discs"]) == 2
+    assert "--engine: needs --instances" in capsys.readouterr().err
+
+
+def tiny(folder: Path) -> Path:
+    """A file with the first two worlds of the set."""
+    path = folder / "tiny.json"
+    path.write_text(json.dumps([one.written() for one in read_worlds("standard")[:2]]))
+    return path
+
+
+def test_a_script_is_measured_in_worlds(tmp_path: Path, capsys: Captured) -> None:
+    path = tiny(tmp_path)
+    found = document(capsys, "hungarian", "--instances", str(path))
+    worlds = read_worlds(path)
+    assert [one["name"] for one in found["instances"]] == [one.name for one in worlds]
+    assert (found["policy"], found["seed"], found["played"]) == ("hungarian", 0, 2)
+    makespans = [one["makespan"] for one in found["instances"]]
+    assert found["mean_makespan"] == pytest.approx(sum(makespans) / 2)
+    assert main(["evaluate", "hungarian", "--instances", str(path)]) == 0
+    printed = capsys.readouterr().out
+    assert max(map(len, printed.splitlines())) <= 80
+    assert "score 1 is as good" in " ".join(printed.split()).replace("score: ", "score ")
+    assert main(["evaluate", "hungarian", "--instances", str(path), "--quiet"]) == 0
+    line = capsys.readouterr().out
+    assert line.startswith("hungarian: score ")
+    assert line.endswith(", 2 worlds\n")
+    assert main(["evaluate", "greedy", "--instances", str(path), "--time-limit-ms", "3"]) == 2
+    assert "--time-limit-ms: has no meaning in worlds" in capsys.readouterr().err
+
+
+def test_a_world_is_described_and_replayed(
+    tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    world = read_worlds("standard")[1]
+    assert main(["info", "--instance", f"standard:{world.name}"]) == 0
+    text = capsys.readouterr().out
+    assert text.splitlines()[-1].startswith(f"# {world.name}: 2 robots, 6 victims; ")
+    (tmp_path / "world.toml").write_text(text)
+    assert Scenario.from_toml("world.toml") == world.scenario
+    words = ["--instance", f"standard:{world.name}"]
+    assert main(["replay", "hungarian", "greedy", *words]) == 0
+    assert "replay.html: 1 episodes" in capsys.readouterr().out
+    assert main(["replay", "hungarian", *words, "--scenario", "world.toml"]) == 2
+    assert "--scenario: has no meaning with --instance" in capsys.readouterr().err
+    assert main(["replay", "hungarian", *words, "--time-limit-ms", "5"]) == 2
+    assert "--time-limit-ms: has no meaning in worlds" in capsys.readouterr().err

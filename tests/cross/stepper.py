@@ -166,7 +166,13 @@ class Stepper:
         too_fast = speed > most
         factor = np.where(too_fast, most / np.where(too_fast, speed, 1.0), 1.0)
         velocities = velocities * factor[..., None]
-        return state.positions + velocities * dt, velocities
+        positions = state.positions + velocities * dt
+        if self.scenario.engine == "none":
+            wall = self.scenario.arena_half_width_m - self.radii[:, None]
+            stopped = (abs(positions) > wall) & self.there(state)[..., None]
+            positions = np.where(stopped, np.sign(positions) * wall, positions)
+            velocities = np.where(stopped, 0.0, velocities)
+        return positions, velocities
 
     def distances(self, state: State, positions: Array) -> Array:
         """Distances of robots from victims, (E, V, R)."""

@@ -236,6 +236,24 @@ def test_worlds_are_as_the_plain_stepper_says(chunk: int) -> None:
         assert total[what] > 50, (what, total)
 
 
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_without_contacts_are_as_the_plain_stepper_says(chunk: int) -> None:
+    """In small arenas, so that many robots would touch each other and walls."""
+    rng = np.random.default_rng(900 + chunk)
+
+    def small(scenario: Scenario) -> Scenario:
+        half = 0.75 * scenario.arena_half_width_m
+        return scenario.replace(
+            engine="none", obstacles=(), arena_half_width_m=half, rescue_radius_m=0.5 * half
+        )
+
+    total = compare_some(rng, small)
+    assert total["free"] == total["transitions"]
+    assert total["touched"] == 0
+    for what in ("rescues", "appeared"):
+        assert total[what] > 50, (what, total)
+
+
 def compare_some(rng: np.random.Generator, changed: Callable[[Scenario], Scenario]) -> Counter[str]:
     """12,000 transitions of random scenarios, each ``changed``; counts what was seen."""
     total: Counter[str] = Counter()

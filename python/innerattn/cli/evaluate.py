@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -21,12 +22,17 @@ from innerattn.cli.progress import Evaluating, Planning
 from innerattn.cli.runs import named_policy
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
-from innerattn.config.instances import read_instances
+from innerattn.config.instances import Instance, WorldInstance, read_any
 from innerattn.errors import ConfigError
 from innerattn.policies import SCRIPTS
 from innerattn.report.table import print_table
 from innerattn.report.tables.evaluation import print_summary, result_line
-from innerattn.report.tables.instances import results_line, results_table
+from innerattn.report.tables.instances import (
+    results_line,
+    results_table,
+    worlds_line,
+    worlds_table,
+)
 from innerattn.zoo import in_zoo
 
 if TYPE_CHECKING:
@@ -50,7 +56,7 @@ class Evaluate(LongCommand):
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
     """A run, or one of random, greedy, hungarian, planner, oracle. A run is a folder, latest, or
-    the beginning of the name of one in runs. With --instances: planner, greedy or random."""
+    the beginning of the name of one in runs. With --instances ral: planner, greedy or random."""
     scenario: Path | None = None
     """TOML file with the scenario to measure in; None: that of the run, or mixed."""
     situation: Literal["single", "double", "mixed"] | None = None
@@ -67,13 +73,16 @@ class Evaluate(LongCommand):
     long_episode_steps: int | None = None
     """The second length [control steps]; None: as the run says, or 100."""
     seed: int | None = None
-    """Seed of the worlds; None: as the run says, or 12345. With --instances, of the planner; None:
-    0."""
+    """Seed of the worlds; None: as the run says, or 12345. With --instances, of what is measured;
+    None: 0."""
     instances: str | None = None
-    """Measure a planner on these instances instead: a JSON file, or ral, which comes with the
-    package."""
+    """Measure on these instead: a JSON file, or what comes with the package: ral (instances of
+    task allocation, for planners) or standard (300 worlds)."""
     time_limit_ms: int | None = None
     """How long planner searches for each instance [ms]; None: 1000."""
+    engine: Literal["none", "discs", "rapier"] | None = None
+    """With --instances ral: play the schedules in worlds of bodies with these contacts, or none;
+    None: exactly, as points."""
     json: Path | None = None
     """Write the results to this file too; - for standard output, and nothing else there."""
 
@@ -93,6 +102,8 @@ class Evaluate(LongCommand):
             return self._on_instances(self.instances)
         if self.time_limit_ms is not None:
             raise UsageError("--time-limit-ms: needs --instances")
+        if self.engine is not None:
+            raise UsageError("--engine: needs --instances")
         evaluation = self._measure()
         if self._wrote(evaluation.summary.to_json()):
             return 0
@@ -116,21 +127,46 @@ class Evaluate(LongCommand):
         return False
 
     def _on_instances(self, source: str) -> int:
+        """Measure on instances of either sort."""
+        for name in self._given(*_OF_WORLDS):
+            raise UsageError(f"--{name.replace('_', '-')}: has no meaning with --instances")
+        check_seed(self.seed)
+        instances = read_any(source)
+        worlds = [one for one in instances if isinstance(one, WorldInstance)]
+        if worlds:
+            return self._in_worlds(worlds)
+        return self._planned([one for one in instances if isinstance(one, Instance)])
+
+    def _planned(self, instances: Sequence[Instance]) -> int:
         """Measure a planner."""
         from innerattn.evaluate.instances import solve_instances
 
         check_planner(self.policy, "--instances")
-        for name in self._given(*_OF_WORLDS):
-            raise UsageError(f"--{name.replace('_', '-')}: has no meaning with --instances")
         limit = limit_ms(self.time_limit_ms)
-        check_seed(self.seed)
-        instances = read_instances(source)
         with Planning(self.progress_console()) as progress:
-            found = solve_instances(self.policy, instances, limit, self.seed or 0, progress)
+            found = solve_instances(
+                self.policy, instances, limit, self.seed or 0, progress, self.engine
+            )
         if self._wrote(found.to_json()):
             return 0
         print_table(self.console(), results_table(found))
         self.say_result(f"{self.policy}: {results_line(found)}")
+        return 0
+
+    def _in_worlds(self, worlds: Sequence[WorldInstance]) -> int:
+        """Measure a script or a team in worlds."""
+        from innerattn.evaluate.instance_worlds import evaluate_worlds
+
+        for name in self._given("time_limit_ms", "engine"):
+            raise UsageError(f"--{name.replace('_', '-')}: has no meaning in worlds")
+        policy = named_policy(self.policy, SCRIPTS)
+        shown = self.policy if in_zoo(self.policy) else policy
+        with Planning(self.progress_console()) as progress:
+            found = replace(evaluate_worlds(policy, worlds, self.seed or 0, progress), policy=shown)
+        if self._wrote(found.to_json()):
+            return 0
+        print_table(self.console(), worlds_table(found))
+        self.say_result(f"{shown}: {worlds_line(found)}")
         return 0
 
     def _measure(self) -> Evaluation:

@@ -27,8 +27,9 @@ class Info(Command):
     scenario: Path | None = None
     """TOML file with a scenario: check it, print it with all defaults, and draw its arena."""
     instance: str | None = None
-    """JSON file with instances of task allocation, or ral, and a name, as in ral:ral_03: check the
-    file, describe the instance (without a name the first), and plan for it for a second."""
+    """JSON file with instances, or ral or standard, and a name, as in ral:ral_03: check the file
+    and describe the instance (without a name the first): a world as --scenario does, or points
+    with a plan of a second."""
     schema: Literal["scenario", "run", "study"] | None = None
     """Print the JSON Schema of the file of a scenario, a run or a study, for editors."""
 
@@ -47,12 +48,7 @@ class Info(Command):
         if len(asked) > 1:
             raise ConfigError(f"{' and '.join(asked)}: must be one of them at a time")
         if self.instance is not None:
-            from innerattn.config.instances import named_instance
-            from innerattn.policies.scripted.planner import plan
-            from innerattn.report.tables.instances import instance_words
-
-            instance = named_instance(self.instance)
-            print(instance_words(instance, plan(instance)))
+            _show_instance(self.instance)
             return 0
         if self.schema == "study":
             from innerattn.studies.schema import study_schema_text
@@ -65,13 +61,7 @@ class Info(Command):
             print(schema_text(self.schema), end="")
             return 0
         if self.scenario is not None:
-            from innerattn.report.scenario_map import scenario_map
-            from innerattn.report.scenario_words import scenario_words
-
-            scenario = Scenario.from_toml(self.scenario)
-            print(tomli_w.dumps(scenario.model_dump(exclude_none=True)))
-            for text in (scenario_map(scenario), scenario_words(scenario)):
-                print("\n".join(f"# {line}".rstrip() for line in text.splitlines()))
+            _show_scenario(Scenario.from_toml(self.scenario))
             return 0
         rows = {"innerattn": _version("innerattn"), "python": platform.python_version()}
         rows |= {name: _version(name) for name in _PACKAGES}
@@ -83,6 +73,29 @@ class Info(Command):
         for name, value in rows.items():
             print(f"{name:<11}{value}")
         return 0
+
+
+def _show_scenario(scenario: Scenario) -> None:
+    """The file with all keys, a map and a few sentences, as a file that can be used again."""
+    from innerattn.report.scenario_map import scenario_map
+    from innerattn.report.scenario_words import scenario_words
+
+    print(tomli_w.dumps(scenario.model_dump(exclude_none=True)))
+    for text in (scenario_map(scenario), scenario_words(scenario)):
+        print("\n".join(f"# {line}".rstrip() for line in text.splitlines()))
+
+
+def _show_instance(written: str) -> None:
+    from innerattn.config.instances import WorldInstance, named_instance
+    from innerattn.policies.scripted.planner import plan
+    from innerattn.report.tables.instances import instance_words, world_line
+
+    instance = named_instance(written)
+    if isinstance(instance, WorldInstance):
+        _show_scenario(instance.scenario)
+        print(f"# {world_line(instance)}")
+    else:
+        print(instance_words(instance, plan(instance)))
 
 
 def _version(package: str) -> str:

@@ -19,6 +19,7 @@ from innerattn.policies import SCRIPTS
 from innerattn.zoo import in_zoo
 
 if TYPE_CHECKING:
+    from innerattn.config.instances import Instance
     from innerattn.records import Record
 
 SUFFIXES = (".html", ".gif", ".mp4")
@@ -31,15 +32,14 @@ class Replay(Command):
     """Watch episodes in a browser, with attention drawn as arrows.
 
     Recorded episodes of a run are shown as they are. Scripts play in the worlds of the first run.
-    With --episodes, --seed or --scenario all policies play anew, in the same worlds. With
-    --instance it shows a planner's schedule.
+    With --episodes, --seed, --scenario or --instance all policies play anew, in the same worlds.
     """
 
     policies: Annotated[
         tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN|POLICY|FILE ...")
     ]
     """Runs, evaluation/episodes.parquet files, or random, greedy, hungarian, planner, oracle; up
-    to four, shown side by side. With --instance: planner, greedy or random; none: planner."""
+    to four, shown side by side. With --instance of points: planner, greedy or random."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("replay.html")
     """File to write: .html is a page, .gif or .mp4 a moving picture of one episode."""
     episodes: int | None = None
@@ -54,8 +54,8 @@ class Replay(Command):
     robot: str | None = None
     """Robot whose attention a moving picture shows, or all; None: the first that hands over."""
     instance: str | None = None
-    """Show a schedule for this instance of task allocation instead: a JSON file, or ral, and a
-    name, as in ral:ral_03; without a name the first."""
+    """Show this instance instead: a JSON file, or ral or standard, and a name, as in ral:ral_03;
+    without a name the first. Points are shown with a schedule, worlds with an episode."""
     time_limit_ms: int | None = None
     """How long planner searches for the instance [ms]; None: 1000."""
 
@@ -69,12 +69,23 @@ class Replay(Command):
             InnerattnError: no such run or policy, nothing recorded, or wrong options.
             OSError: the file cannot be written.
         """
+        world: Scenario | None = None
         if self.instance is not None:
-            return self._of_instance(self.instance)
+            from innerattn.config.instances import WorldInstance, named_instance
+
+            instance = named_instance(self.instance)
+            if not isinstance(instance, WorldInstance):
+                return self._of_instance(instance)
+            if self.scenario is not None:
+                raise UsageError("--scenario: has no meaning with --instance")
+            world = instance.scenario
         self._check()
         self.policies = [named_policy(one, SCRIPTS) for one in self.policies]
         names = _names(self.policies)
-        records = self._played() if self._plays_anew() else self._recorded()
+        if world is not None:
+            self.episodes = 1 if self.episodes is None else self.episodes
+        anew = world is not None or self._plays_anew()
+        records = self._played(world) if anew else self._recorded()
         if self.output.suffix == ".html":
             from innerattn.report.replay import replay_page
 
@@ -90,9 +101,8 @@ class Replay(Command):
         print(f"{self.output}: {records[0].num_episodes} episodes, {size:.1f} MB")
         return 0
 
-    def _of_instance(self, written: str) -> int:
+    def _of_instance(self, instance: Instance) -> int:
         """Plan for an instance and write the page of the schedule."""
-        from innerattn.config.instances import named_instance
         from innerattn.policies.scripted.planner import schedule_by
         from innerattn.report.schedule import schedule_page
         from innerattn.report.tables.instances import schedule_line
@@ -109,7 +119,6 @@ class Replay(Command):
         limit = limit_ms(self.time_limit_ms)
         check_seed(self.seed)
         check_target(self.output)
-        instance = named_instance(written)
         schedule = schedule_by(policy, instance, limit / 1000, self.seed or 0)
         write_whole(self.output, schedule_page(instance, schedule, policy).encode())
         print(f"{self.output}: {instance.name}, {policy}, {schedule_line(instance, schedule)}")
@@ -117,7 +126,8 @@ class Replay(Command):
 
     def _check(self) -> None:
         if self.time_limit_ms is not None:
-            raise UsageError("--time-limit-ms: needs --instance")
+            needs = "needs --instance" if self.instance is None else "has no meaning in worlds"
+            raise UsageError(f"--time-limit-ms: {needs}")
         if not 1 <= len(self.policies) <= 4:
             raise UsageError(f"{len(self.policies)} policies: must be 1 to 4 of RUN|POLICY|FILE")
         if self.output.suffix not in SUFFIXES:
@@ -141,7 +151,8 @@ class Replay(Command):
             for one in self.policies
         ]
 
-    def _played(self) -> list[Record]:
+    def _played(self, world: Scenario | None = None) -> list[Record]:
+        """New episodes; ``world`` is what they are in, if it is fixed."""
         from innerattn.records.run_folder import read_config
 
         runs = [one for one in self.policies if one not in SCRIPTS]
@@ -150,7 +161,9 @@ class Replay(Command):
                 raise UsageError(f"{one}: holds records, which cannot play; name the run's folder")
         config = read_config(runs[0]) if runs else None
         settings = config.evaluate if config else EvaluateConfig()
-        if self.scenario is not None:
+        if world is not None:
+            scenario = world
+        elif self.scenario is not None:
             scenario = Scenario.from_toml(self.scenario)
         else:
             scenario = config.scenario if config else Scenario.preset("mixed")

@@ -245,9 +245,10 @@ class Scenario(Model, Shown):
     friction: Annotated[float, Told(0.0, 10.0)] = Field(
         0.0, description="friction coefficient at contacts"
     )
-    engine: Literal["rapier", "discs"] = Field(
+    engine: Literal["rapier", "discs", "none"] = Field(
         "rapier",
-        description="contacts; rapier: rigid bodies in substeps; discs: exact, without friction",
+        description="contacts; rapier: rigid bodies in substeps; discs: exact, without friction; "
+        "none: robots pass through each other",
     )
     actions: Literal["discrete", "continuous"] = Field(
         "discrete", description="discrete: stay, +x, -x, +y, -y; continuous: a force in the plane"

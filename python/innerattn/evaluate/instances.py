@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from innerattn.config.instances import Instance
+from innerattn.config.instances.bodies import Engine
+from innerattn.evaluate.played_schedule import most_time, play_schedule
 from innerattn.policies.scripted.planner import schedule_by
 
 SCHEMA_VERSION = 1
@@ -19,13 +21,16 @@ class Solved:
 
     Attributes:
         instance: which one.
-        makespan: of the planner's schedule, in the instance's units.
+        makespan: of the planner's schedule, in the instance's units; with an engine, until the last
+            robot was back.
         seconds: what the planner took [s].
+        is_done: whether all robots were back before the time was up.
     """
 
     instance: Instance
     makespan: float
     seconds: float
+    is_done: bool = True
 
     def to_json(self) -> dict[str, Any]:
         """As a part of `InstanceResults.to_json`."""
@@ -33,6 +38,7 @@ class Solved:
             "name": self.instance.name,
             "makespan": self.makespan,
             "seconds": self.seconds,
+            "is_done": self.is_done,
             "published_makespan": self.instance.makespan_milp_600s,
             "lower_bound": self.instance.lower_bound_milp,
         }
@@ -46,6 +52,7 @@ class InstanceResults:
         policy: name of the planner.
         seed: of the planner.
         time_limit_ms: how long it was to search for each instance [ms]; None: it does not search.
+        engine: of the worlds in which its schedules were played; None: they were simulated exactly.
         solved: one for each instance, in order.
     """
 
@@ -53,6 +60,7 @@ class InstanceResults:
     seed: int
     time_limit_ms: int | None
     solved: tuple[Solved, ...]
+    engine: Engine | None = None
 
     @property
     def mean_makespan(self) -> float:
@@ -84,6 +92,7 @@ class InstanceResults:
             "policy": self.policy,
             "seed": self.seed,
             "time_limit_ms": self.time_limit_ms,
+            "engine": self.engine,
             "instances": [one.to_json() for one in self.solved],
             "mean_makespan": self.mean_makespan,
             "published_mean_makespan": self.published_mean_makespan,
@@ -97,8 +106,9 @@ def solve_instances(
     time_limit_ms: int,
     seed: int,
     progress: Callable[[int, int], None] | None = None,
+    engine: Engine | None = None,
 ) -> InstanceResults:
-    """Let a planner make a schedule for each instance, and simulate it.
+    """Let a planner make a schedule for each instance, and simulate it or play it in a world.
 
     Args:
         policy: one of `innerattn.policies.scripted.planner.PLANNERS`.
@@ -106,13 +116,23 @@ def solve_instances(
         time_limit_ms: how long ``planner`` searches for each [ms].
         seed: of ``planner`` and ``random``, the same for each instance.
         progress: is told how many instances of how many are done.
+        engine: of the worlds in which schedules are played, see `play_schedule`; None: they are
+            simulated exactly, as of points.
+
+    Raises:
+        ConfigError: an instance has no world.
     """
     solved = []
     for instance in instances:
         began = time.perf_counter()
         schedule = schedule_by(policy, instance, time_limit_ms / 1000, seed)
-        solved.append(Solved(instance, schedule.makespan, time.perf_counter() - began))
+        seconds = time.perf_counter() - began
+        makespan: float | None = schedule.makespan
+        if engine is not None:
+            makespan = play_schedule(instance, schedule, engine)
+        is_done = makespan is not None
+        solved.append(Solved(instance, makespan or most_time(schedule), seconds, is_done))
         if progress is not None:
             progress(len(solved), len(instances))
     limit = time_limit_ms if policy == "planner" else None
-    return InstanceResults(policy, seed, limit, tuple(solved))
+    return InstanceResults(policy, seed, limit, tuple(solved), engine)

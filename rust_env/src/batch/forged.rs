@@ -70,7 +70,7 @@ fn step(batch: &mut Batch, chance: &mut Stream) {
 
 #[test]
 fn a_forged_image_is_refused_or_a_state_from_which_worlds_go_on() {
-    for engine in [Engine::Rapier, Engine::Discs] {
+    for engine in [Engine::Rapier, Engine::Discs, Engine::None] {
         let mut batch = played(engine, 40);
         let image = batch.snapshot();
         let worlds_from = image.len() - CHECKSUM_BYTES - 2 * (image.len() / 3).min(600);

@@ -74,8 +74,31 @@ fn teams_have_their_limits() {
     let refused = heavy(51.0, Engine::Discs).expect_err("beyond what contacts are true for").to_string();
     let pair = "\"food_1\" weighs 51 kg and \"navigation_0\" 0.5 kg";
     assert_eq!(refused, format!("{masses} = 102: {pair}; must be at most 100"));
+    assert_eq!(heavy(900.0, Engine::None), Ok(()));
     let scenario = Scenario { robots: team_of(64), ..Scenario::default() };
     assert_eq!(scenario.validate(), Ok(()));
+}
+
+#[test]
+fn without_contacts_nothing_is_in_the_way_and_nothing_rubs() {
+    let none = |change: fn(&mut Scenario)| {
+        refusal(move |scenario| {
+            scenario.engine = Engine::None;
+            change(scenario);
+        })
+    };
+    let rubbing = none(|scenario| scenario.friction = 0.5);
+    assert_eq!(rubbing, "scenario.friction = 0.5: must be 0 where engine is not \"rapier\"");
+    let obstacle = none(|scenario| {
+        scenario.obstacles = vec![Obstacle {
+            shape: Shape::Disc,
+            radius_m: Some(0.1),
+            half_extents_m: None,
+            position_m: None,
+        }];
+    });
+    let rule = "must be none where engine = \"none\", in which nothing is in the way";
+    assert_eq!(obstacle, format!("scenario.obstacles (their number) = 1: {rule}"));
 }
 
 #[test]

@@ -43,8 +43,12 @@ impl Scenario {
         within("contact_cost", self.contact_cost, -1e6, 1e6, "")?;
         within("action_cost", self.action_cost, -1e6, 1e6, "")?;
         within("lost_cost", self.lost_cost, -1e6, 1e6, "")?;
-        if self.engine == Engine::Discs && self.friction != 0.0 {
-            return broken("friction", &self.friction, "must be 0 where engine = \"discs\"");
+        if self.engine != Engine::Rapier && self.friction != 0.0 {
+            return broken("friction", &self.friction, "must be 0 where engine is not \"rapier\"");
+        }
+        if self.engine == Engine::None && !self.obstacles.is_empty() {
+            let rule = "must be none where engine = \"none\", in which nothing is in the way";
+            return broken("obstacles (their number)", &self.obstacles.len(), rule);
         }
         counts("episode_steps", self.episode_steps as usize, 1, 1_000_000)?;
         counts("substeps", self.substeps as usize, 1, 1000)?;
@@ -85,6 +89,7 @@ impl Scenario {
                 format!(" with engine = \"rapier\", and {MAX_MASS_RATIO} with \"discs\""),
             ),
             Engine::Discs => (MAX_MASS_RATIO, String::new()),
+            Engine::None => return Ok(()),
         };
         match self.most_unlike() {
             Some((heaviest, lightest)) if self.mass_ratio() > most * (1.0 + 1e-12) => {

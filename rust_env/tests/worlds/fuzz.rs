@@ -139,6 +139,7 @@ fn strange(source: &mut Stream) -> Value {
         json!("food_0"),
         json!("discs"),
         json!("rapier"),
+        json!("none"),
         json!(large),
         json!([]),
         json!([0.1, 0.1]),

@@ -1,13 +1,24 @@
-"""Instances of multi-robot task allocation that others have published: model, reader and data."""
+"""Instances to be measured on: points of task allocation as others publish them, and worlds."""
 
 from innerattn.config.instances.instance import Instance, InstanceRobot, InstanceTask
-from innerattn.config.instances.read import SHIPPED, named_instance, read_instances
+from innerattn.config.instances.read import (
+    SHIPPED,
+    named_instance,
+    read_any,
+    read_instances,
+    read_worlds,
+)
+from innerattn.config.instances.world import Reference, WorldInstance
 
 __all__ = [
     "SHIPPED",
     "Instance",
     "InstanceRobot",
     "InstanceTask",
+    "Reference",
+    "WorldInstance",
     "named_instance",
+    "read_any",
     "read_instances",
+    "read_worlds",
 ]

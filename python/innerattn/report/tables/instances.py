@@ -1,19 +1,26 @@
-"""What is shown of planners and instances in a terminal."""
+"""What is shown of instances, and of those who were measured on them."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from innerattn.report.table import Table, columns, plain_table
-from innerattn.report.tables.text import number
+from innerattn.report.table import Row, Section, Table, columns, markdown, plain_table
+from innerattn.report.tables.text import number, percent
 
 if TYPE_CHECKING:
-    from innerattn.config.instances import Instance
+    from innerattn.config.instances import Instance, WorldInstance
+    from innerattn.evaluate.instance_worlds import WorldResults
     from innerattn.evaluate.instances import InstanceResults
     from innerattn.policies.scripted.planner import Schedule
 
 _NOTE = "ratio: mean makespan divided by the mean that was published with the instances"
+
+_SCORE_NOTE = (
+    "score: 1 is as good as the best script. It compares makespans; where victims have deadlines, "
+    "it compares rescues"
+)
 
 
 def results_table(results: InstanceResults) -> Table:
@@ -28,8 +35,12 @@ def results_table(results: InstanceResults) -> Table:
         f"{results.mean_seconds:.3f}",
     ]
     heads = ["instances", "makespan", "published", "ratio", "seconds each"]
-    notes = () if published is None else (_NOTE,)
-    return plain_table(columns(["policy"], heads), [row], notes=notes)
+    notes = [] if published is None else [_NOTE]
+    if results.engine is not None:
+        notes.append(f"schedules were played by robots with bodies (engine {results.engine})")
+    if late := sum(not one.is_done for one in results.solved):
+        notes.append(f"in {late} instances robots were not back in time; the time limit counts")
+    return plain_table(columns(["policy"], heads), [row], notes=tuple(notes))
 
 
 def results_line(results: InstanceResults) -> str:
@@ -71,3 +82,64 @@ def instance_words(instance: Instance, schedule: Schedule) -> str:
         "planner": f"makespan {number(schedule.makespan)}",
     }
     return "\n".join(f"{name:<11}{value}" for name, value in rows.items())
+
+
+def worlds_table(results: WorldResults) -> Table:
+    """What a policy reached in the worlds of each feature, and in all."""
+    heads = ["worlds", "played", "rescued", "makespan [s]", "score"]
+    rows = [_worlds_row(name, results.of(name)) for name in results.features]
+    rows.append(_worlds_row("all", results))
+    notes = [_SCORE_NOTE]
+    if reasons := [one.refusal for one in results.worlds if one.refusal]:
+        notes.append(
+            f"{len(reasons)} worlds were not played and do not count; the first because: "
+            f"{reasons[0]}"
+        )
+    return plain_table(columns(["feature"], heads), rows, notes=tuple(notes))
+
+
+def worlds_line(results: WorldResults) -> str:
+    """The same in one line."""
+    played, of = len(results.played), len(results.worlds)
+    worlds = f"{of} worlds" if played == of else f"{played} of {of} worlds"
+    return (
+        f"score {number(results.score)}, {percent(results.rescued_share)} rescued, "
+        f"mean makespan {number(results.mean_makespan_s)} s, {worlds}"
+    )
+
+
+def worlds_markdown(results: Sequence[WorldResults]) -> str:
+    """Scores of several policies on the same worlds, a row for each feature."""
+    rows = [
+        Row((name, *(_score_cell(one.of(name)) for one in results))) for name in results[0].features
+    ]
+    rows.append(Row(("all", *map(_score_cell, results)), strong=True))
+    names = [one.policy for one in results]
+    return markdown(Table(columns(["feature"], names), (Section(tuple(rows)),)))
+
+
+def world_line(world: WorldInstance) -> str:
+    """What a world is, and what its reference reached, in one line."""
+    found = world.reference
+    return (
+        f"{world.name}: {world.scenario.num_robots} robots, {world.victims} victims; "
+        f"{found.policy} rescued {found.rescued} in {found.makespan_s:.1f} s"
+    )
+
+
+def _worlds_row(name: str, results: WorldResults) -> list[str]:
+    return [
+        name,
+        f"{len(results.worlds):,}",
+        f"{len(results.played):,}",
+        percent(results.rescued_share),
+        number(results.mean_makespan_s),
+        number(results.score),
+    ]
+
+
+def _score_cell(results: WorldResults) -> str:
+    """Score and, in brackets, the share of victims that were rescued."""
+    if not results.played:
+        return "–"
+    return f"{number(results.score)} ({percent(results.rescued_share)})"
