@@ -224,7 +224,7 @@ def test_a_world_is_described_and_replayed(
     assert Scenario.from_toml("world.toml") == world.scenario
     words = ["--instance", f"standard:{world.name}"]
     assert main(["replay", "hungarian", "greedy", *words]) == 0
-    assert "replay.html: 1 episodes" in capsys.readouterr().out
+    assert "replay.html: 1 episode, " in capsys.readouterr().out
     assert main(["replay", "hungarian", *words, "--scenario", "world.toml"]) == 2
     assert "--scenario: has no meaning with --instance" in capsys.readouterr().err
     assert main(["replay", "hungarian", *words, "--time-limit-ms", "5"]) == 2

@@ -1,5 +1,6 @@
 """Every code block of the pages is run, here or by the test that is named here."""
 
+import json
 import os
 import re
 import shlex
@@ -13,6 +14,7 @@ import pytest
 
 from innerattn.cli.main import COMMANDS, _parse, main
 from innerattn.config import Scenario, load_run_config
+from innerattn.config.instances import read_worlds
 from innerattn.envs import BatchEnv
 from innerattn.policies import Exported
 from innerattn.studies.plan import plan_study
@@ -209,7 +211,17 @@ def test_commands_run(place: Path, command: str, capsys: pytest.CaptureFixture[s
         given = []  # one episode, of those that were recorded
     if "--instances" in words or (words[0] == "replay" and "--instance" in words):
         given = ["--time-limit-ms", "2"]
+    if any(one.split(":")[0] == "standard" for one in words):
+        given = []
+        words = [few_worlds(place) if one == "standard" else one for one in words]
     assert main([*words, *given]) == 0, capsys.readouterr().err
+
+
+def few_worlds(place: Path) -> str:
+    """A file with the first worlds of the set."""
+    path = place / "few.json"
+    path.write_text(json.dumps([one.written() for one in read_worlds("standard")[:2]]))
+    return str(path)
 
 
 def test_other_commands_name_what_is_there() -> None:

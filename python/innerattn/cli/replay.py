@@ -98,7 +98,9 @@ class Replay(Command):
             )
             write_whole(self.output, data)
         size = self.output.stat().st_size / 1e6
-        print(f"{self.output}: {records[0].num_episodes} episodes, {size:.1f} MB")
+        count = records[0].num_episodes
+        noun = "episode" if count == 1 else "episodes"
+        print(f"{self.output}: {count} {noun}, {size:.1f} MB")
         return 0
 
     def _of_instance(self, instance: Instance) -> int:
