@@ -11,6 +11,7 @@ export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 export PIP_CONSTRAINT := $(if $(CONSTRAINTS),$(CURDIR)/$(CONSTRAINTS))
 export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PYTHONDONTWRITEBYTECODE := # compiled modules are kept: the tests begin many processes
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
 .PHONY: train robot test test-pool test-asan test-gpu test-slow examples study-kill reliability soak lint format bench lock docs site schemas dist smoke bounds setup clean

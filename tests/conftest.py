@@ -5,6 +5,7 @@ import shutil
 import signal
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,8 @@ from innerattn.experiments.crossed.arms import ARMS
 from innerattn.experiments.plan import Case
 from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.studies.work import work
+
+torch.set_num_threads(1)  # there is a process of the tests for each core
 
 # A slow machine fails no property.
 settings.register_profile(
@@ -83,6 +86,19 @@ def plain_team(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from made_export import made_export  # PyTorch takes long to load what exports
 
     return made_once(tmp_path_factory, "plain_team", lambda folder: made_export(folder, "td-inner"))
+
+
+@pytest.fixture(scope="session")
+def framed_team(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """As ``plain_team``, of PPO in canonical frames, shared by kind, that sees faults."""
+    from made_export import FRAMED, made_export
+
+    values = {**FRAMED, "scenario.observe_faults": True, "scenario.victim_order": "slot"}
+
+    def make(folder: Path) -> None:
+        made_export(folder, "ppo-inner", **values)
+
+    return made_once(tmp_path_factory, "framed_team", make)
 
 
 @pytest.fixture(scope="session")
@@ -148,7 +164,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[FinishedRun]:
 
 @pytest.fixture(scope="session")
 def crossed_study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[FinishedRun]]:
-    """Runs of all arms in mixed, two of each, in a study's folder."""
+    """Runs of all arms in mixed, two of each, in a study's folder; not to be changed."""
     cases = [Case("mixed", arm.method, seed, arm.variant) for seed in range(2) for arm in ARMS]
 
     def folder_of(out: Path, case: Case) -> Path:
@@ -162,6 +178,16 @@ def crossed_study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[
 
     out = made_once(tmp_path_factory, "crossed_study", make)
     return out, [read_run(case, folder_of(out, case)) for case in cases]
+
+
+@pytest.fixture(scope="module")
+def crossed(
+    crossed_study: tuple[Path, list[FinishedRun]], tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, list[FinishedRun]]:
+    """A copy of the study of all arms, into which files may be written."""
+    shared, runs = crossed_study
+    out = shutil.copytree(shared, tmp_path_factory.mktemp("crossed") / "study")
+    return out, [replace(run, folder=out / run.folder.relative_to(shared)) for run in runs]
 
 
 @pytest.fixture
