@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from markdown_rows import rows_of
+from once import made_once
 
 from innerattn.cli.main import main
 from innerattn.experiments.archive import FILE, read_archive
@@ -48,18 +49,24 @@ def make(words: list[str], archive: Path, pool: Path) -> Path:
     return study
 
 
+def words_of(name: str) -> list[str]:
+    """Target and options of the command on a page."""
+    (command,) = re.findall(r"^innerattn (reproduce .*)$", page(name), flags=re.MULTILINE)
+    target, *options = command.removeprefix("reproduce ").replace(" --report-only", "").split()
+    return [{"all": "table2"}.get(target, target), *options]  # what else there is needs steps
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Folders of the studies, as the commands on the pages make them of the archives."""
-    folders = {}
-    for name in PAGES:
-        (command,) = re.findall(r"^innerattn (reproduce .*)$", page(name), flags=re.MULTILINE)
-        target, *options = command.removeprefix("reproduce ").replace(" --report-only", "").split()
-        target = {"all": "table2"}.get(target, target)  # what else there is needs steps
-        pool = tmp_path_factory.mktemp("studies") / name
-        pool.mkdir()
-        folders[name] = make([target, *options], RECORDS / f"{name}.parquet", pool)
-    return folders
+
+    def make_all(pools: Path) -> None:
+        for name in PAGES:
+            (pools / name).mkdir()
+            make(words_of(name), RECORDS / f"{name}.parquet", pools / name)
+
+    pools = made_once(tmp_path_factory, "published_studies", make_all)
+    return {name: pools / name / words_of(name)[0] for name in PAGES}
 
 
 def made_sections(name: str, folder: Path) -> tuple[str, str]:

@@ -81,9 +81,9 @@ def test_a_study_takes_archived_runs_for_runs(
 
 
 def test_archived_runs_give_the_same_report(
-    crossed_study: tuple[Path, list[FinishedRun]], tmp_path: Path
+    crossed: tuple[Path, list[FinishedRun]], tmp_path: Path
 ) -> None:
-    out, runs = crossed_study
+    out, runs = crossed
     write_archive(runs, tmp_path / FILE)
     write_crossed(runs, out, "quick")
     write_crossed(read_archive(tmp_path / FILE), tmp_path, "quick")

@@ -17,6 +17,8 @@ from innerattn.config.team import TeamConfig
 
 ROOT = Path(__file__).parents[2]
 
+pytestmark = pytest.mark.long  # it takes a minute to build
+
 
 class Links(HTMLParser):
     """What a page links to, what it loads, and the places that can be linked to."""
@@ -45,7 +47,6 @@ def pages(site: Path) -> dict[Path, Links]:
     return {page: Links(page.read_text("utf-8")) for page in site.rglob("*.html")}
 
 
-@pytest.mark.long
 def test_links_and_anchors(site: Path, pages: dict[Path, Links]) -> None:
     checked = 0
     for page, found in pages.items():
@@ -120,7 +121,6 @@ LOOKED_AT = sorted(
 )
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("size", [WIDE, PHONE], ids=["wide", "phone"])
 def test_no_page_scrolls_sideways(site: Path, browser: Browser, size: tuple[int, int]) -> None:
     for name in LOOKED_AT:

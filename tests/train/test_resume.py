@@ -13,6 +13,7 @@ from typing import Any
 import hypothesis.strategies as st
 import pytest
 from hypothesis import HealthCheck, given, settings
+from once import made_once
 
 from innerattn.config import RunConfig
 from innerattn.errors import RunError
@@ -28,9 +29,10 @@ SMALL = {
     "train.checkpoint_every_minutes": 0.0,
     "ppo.rollout_steps": 7,
     "ppo.minibatch_size": 32,
+    "ppo.epochs": 2,
     "network.attention_heads": 2,
     "td.replay_capacity": 300,
-    "td.update_every_env_steps": 5,
+    "td.update_every_env_steps": 20,
     "td.warmup_env_steps": 100,
 }
 WARM = {
@@ -144,13 +146,12 @@ def whole(
     small_config: Configure, tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[[str], tuple[str, str]]:
     """What a case leaves that is not cut, by its name."""
-    found: dict[str, tuple[str, str]] = {}
 
     def of(case: str) -> tuple[str, str]:
-        if case not in found:
-            path = tmp_path_factory.mktemp("whole") / "run"
-            found[case] = left_by(train(small_config(**{**SMALL, **CASES[case]}), path))
-        return found[case]
+        def make(folder: Path) -> None:
+            train(small_config(**{**SMALL, **CASES[case]}), folder / "run")
+
+        return left_by(made_once(tmp_path_factory, f"whole {case}", make) / "run")
 
     return of
 

@@ -3,8 +3,6 @@
 from pathlib import Path
 
 import pytest
-from made_export import FRAMED, made_export
-from once import made_once
 
 
 @pytest.fixture(scope="session")
@@ -14,11 +12,6 @@ def plain_export(plain_team: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def framed_export(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def framed_export(framed_team: Path) -> Path:
     """Entity networks in canonical frames, shared by kind; faults are seen; not to be changed."""
-    values = {**FRAMED, "scenario.observe_faults": True, "scenario.victim_order": "slot"}
-
-    def make(folder: Path) -> None:
-        made_export(folder, "ppo-inner", **values)
-
-    return made_once(tmp_path_factory, "framed_export", make) / "export"
+    return framed_team / "export"

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from markdown_rows import rows_of
 
 from innerattn.experiments.crossed.arms import arm_of
 from innerattn.experiments.crossed.outcome import outcome_of
+from innerattn.experiments.crossed.study import Situation
 from innerattn.experiments.run import FinishedRun
 from innerattn.report.crossed.tables import claims_table
 from innerattn.report.crossed.write import FILES, write_crossed
@@ -18,11 +20,23 @@ from innerattn.stats.text import format_estimate
 from innerattn.train.weights import digest_of
 
 Crossed = tuple[Path, list[FinishedRun]]
+Short = tuple[Path, Situation]
+
+
+@pytest.fixture(scope="module")
+def short(crossed: Crossed, tmp_path_factory: pytest.TempPathFactory) -> Short:
+    """The files of budget short, and what they say; not to be changed."""
+    out, runs = crossed
+    (situation,) = write_crossed(runs, out, "short")
+    kept = tmp_path_factory.mktemp("short")
+    for name in FILES:
+        shutil.copy(out / name, kept)
+    return kept, situation
 
 
 @pytest.mark.long
-def test_files_are_the_same_twice_and_say_what_they_are_of(crossed_study: Crossed) -> None:
-    out, runs = crossed_study
+def test_files_are_the_same_twice_and_say_what_they_are_of(crossed: Crossed) -> None:
+    out, runs = crossed
     write_crossed(runs, out, "quick", ["mixed td-inner seed 9: failed"])
     before = {name: (out / name).read_bytes() for name in FILES}
     write_crossed(runs[::-1], out, "quick", ["mixed td-inner seed 9: failed"])
@@ -38,8 +52,8 @@ def test_files_are_the_same_twice_and_say_what_they_are_of(crossed_study: Crosse
     assert "Left out" not in text
 
 
-def test_every_run_has_a_line(crossed_study: Crossed) -> None:
-    out, runs = crossed_study
+def test_every_run_has_a_line(crossed: Crossed) -> None:
+    out, runs = crossed
     write_crossed(runs, out, "quick")
     document = json.loads((out / "crossed.json").read_text())
     (situation,) = document["situations"]
@@ -65,9 +79,8 @@ def test_every_run_has_a_line(crossed_study: Crossed) -> None:
     assert len(scores) == 18  # else runs could be taken for one another
 
 
-def test_the_page_opens_with_its_figure_and_links_the_rest(crossed_study: Crossed) -> None:
-    out, runs = crossed_study
-    (situation,) = write_crossed(runs, out, "short")
+def test_the_page_opens_with_its_figure_and_links_the_rest(short: Short) -> None:
+    out, situation = short
     text = (out / "crossed.md").read_text()
     opening = text.split("\n## ")[0]
     assert opening.splitlines()[2].endswith("(crossed_seeds.png)")
@@ -80,9 +93,8 @@ def test_the_page_opens_with_its_figure_and_links_the_rest(crossed_study: Crosse
     assert len(text.split()) < 2_500
 
 
-def test_verdicts_of_situations_stand_below_one_another(crossed_study: Crossed) -> None:
-    out, runs = crossed_study
-    (mixed,) = write_crossed(runs, out, "short")
+def test_verdicts_of_situations_stand_below_one_another(short: Short) -> None:
+    _, mixed = short
     rows = rows_of(markdown(claims_table([mixed, replace(mixed, name="double")])))[1:]
     assert [row[0] for row in rows[::2]] == [answer.claim for answer in mixed.answers]
     assert {row[0] for row in rows[1::2]} == {""}
@@ -90,9 +102,8 @@ def test_verdicts_of_situations_stand_below_one_another(crossed_study: Crossed) 
     assert [row[2:] for row in rows[::2]] == [row[2:] for row in rows[1::2]]
 
 
-def test_the_long_tables_hold_every_arm_and_effect(crossed_study: Crossed) -> None:
-    out, runs = crossed_study
-    (situation,) = write_crossed(runs, out, "short")
+def test_the_long_tables_hold_every_arm_and_effect(short: Short) -> None:
+    out, situation = short
     rows = rows_of((out / "crossed_tables.md").read_text())
     by_arm = {row[0]: row for row in rows if len(row) == 8}
     for arm, means in situation.means.items():

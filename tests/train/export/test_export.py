@@ -27,10 +27,10 @@ from innerattn.train.export.check import check_export
 Made = tuple[Path, Path]
 
 
-@pytest.fixture(scope="module")
-def framed(tmp_path_factory: pytest.TempPathFactory) -> Made:
+@pytest.fixture
+def framed(framed_team: Path) -> Made:
     """PPO in canonical frames, parameters shared by kind, entities encoded one by one."""
-    return made_export(tmp_path_factory.mktemp("framed"), "ppo-inner", **FRAMED)
+    return framed_team / "run", framed_team / "export"
 
 
 @pytest.fixture(scope="module")
