@@ -24,7 +24,12 @@ from innerattn.envs import BatchEnv
 
 CHUNKS = 8
 LEAST = 104_000
-"""Transitions of all chunks together, half of which are for `make test-slow`."""
+"""Transitions of all chunks together."""
+PARTS = [
+    *(0, 1),
+    *(pytest.param(n, marks=pytest.mark.long) for n in (2, 3)),
+    *(pytest.param(n, marks=pytest.mark.slow) for n in range(4, CHUNKS)),
+]
 THIRDS = [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))]
 """Chunks of 12,000 transitions; two of three are for `make test-slow`."""
 
@@ -215,10 +220,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
     return seen
 
 
-@pytest.mark.parametrize(
-    "chunk",
-    [n if n < CHUNKS // 2 else pytest.param(n, marks=pytest.mark.slow) for n in range(CHUNKS)],
-)
+@pytest.mark.parametrize("chunk", PARTS)
 def test_worlds_are_as_the_plain_stepper_says(chunk: int) -> None:
     total: Counter[str] = Counter()
     rng = np.random.default_rng(100 + chunk)

@@ -113,7 +113,7 @@ def test_the_traced_update_agrees(algorithm: str, robots: int, attention: str) -
             {"policy_gradient": "sampled", "entropy_target": "maac"},
             marks=pytest.mark.slow,
         ),
-        ("ppo", "uniform", {"advantage": "value"}),
+        pytest.param("ppo", "uniform", {"advantage": "value"}, marks=pytest.mark.long),
     ],
 )
 def test_the_traced_update_agrees_masked_and_clipped(
@@ -140,7 +140,11 @@ def test_the_traced_update_agrees_by_kind() -> None:
 
 @pytest.mark.parametrize(
     ("algorithm", "robots"),
-    [("td", 1), ("ppo", 4), pytest.param("td", 4, marks=pytest.mark.slow)],
+    [
+        ("ppo", 4),
+        pytest.param("td", 1, marks=pytest.mark.long),
+        pytest.param("td", 4, marks=pytest.mark.slow),
+    ],
 )
 def test_the_compiled_update_agrees(algorithm: str, robots: int) -> None:
     agree(algorithm, robots, "inductor", {"attention": "inner"}, {})

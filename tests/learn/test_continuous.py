@@ -96,6 +96,7 @@ def test_what_pays_is_done_more() -> None:
     assert float(learner.act(obs, greedy=True)[..., 0].mean()) > 0.8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("backend", ["aot_eager", pytest.param("inductor", marks=pytest.mark.slow)])
 def test_the_compiled_update_agrees(backend: str) -> None:
     torch.compiler.reset()

@@ -39,7 +39,7 @@ def updated(precision: str, attention: str, *, compiled: bool) -> tuple[TD, dict
     [
         ("inner", False),
         ("uniform", False),
-        ("inner", True),
+        pytest.param("inner", True, marks=pytest.mark.long),
         pytest.param("uniform", True, marks=pytest.mark.slow),
     ],
 )

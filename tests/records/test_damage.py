@@ -19,7 +19,7 @@ from innerattn.records.run_files import RunFiles, amend
 from innerattn.records.run_folder import read_config
 from innerattn.train import load_policy
 
-SHORT, FULL = 40, 1000
+SHORT, FULL = 20, 1000
 FILES = (
     *("config.toml", "run.json", "manifest.json", "metrics.jsonl"),
     *("checkpoints/latest", "checkpoints/96/weights.safetensors"),

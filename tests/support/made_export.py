@@ -1,8 +1,10 @@
 """Exported teams for tests, of the weights that training begins with."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+import torch.onnx._internal.exporter._registration as registration
 from fresh_run import make_run, run_config
 
 from innerattn.envs.state import shares_left
@@ -16,6 +18,12 @@ FRAMED = {
     "network.hidden_width": 64,
     "network.attention_heads": 2,
 }
+
+
+# PyTorch gathers two thousand operators anew for each network that it writes: once will do.
+registration.ONNXRegistry.from_torchlib = staticmethod(
+    cache(registration.ONNXRegistry.from_torchlib)
+)
 
 
 def made_export(folder: Path, method: str, **values: object) -> tuple[Path, Path]:

@@ -98,7 +98,7 @@ def at_env_step(count: int) -> Callable[[Progress], None]:
 @pytest.mark.parametrize(
     ("method", "warm_start"),
     [
-        ("td-inner", "hungarian"),
+        pytest.param("td-inner", "hungarian", marks=pytest.mark.long),
         ("ppo-inner", "none"),
         pytest.param("td-inner", "none", marks=pytest.mark.slow),
         pytest.param("ppo-inner", "hungarian", marks=pytest.mark.slow),
