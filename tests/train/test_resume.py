@@ -128,7 +128,7 @@ def elsewhere(run: Path, stop_after: int = 0) -> None:
     code = """
 import sys
 from pathlib import Path
-sys.path.insert(0, sys.argv[3])
+sys.path[:0] = sys.argv[3:]
 from test_resume import stopped_after
 from innerattn.train import resume
 try:
@@ -136,7 +136,9 @@ try:
 except KeyboardInterrupt:
     assert int(sys.argv[2])
 """
-    command = [sys.executable, "-c", code, str(run), str(stop_after), str(Path(__file__).parent)]
+    here = Path(__file__).parent
+    folders = [str(here), str(here.parent / "support")]
+    command = [sys.executable, "-c", code, str(run), str(stop_after), *folders]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
