@@ -7,7 +7,7 @@ mod points;
 mod rapier;
 
 use crate::geometry::{Solid, Touch, Vec2};
-use crate::robot::Body;
+use crate::robot::{Body, bodies};
 use crate::scenario::{Engine as Choice, Scenario};
 
 /// What moves robots through a control period.
@@ -33,20 +33,81 @@ trait Engine: Send + Sync {
 pub struct Workspace {
     rapier: rapier::Scratch,
     discs: discs::Scratch,
+    layer: LayerScratch,
 }
 
-/// Everything about motion that a scenario fixes.
-pub struct Physics(Box<dyn Engine>);
+/// The robots and obstacles of one layer.
+#[derive(Default)]
+struct LayerScratch {
+    positions: Vec<Vec2>,
+    velocities: Vec<Vec2>,
+    obstacles: Vec<Vec2>,
+}
+
+/// Robots that can touch each other, and what moves them.
+struct Layer {
+    /// Indices of the robots.
+    robots: Vec<usize>,
+    /// Indices of the obstacles that block them.
+    obstacles: Vec<usize>,
+    engine: Box<dyn Engine>,
+}
+
+impl Layer {
+    fn new(scenario: &Scenario, name: &str) -> Self {
+        let robots = scenario.robots.iter().enumerate().filter(|(_, robot)| robot.layer == name);
+        let obstacles = scenario.obstacles.iter().enumerate().filter(|(_, obstacle)| obstacle.blocks(name));
+        let alone = scenario.layer_alone(name);
+        let team = bodies(&alone);
+        let solids: Vec<Solid> = alone.obstacles.iter().map(Solid::of).collect();
+        Self {
+            robots: robots.map(|(index, _)| index).collect(),
+            obstacles: obstacles.map(|(index, _)| index).collect(),
+            engine: match scenario.engine {
+                Choice::Rapier => Box::new(rapier::Rapier::new(&alone, &team, &solids)),
+                Choice::Discs => Box::new(discs::Discs::new(&alone, &team, &solids)),
+                Choice::None => Box::new(points::Points::new(&alone, &team)),
+            },
+        }
+    }
+
+    /// As [`Physics::advance`], for the robots of this layer alone.
+    fn advance(
+        &self,
+        workspace: &mut Workspace,
+        positions: &mut [Vec2],
+        velocities: &mut [Vec2],
+        obstacles: &[Vec2],
+        absent: u64,
+    ) -> u64 {
+        let mut own = std::mem::take(&mut workspace.layer);
+        let LayerScratch { positions: places, velocities: speeds, obstacles: centres } = &mut own;
+        let some = |into: &mut Vec<Vec2>, of: &[Vec2], which: &[usize]| {
+            into.clear();
+            into.extend(which.iter().map(|index| of[*index]));
+        };
+        some(places, positions, &self.robots);
+        some(speeds, velocities, &self.robots);
+        some(centres, obstacles, &self.obstacles);
+        let number = self.robots.iter().enumerate();
+        let away = number.clone().fold(0, |bits, (own, index)| bits | (absent >> index & 1) << own);
+        let touched = self.engine.advance(workspace, places, speeds, centres, away);
+        for (own, index) in number.clone() {
+            (positions[*index], velocities[*index]) = (places[own], speeds[own]);
+        }
+        workspace.layer = own;
+        number.fold(0, |bits, (own, index)| bits | (touched >> own & 1) << index)
+    }
+}
+
+/// Everything about motion that a scenario fixes: each layer by itself, so that none changes another.
+pub struct Physics(Vec<Layer>);
 
 impl Physics {
     /// Prepares the motion of a valid scenario's team.
     #[must_use]
-    pub(crate) fn new(scenario: &Scenario, team: &[Body], solids: &[Solid]) -> Self {
-        Self(match scenario.engine {
-            Choice::Rapier => Box::new(rapier::Rapier::new(scenario, team, solids)),
-            Choice::Discs => Box::new(discs::Discs::new(scenario, team, solids)),
-            Choice::None => Box::new(points::Points::new(scenario, team)),
-        })
+    pub(crate) fn new(scenario: &Scenario) -> Self {
+        Self(scenario.layers().iter().map(|name| Layer::new(scenario, name)).collect())
     }
 
     /// Moves the robots through one control period, in place. `obstacles` are the solids' centres; robots that
@@ -60,13 +121,17 @@ impl Physics {
         obstacles: &[Vec2],
         absent: u64,
     ) -> u64 {
-        self.0.advance(workspace, positions, velocities, obstacles, absent)
+        if let [only] = &self.0[..] {
+            return only.engine.advance(workspace, positions, velocities, obstacles, absent);
+        }
+        let each = self.0.iter();
+        each.fold(0, |bits, one| bits | one.advance(workspace, positions, velocities, obstacles, absent))
     }
 
     /// Worlds whose steps take long enough to be worth another thread.
     #[must_use]
     pub fn envs_worth_a_thread(&self) -> usize {
-        self.0.envs_worth_a_thread()
+        self.0[0].engine.envs_worth_a_thread()
     }
 }
 

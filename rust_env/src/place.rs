@@ -88,18 +88,21 @@ impl Placing {
         Self { arena, spawn_clearance: scenario.spawn_clearance_m as f32, wall_clearance: wall, victims }
     }
 
-    /// A place for an obstacle, clear of those already `placed` and of robots that start at given places.
+    /// A place for an obstacle that blocks these layers (as bits), clear of those already `placed` and of robots
+    /// of these layers that start at given places.
     pub fn obstacle(
         &self,
         stream: &mut Stream,
         solid: &Solid,
+        blocked: u64,
         placed: &[Placed],
         starts: &[(&Body, Vec2)],
     ) -> Place {
         draw(stream, &Region::square((self.arena - solid.reach()).max(0.0)), |at| {
             let solids = placed.iter().map(|(other, centre)| other.distance(at - centre) - solid.reach());
             let gap = |(body, start): &(&Body, Vec2)| solid.distance(start - at) - body.radius - START_GAP_M;
-            smallest(solids.chain(starts.iter().map(gap)))
+            let starts = starts.iter().filter(|(body, _)| body.layer & blocked != 0);
+            smallest(solids.chain(starts.map(gap)))
         })
     }
 
@@ -121,8 +124,8 @@ impl Placing {
         at.amax() <= self.victim_reach()
     }
 
-    /// A place for a robot, without overlap with solids and the `others` already placed: the one `given`,
-    /// or a random one.
+    /// A place for a robot, without overlap with solids and the `others` of its layer that are already placed:
+    /// the one `given`, or a random one.
     pub fn robot(
         &self,
         stream: &mut Stream,
@@ -133,7 +136,8 @@ impl Placing {
     ) -> Place {
         let gap = body.radius + START_GAP_M;
         let clearance = |at: Vec2| {
-            let others = others.iter().map(|(other, centre)| (at - centre).norm() - other.radius - gap);
+            let others = others.iter().filter(|(other, _)| other.layer == body.layer);
+            let others = others.map(|(other, centre)| (at - centre).norm() - other.radius - gap);
             smallest(others.chain(solids.iter().map(|(solid, centre)| solid.distance(at - centre) - gap)))
         };
         match given {
@@ -189,7 +193,7 @@ mod tests {
         let mut stream = Stream::new(0, 0, 0, Purpose::Start);
         let solids = [Solid::Disc(0.3), Solid::Box(Vec2::new(0.2, 0.05))];
         for _ in 0..300 {
-            let centre = placing.obstacle(&mut stream, &solids[1], &[(&solids[0], Vec2::zeros())], &[]);
+            let centre = placing.obstacle(&mut stream, &solids[1], 1, &[(&solids[0], Vec2::zeros())], &[]);
             assert!(centre.clear && solids[0].distance(centre.at) >= solids[1].reach());
             let placed = [(&solids[0], Vec2::zeros()), (&solids[1], centre.at)];
             let mut robots: Vec<(&Body, Vec2)> = vec![];
@@ -268,7 +272,7 @@ mod tests {
         assert!(!place.clear && place.at == at);
         let solid = Solid::Disc(0.3);
         for _ in 0..200 {
-            let place = placing.obstacle(&mut stream, &solid, &[], &[(&team[0], at)]);
+            let place = placing.obstacle(&mut stream, &solid, 1, &[], &[(&team[0], at)]);
             assert!(place.clear && (place.at - at).norm() > 0.35, "{place:?}");
         }
     }

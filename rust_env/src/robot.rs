@@ -1,7 +1,7 @@
 //! Robots as numbers: abilities as bits, and the drive that turns a command into a velocity.
 
 use crate::geometry::Vec2;
-use crate::scenario::{Actions, Scenario};
+use crate::scenario::{Actions, DriveMode, Scenario};
 
 /// Number of discrete actions: stay, +x, −x, +y, −y.
 pub const NUM_ACTIONS: usize = 5;
@@ -19,8 +19,13 @@ pub struct Body {
     pub mass: f32,
     /// Speed cap, m/s.
     pub max_speed: f32,
-    /// Speed gained by full drive in one control period, F/m · dt, m/s.
+    /// Speed gained by full drive in one control period, m/s: F/m · dt, or the speed cap where actions set
+    /// the velocity.
     pub gain: f32,
+    /// Share of the velocity that a control period begins with: none where actions set it.
+    pub kept: f32,
+    /// Its layer, one bit, in the order of [`Scenario::layers`].
+    pub layer: u64,
     /// Abilities as bits, in the order of [`Scenario::abilities`].
     pub abilities: u32,
 }
@@ -29,6 +34,8 @@ pub struct Body {
 #[must_use]
 pub(crate) fn bodies(scenario: &Scenario) -> Vec<Body> {
     let abilities = scenario.abilities();
+    let layers = scenario.layers();
+    let layer = |name: &str| layers.iter().position(|layer| *layer == name).map_or(0, |bit| 1 << bit);
     let bit = |name: &str| abilities.iter().position(|ability| *ability == name).map_or(0, |bit| 1 << bit);
     scenario
         .robots
@@ -37,7 +44,15 @@ pub(crate) fn bodies(scenario: &Scenario) -> Vec<Body> {
             radius: robot.radius_m as f32,
             mass: robot.mass_kg as f32,
             max_speed: robot.max_speed_mps as f32,
-            gain: (robot.drive_force_n / robot.mass_kg * scenario.dt_s) as f32,
+            gain: match robot.drive {
+                DriveMode::Force => (robot.drive_force_n / robot.mass_kg * scenario.dt_s) as f32,
+                DriveMode::Velocity => robot.max_speed_mps as f32,
+            },
+            kept: match robot.drive {
+                DriveMode::Force => 1.0 - scenario.damping as f32,
+                DriveMode::Velocity => 0.0,
+            },
+            layer: layer(&robot.layer),
             abilities: robot.abilities.names().map(bit).fold(0, |mask, bit| mask | bit),
         })
         .collect()
@@ -99,8 +114,8 @@ impl Commands<'_> {
 impl Body {
     /// The velocity a control period starts with: damped, driven, and clipped to `cap` of the speed cap.
     #[must_use]
-    pub fn driven(&self, velocity: Vec2, drive: Vec2, damping: f32, cap: f32) -> Vec2 {
-        let wanted = velocity * (1.0 - damping) + drive * self.gain;
+    pub fn driven(&self, velocity: Vec2, drive: Vec2, cap: f32) -> Vec2 {
+        let wanted = velocity * self.kept + drive * self.gain;
         let (speed, most) = (wanted.norm(), self.max_speed * cap);
         if speed > most { wanted * (most / speed) } else { wanted }
     }
@@ -116,11 +131,23 @@ mod tests {
         for (body, robot) in bodies(&scenario).iter().zip(&scenario.robots) {
             let mut velocity = Vec2::zeros();
             for _ in 0..20 {
-                velocity = body.driven(velocity, Vec2::new(0.0, 1.0), scenario.damping as f32, 1.0);
+                velocity = body.driven(velocity, Vec2::new(0.0, 1.0), 1.0);
                 assert!(velocity.norm() <= body.max_speed * (1.0 + 1e-6), "{}", robot.name);
             }
             assert!((velocity.norm() - body.max_speed).abs() < 1e-5, "{}", robot.name);
         }
+    }
+
+    #[test]
+    fn a_velocity_is_set_at_once_and_kept_by_nothing() {
+        let mut scenario = Scenario::default();
+        scenario.robots[1].drive = DriveMode::Velocity;
+        let body = bodies(&scenario)[1];
+        let fast = Vec2::new(-7.0, 3.0);
+        assert_eq!(body.driven(fast, Vec2::new(0.0, 1.0), 1.0), Vec2::new(0.0, 1.0));
+        assert_eq!(body.driven(fast, Vec2::new(0.3, -0.4), 1.0), Vec2::new(0.3, -0.4));
+        assert_eq!(body.driven(fast, Vec2::new(1.0, 0.0), 0.25), Vec2::new(0.25, 0.0));
+        assert_eq!(body.driven(fast, Vec2::zeros(), 1.0), Vec2::zeros());
     }
 
     #[test]

@@ -101,7 +101,7 @@ impl Rules {
             }
         }
         Ok(Self {
-            physics: Physics::new(&scenario, &team, &solids),
+            physics: Physics::new(&scenario),
             layout: Layout::new(&scenario, &tasks),
             services: Service::of_tasks(&scenario),
             deadlines: Deadlines::new(&scenario),
@@ -235,6 +235,7 @@ mod tests {
                 radius_m: Some(0.1),
                 half_extents_m: None,
                 position_m: Some([0.5, 0.65]),
+                layers: None,
             }];
         });
         assert!(
@@ -249,6 +250,7 @@ mod tests {
                 radius_m: Some(0.1),
                 half_extents_m: None,
                 position_m: Some([0.5, 0.65]),
+                layers: None,
             }];
         });
         assert!(refused.starts_with("scenario.arrivals[0] = [0.5, 0.5]: must be wall_clear"), "{refused}");

@@ -6,6 +6,7 @@ mod arrivals;
 mod battery;
 mod check;
 mod depot;
+mod layers;
 mod order;
 mod spot;
 mod task;
@@ -84,6 +85,17 @@ pub enum Actions {
     Discrete,
     /// Two numbers in [−1, 1], the drive's direction and share; the vector's length is clipped to 1.
     Continuous,
+}
+
+/// What an action sets of a robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DriveMode {
+    /// A force, so that it takes time until the robot is fast and until it stands.
+    #[default]
+    Force,
+    /// Its velocity, at once.
+    Velocity,
 }
 
 /// Who is rewarded for a rescue.
@@ -168,9 +180,15 @@ pub struct Robot {
     /// Radius of its disc, m.
     #[serde(default = "default_radius_m")]
     pub radius_m: f64,
-    /// Force of its drive, N.
+    /// Force of its drive, N; of no use where it sets the velocity.
     #[serde(default = "default_drive_force_n")]
     pub drive_force_n: f64,
+    /// What actions set.
+    #[serde(default)]
+    pub drive: DriveMode,
+    /// Robots of different layers do not touch each other.
+    #[serde(default = "layers::default_layer")]
+    pub layer: String,
     /// Where it is when an episode starts, m; a random place in each episode if absent.
     #[serde(default)]
     pub start_m: Option<[f64; 2]>,
@@ -205,6 +223,9 @@ pub struct Obstacle {
     /// Place of its centre, m; a random place in each episode if absent.
     #[serde(default)]
     pub position_m: Option<[f64; 2]>,
+    /// The layers of the robots that touch it; all if absent.
+    #[serde(default)]
+    pub layers: Option<Vec<String>>,
 }
 
 /// A rescue world, described. The defaults are the paper's team (Table I) in the mixed situation.
@@ -294,6 +315,8 @@ impl Default for Scenario {
             mass_kg,
             radius_m: default_radius_m(),
             drive_force_n: default_drive_force_n(),
+            drive: DriveMode::Force,
+            layer: layers::default_layer(),
             start_m: None,
             battery: None,
             load: None,

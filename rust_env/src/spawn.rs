@@ -34,6 +34,8 @@ pub struct Spawn {
     placing: Placing,
     team: Vec<Body>,
     solids: Vec<Solid>,
+    /// Layers that each obstacle blocks, as bits.
+    blocked: Vec<u64>,
     /// Given places of the obstacles, m; none for those that stand elsewhere in each episode.
     given: Vec<Option<Vec2>>,
     /// Given places of the robots when an episode starts, m; none for those that start elsewhere each time.
@@ -56,6 +58,7 @@ impl Spawn {
             placing: Placing::new(scenario),
             team: team.to_vec(),
             solids: solids.to_vec(),
+            blocked: scenario.blocked(),
             given: scenario.obstacles.iter().map(|obstacle| obstacle.position_m.map(given)).collect(),
             starts: scenario.robots.iter().map(|robot| robot.start_m.map(given)).collect(),
             situation: scenario.situation,
@@ -74,9 +77,10 @@ impl Spawn {
         placed.extend(given.filter_map(|(solid, at)| at.map(|at| (solid, at))));
         let starts = self.team.iter().zip(&self.starts);
         let starts: Vec<(&Body, Vec2)> = starts.filter_map(|(body, at)| at.map(|at| (body, at))).collect();
-        for ((solid, given), obstacle) in self.solids.iter().zip(&self.given).zip(obstacles) {
+        let each = self.solids.iter().zip(&self.blocked).zip(&self.given);
+        for (((solid, blocked), given), obstacle) in each.zip(obstacles) {
             *obstacle = given.unwrap_or_else(|| {
-                let place = self.placing.obstacle(stream, solid, &placed, &starts);
+                let place = self.placing.obstacle(stream, solid, *blocked, &placed, &starts);
                 clear &= place.clear;
                 placed.push((solid, place.at));
                 place.at
@@ -88,11 +92,11 @@ impl Spawn {
     /// Writes the robots' places, those given first. Returns whether none overlaps anything.
     pub fn place_robots(&self, stream: &mut Stream, obstacles: &[Vec2], robots: &mut [Vec2]) -> bool {
         let mut clear = true;
-        let solids = self.placed(obstacles);
         let mut others = Vec::with_capacity(self.team.len());
         for wanted in [true, false] {
             let team = self.team.iter().zip(&self.starts).zip(&mut *robots);
             for ((body, start), robot) in team.filter(|((_, start), _)| start.is_some() == wanted) {
+                let solids = self.solids_in(body.layer, obstacles);
                 let place = self.placing.robot(stream, body, *start, &others, &solids);
                 clear &= place.clear || self.passing;
                 others.push((body, place.at));
@@ -115,7 +119,7 @@ impl Spawn {
         let there = |index: &usize| *index != robot && absent >> index & 1 == 0;
         let others: Vec<(&Body, Vec2)> =
             (0..robots.len()).filter(there).map(|index| (&self.team[index], robots[index])).collect();
-        let solids = self.placed(obstacles);
+        let solids = self.solids_in(self.team[robot].layer, obstacles);
         robots[robot] = self.placing.robot(stream, &self.team[robot], None, &others, &solids).at;
     }
 
@@ -279,6 +283,12 @@ impl Spawn {
                 None
             }
         })
+    }
+
+    /// The obstacles that block a layer (one bit).
+    fn solids_in<'a>(&'a self, layer: u64, obstacles: &[Vec2]) -> Vec<Placed<'a>> {
+        let blocking = self.placed(obstacles).into_iter().zip(&self.blocked);
+        blocking.filter(|(_, blocked)| *blocked & layer != 0).map(|(placed, _)| placed).collect()
     }
 
     fn placed<'a>(&'a self, obstacles: &[Vec2]) -> Vec<Placed<'a>> {

@@ -160,14 +160,13 @@ impl World {
         let (away, unable, absent) = (self.away(rules), self.unable(rules), self.absent(rules));
         let distance_before = if shaping == Shaping::None { 0.0 } else { self.distance(rules, unable) };
         let mut effort = [0.0; MAX_ROBOTS];
-        let damping = rules.scenario.damping as f32;
         for (robot, body) in rules.team.iter().enumerate() {
             let is_away = away >> robot & 1 == 1;
             let given = commands.drive(env * rules.team.len() + robot);
             let drive = if is_away { Vec2::zeros() } else { given };
             effort[robot] = drive.norm_squared();
             let (drive, cap) = self.faults.drive(robot, drive);
-            self.velocities[robot] = body.driven(self.velocities[robot], drive, damping, cap);
+            self.velocities[robot] = body.driven(self.velocities[robot], drive, cap);
         }
         let before = rules.energy.as_ref().map(|_| {
             let mut places = [Vec2::zeros(); MAX_ROBOTS];

@@ -46,11 +46,11 @@ def printed(capsys: Captured, *arguments: str) -> str:
         ("train --train.sede 1", "--train.sede: unknown option, did you mean --train.seed?"),
         ("train --env-steps 9", "--env-steps: unknown option, did you mean --train.env-steps or"),
         ("train --frobnicate", "--frobnicate: unknown option; innerattn train --help-all lists"),
-        ("train --preset mxied", "--preset mxied: must be double, mixed, "),
+        ("train --preset mxied", "--preset mxied: must be air-ground, double, mixed, "),
         (
             "train --preset a.toml",
-            "--preset a.toml: must be double, mixed, mixed-1-food, mixed-16, mixed-4-food, "
-            "mixed-8, mixed-faults or single; --scenario reads a file",
+            "--preset a.toml: must be air-ground, double, mixed, mixed-1-food, mixed-16, "
+            "mixed-4-food, mixed-8, mixed-faults or single; --scenario reads a file",
         ),
         ("train --seed abc", "--seed abc: must be a whole number"),
         ("train --seed=abc", "--seed abc: must be a whole number"),

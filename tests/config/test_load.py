@@ -224,7 +224,9 @@ def test_wrong_values_are_named(overrides: dict[str, object], message: str) -> N
 
 
 def test_unknown_sources_are_named() -> None:
-    with pytest.raises(ConfigError, match=r"'triple': known are double, mixed, .*single"):
+    with pytest.raises(
+        ConfigError, match=r"'triple': known are air-ground, double, mixed, .*single"
+    ):
         load_run_config("triple")
     with pytest.raises(ConfigError, match=r"'long': known are fast, paper, quick, short, strong"):
         load_run_config(budget="long")

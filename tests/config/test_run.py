@@ -270,7 +270,8 @@ def test_a_digest_is_that_of_the_values_in_use() -> None:
         for name in names:
             del values[section][name]  # at its default
     for robot in values["scenario"]["robots"]:
-        del robot["start_m"], robot["battery"], robot["load"]
+        for name in ("start_m", "battery", "load", "drive", "layer"):
+            del robot[name]
     for task in values["scenario"]["tasks"]:
         for name in ("service_s", "service", "deadline_s", "after", "arrival_rate_hz"):
             del task[name]

@@ -64,6 +64,8 @@ class Stepper:
         robots, tasks = scenario.robots, scenario.tasks
         self.radii = np.array([robot.radius_m for robot in robots])
         self.max_speed = np.array([robot.max_speed_mps for robot in robots])
+        self.sets_velocity = np.array([robot.drive == "velocity" for robot in robots])
+        self.layers = np.array([robot.layer for robot in robots])
         self.acceleration = np.array([robot.drive_force_n / robot.mass_kg for robot in robots])
         self.abilities = sorted({ability for robot in robots for ability in robot.abilities})
         self.able = np.array([[a in robot.abilities for a in self.abilities] for robot in robots])
@@ -161,6 +163,8 @@ class Stepper:
         drive = drive * (faults["motor_gain"] * state.able)[..., None]
         velocities = (1 - self.scenario.damping) * state.velocities
         velocities = velocities + self.acceleration[:, None] * dt * drive
+        set_at_once = self.max_speed[:, None] * drive
+        velocities = np.where(self.sets_velocity[:, None], set_at_once, velocities)
         speed = np.linalg.norm(velocities, axis=-1)
         most = self.max_speed * faults["speed_limit"]
         too_fast = speed > most

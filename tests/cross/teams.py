@@ -194,3 +194,21 @@ def with_loads(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     ]
     fixed = [one for one in scenario.obstacles if one.position_m is None]
     return scenario.replace(robots=tuple(robots), depots=tuple(depots), obstacles=tuple(fixed))
+
+
+def with_layers(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, whose robots are in up to three layers in which obstacles block some of them, and
+    some of which set their velocity."""
+    names = ("ground", "air", "water")
+    robots = [
+        robot.replace(layer=names[rng.integers(3)], drive=("force", "velocity")[rng.integers(2)])
+        for robot in scenario.robots
+    ]
+    used = sorted({robot.layer for robot in robots})
+    obstacles = [
+        one.replace(layers=tuple(rng.permutation(used)[: rng.integers(1, len(used) + 1)].tolist()))
+        if rng.random() < 0.6
+        else one
+        for one in scenario.obstacles
+    ]
+    return scenario.replace(robots=tuple(robots), obstacles=tuple(obstacles))

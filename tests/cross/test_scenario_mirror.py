@@ -145,6 +145,14 @@ def test_the_reference_names_every_fault_and_every_reward() -> None:
     assert [name for name in names if f"`{name}`" not in text] == []
 
 
+def test_drives_agree() -> None:
+    for drive in get_args(Robot.model_fields["drive"].annotation):
+        table = {"robots": [*TEAM, {**ROBOT, "drive": drive}]}
+        assert compiled(table) == Scenario.model_validate(table).model_dump(mode="json")
+    with pytest.raises(ValueError, match="expected `force` or `velocity`"):
+        compiled({"robots": [*TEAM, {**ROBOT, "drive": "jet"}]})
+
+
 def test_shapes_agree() -> None:
     shapes = {"disc": {"radius_m": 0.1}, "box": {"half_extents_m": [0.1, 0.2]}}
     assert {*get_args(Obstacle.model_fields["shape"].annotation)} == shapes.keys()
@@ -174,6 +182,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
             *TEAM[1:],
             {**TEAM[0], "radius_m": 0.04, "drive_force_n": 3.5, "start_m": [0.25, -0.5]},
             {**TEAM[0], "name": "last", "battery": {**BATTERY, "idle_w": 0.25}, "load": 4},
+            {**TEAM[0], "name": "drone", "drive": "velocity", "layer": "air"},
         ],
         "tasks": [
             {
@@ -187,7 +196,14 @@ def test_every_value_survives_the_way_there_and_back() -> None:
             {**TASK, "name": "other"},
         ],
         "max_victims": 7,
-        "obstacles": [{"shape": "box", "half_extents_m": [0.1, 0.2], "position_m": [0.3, 0.4]}],
+        "obstacles": [
+            {
+                "shape": "box",
+                "half_extents_m": [0.1, 0.2],
+                "position_m": [0.3, 0.4],
+                "layers": ["air"],
+            }
+        ],
         "stations": [{**STATION, "radius_m": 0.25}],
         "depots": [{**DEPOT, "radius_m": 0.375}],
         "arena_half_width_m": 2.0,

@@ -11,6 +11,7 @@ from teams import (
     with_amounts,
     with_arrivals,
     with_batteries,
+    with_layers,
     with_list,
     with_loads,
     with_order,
@@ -340,6 +341,19 @@ def test_worlds_with_loads_are_as_the_plain_stepper_says(chunk: int) -> None:
 
     total = compare_some(rng, changed)
     for what in ("rescues", "appeared", "refilled", "used up"):
+        assert total[what] > 50, (what, total)
+
+
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_with_layers_and_set_velocities_are_as_the_plain_stepper_says(chunk: int) -> None:
+    rng = np.random.default_rng(1000 + chunk)
+
+    def changed(scenario: Scenario) -> Scenario:
+        scenario = with_layers(scenario, rng)
+        return with_batteries(scenario, rng) if rng.random() < 0.3 else scenario
+
+    total = compare_some(rng, changed)
+    for what in ("free", "touched", "rescues", "appeared"):
         assert total[what] > 50, (what, total)
 
 

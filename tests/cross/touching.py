@@ -18,13 +18,14 @@ def may_touch(plain: Stepper, state: State, velocities: Array) -> Bools:
     apart = at[:, :, None] - at[:, None]
     closing = (velocities[:, :, None] - velocities[:, None]) * dt
     reach = plain.radii[:, None] + plain.radii + 1e-4 - 10 * np.eye(len(plain.radii))
-    both = there[:, :, None] & there[:, None]
+    both = there[:, :, None] & there[:, None] & (plain.layers[:, None] == plain.layers)
     near |= ((closest(apart, closing) < reach) & both).any((-1, -2))
     for index, obstacle in enumerate(plain.scenario.obstacles):
         size = obstacle.radius_m or np.hypot(*(obstacle.half_extents_m or (0.0, 0.0)))
         apart = at - state.obstacles[:, None, index]
         close = closest(apart, velocities * dt) < plain.radii + size + 0.05
-        near |= (close & there).any(-1)
+        blocked = [layer in (obstacle.layers or plain.layers) for layer in plain.layers]
+        near |= (close & there & blocked).any(-1)
     return np.asarray(near)
 
 

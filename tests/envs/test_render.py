@@ -84,3 +84,21 @@ def test_render_through_the_environment() -> None:
     silent = parallel_env()
     silent.reset(seed=0)
     assert silent.render() is None
+
+
+def test_layers_are_told_apart_with_a_legend() -> None:
+    def shown(scenario: Scenario) -> tuple[list[str], list[object]]:
+        figure = Figure()
+        still, victims = np.zeros_like(PLACES), np.array([(1, 0, 0.0, 0.0)], VICTIM)
+        obstacles = np.zeros((len(scenario.obstacles), 2), np.float32)
+        paint_figure(figure, scenario, PLACES, still, victims, obstacles)
+        labels = [text.get_text() for text in figure.legends[0].get_texts()]
+        robots = [one for one in figure.axes[0].patches if one.get_zorder() == 3]
+        return labels, [one.get_linestyle() for one in robots]
+
+    labels, edges = shown(Scenario.preset("air-ground"))
+    assert "outline of\nlayer air" in labels
+    assert edges == ["--", "--", "-", "-"]
+    labels, edges = shown(Scenario())
+    assert not any("layer" in label for label in labels)
+    assert len(set(edges)) == 1

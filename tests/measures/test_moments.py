@@ -131,3 +131,17 @@ def test_obstacles_stand_where_the_episodes_had_them() -> None:
             env.step(np.zeros((4, 4), np.int64))
         assert np.array_equal(obstacle_places(record), env.obstacles())
     assert obstacle_places(watched(episodes=2)).shape == (2, 0, 2)
+
+
+def test_robots_of_other_layers_and_what_they_pass_block_nobody() -> None:
+    two = [{**LONE, "start_m": [0.0, 0.0]}, {**LONE, "name": "other", "start_m": [0.105, 0.0]}]
+    still = {"robot": "other", "kind": "unavailable", "value": 1.0}
+    task = {"tasks": [{"name": "t", "needs": ["food"]}], "faults": [still]}
+    heavy = {"mass_kg": 16.0, "drive_force_n": 0.0}
+
+    def first(**of_other: object) -> NDArray[np.bool_]:
+        robots = [two[0], {**two[1], **heavy, **of_other}]
+        return blocked(always(1, robots=robots, **task))[:, :2, 0]
+
+    assert first().any()
+    assert not first(layer="air").any()

@@ -87,3 +87,11 @@ def test_discs_close_a_corner() -> None:
     assert [line.partition(":")[0] for line in found] == [
         f"place ({at:g}, {at:g})" for _ in ("lift", "water") for at in (0.8, 0.9)
     ]
+
+
+def test_obstacles_keep_robots_of_the_layers_that_they_block() -> None:
+    made = scenario(0.06)
+    flying = made.robots[0].replace(layer="air")
+    walls = tuple(one.replace(layers=("ground",)) for one in made.obstacles)
+    found = list(closed_off(made.replace(robots=(flying, made.robots[1]), obstacles=walls)))
+    assert found == ["place (0, 0.5): obstacles keep every robot with water away from it"]

@@ -43,3 +43,13 @@ def test_areas_and_places_of_victims() -> None:
     assert sum(row.count("x") for row in rows(listed)) == 2
     assert "x  a victim may appear here" in scenario_map(listed)
     assert "·" not in scenario_map(listed)
+
+
+def test_obstacles_that_some_pass_have_their_own_sign() -> None:
+    preset = Scenario.preset("air-ground")
+    assert {sign for row in rows(preset) for sign in row} == {" ", "·", "%"}
+    assert "%  an obstacle that robots of some layers pass" in scenario_map(preset)
+    assert "an obstacle\n" not in scenario_map(preset)
+    first, *others = preset.robots
+    named = scenario_map(preset.replace(robots=(first.replace(start_m=(0.0, 0.0)), *others)))
+    assert "A  food_0 starts here (food; layer air)" in named

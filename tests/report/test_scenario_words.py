@@ -114,6 +114,35 @@ def test_loads_have_words() -> None:
     )
 
 
+def test_layers_have_words() -> None:
+    words = scenario_words(Scenario.preset("air-ground")).splitlines()
+    assert words[2:] == [
+        "layer ground: navigation_0, medical_0; they touch no robot of another layer",
+        "layer air: food_0, food_1; they touch no robot of another layer",
+        "obstacles[0]: robots of air pass it",
+        "obstacles[1]: robots of air pass it",
+    ]
+    assert "layer" not in scenario_words(Scenario())
+
+
+def test_set_velocities_have_words_and_need_no_force() -> None:
+    first, *others = Scenario().robots
+    still = {"drive_force_n": 0.0}
+    made = Scenario(robots=(first.replace(**still, drive="velocity"), *others))
+    assert scenario_words(made).splitlines()[2:] == ["food_0: actions set the velocity"]
+    assert "food_0: cannot move" in scenario_words(
+        Scenario(robots=(first.replace(**still), *others))
+    )
+
+
+def test_helpers_of_different_layers_meet_however_large() -> None:
+    robots = [robot.replace(radius_m=0.16) for robot in Scenario().robots]
+    doubt = "helpers hardly meet"
+    assert doubt in scenario_words(Scenario(robots=tuple(robots)))
+    flying = [robot.replace(layer="air") for robot in robots[:2]]
+    assert doubt not in scenario_words(Scenario(robots=(*flying, *robots[2:])))
+
+
 def test_what_is_doubtful() -> None:
     scenario = Scenario.model_validate(
         {

@@ -46,11 +46,13 @@ class Depot(Model):
     )
 
 
-def refuse_stores(scenario: Scenario, who: str) -> None:
+def refuse_stores_and_velocities(scenario: Scenario, who: str) -> None:
     """Refuse a team with batteries or loads, for policies (``who``) that know neither.
 
+    Robots whose actions set a velocity are refused, too: such policies know forces alone.
+
     Raises:
-        ConfigError: a robot has a battery or a load.
+        ConfigError: a robot has a battery or a load, or actions set its velocity.
     """
     for index, robot in enumerate(scenario.robots):
         key = f"scenario.robots[{index}]"
@@ -60,3 +62,5 @@ def refuse_stores(scenario: Scenario, who: str) -> None:
         if robot.load is not None:
             found = f"{key}.load = {robot.load}"
             raise ConfigError(f"{found}: there must be no load; {who} see no loads")
+        if robot.drive != "force":
+            raise ConfigError(f"{key}.drive = {robot.drive!r}: must be 'force'; {who} set forces")

@@ -28,7 +28,12 @@ _EXAMPLES: dict[str, Any] = {
 _OF_TABLES = {"robots": ("start_m", [-0.5, 0.0]), "tasks": ("deadline_s", [10.0, 20.0])}
 _TABLES: dict[str, dict[str, Any]] = {
     "arrivals": {"at_s": 2.0, "task": "task_1", "position_m": [0.5, 0.5]},
-    "obstacles": {"shape": "box", "half_extents_m": [0.3, 0.05], "position_m": [0.0, 0.4]},
+    "obstacles": {
+        "shape": "box",
+        "half_extents_m": [0.3, 0.05],
+        "position_m": [0.0, 0.4],
+        "layers": ["ground"],
+    },
     "faults": {"robot": "food_0", "kind": "motor_gain", "value": 0.3, "onset_step": 10},
 }
 """Values of keys, and tables, that are not there by default."""

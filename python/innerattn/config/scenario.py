@@ -45,7 +45,17 @@ class Robot(Model):
         0.05, description="radius of the disc [m]"
     )
     drive_force_n: Annotated[float, Told(0.0, 1e5)] = Field(
-        5.0, description="force of a full command [N]"
+        5.0, description="force of a full command, where actions set a force [N]"
+    )
+    drive: Annotated[Literal["force", "velocity"], ADDED_LATER] = Field(
+        "force",
+        description="what actions set; force: it takes time until the robot is fast and until it "
+        "stands; velocity: a share of max_speed_mps, at once",
+    )
+    layer: Annotated[str, ADDED_LATER] = Field(
+        "ground",
+        description="robots of different layers do not touch each other; 1 to 64 letters, digits, "
+        "'_' or '-'",
     )
     start_m: Annotated[tuple[float, float] | None, ADDED_LATER] = Field(
         None,
@@ -70,6 +80,16 @@ class Robot(Model):
             return self.abilities.get(ability, 0.0)
         return float(ability in self.abilities)
 
+    def gain_mps(self, dt_s: float) -> float:
+        """Speed that a full command adds in a control period of ``dt_s``, up to its limit [m/s]."""
+        if self.drive == "velocity":
+            return self.max_speed_mps
+        return self.drive_force_n / self.mass_kg * dt_s
+
+    def kept(self, damping: float) -> float:
+        """Share of its velocity that a control period begins with."""
+        return 0.0 if self.drive == "velocity" else 1.0 - damping
+
 
 class Obstacle(Model):
     """A fixed body in the way."""
@@ -85,6 +105,13 @@ class Obstacle(Model):
     position_m: tuple[float, float] | None = Field(
         None, description="centre, inside the walls [m]; None: a new random place each episode"
     )
+    layers: Annotated[tuple[str, ...] | None, ADDED_LATER, Told(1, 64)] = Field(
+        None, description="layers of the robots that touch it; None: all"
+    )
+
+    def blocks(self, layer: str) -> bool:
+        """Whether robots of a layer touch it."""
+        return self.layers is None or layer in self.layers
 
 
 class Fault(Model):
@@ -251,7 +278,9 @@ class Scenario(Model, Shown):
         "none: robots pass through each other",
     )
     actions: Literal["discrete", "continuous"] = Field(
-        "discrete", description="discrete: stay, +x, -x, +y, -y; continuous: a force in the plane"
+        "discrete",
+        description="discrete: stay, +x, -x, +y, -y; continuous: a force in the plane, or a "
+        "velocity, as the robot's drive says",
     )
     rescue_credit: Literal["helpers", "team"] = Field(
         "helpers", description="who is rewarded for a rescue"
@@ -398,6 +427,12 @@ class Scenario(Model, Shown):
     def has_loads(self) -> bool:
         """Whether some robots can help with so many rescues alone before a depot refills them."""
         return any(robot.load is not None for robot in self.robots)
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """The layers of the robots: "ground", then the others by the first robot of each."""
+        found = dict.fromkeys(robot.layer for robot in self.robots)
+        return tuple(sorted(found, key=lambda layer: layer != "ground"))
 
     @property
     def robots_leave(self) -> bool:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _VICTIM_COLOUR = "#D55E00"
 _TASK_MARKERS = "*XDP^v"
+_EDGES = ("-", "--", ":", "-.")  # of robots, by their layer
 _ARROW_S = 0.2  # an arrow's tip is where the robot would be after so many seconds
 
 
@@ -78,7 +79,8 @@ def paint_figure(
     axes = figure.add_axes((0.1, 0.1, 0.63, 0.84))
     axes.set_title(title)
     legend = paint_world(axes, scenario, positions, velocities, victims, obstacles)
-    figure.legend(legend.values(), legend.keys(), loc=(0.74, 0.6), frameon=False, labelspacing=0.9)
+    low = 0.6 - 0.08 * (len(scenario.layers) - 1)
+    figure.legend(legend.values(), legend.keys(), loc=(0.74, low), frameon=False, labelspacing=0.9)
 
 
 def paint_world(
@@ -111,8 +113,12 @@ def _paint_arena(axes: Axes, scenario: Scenario, obstacles: NDArray[np.float32])
     for stops, colour in ((scenario.stations, "#d9ead3"), (scenario.depots, "#fce5cd")):
         for stop in stops:
             axes.add_patch(Circle(stop.position_m, stop.radius_m, facecolor=colour, zorder=0))
-    style: dict[str, Any] = {"facecolor": "#999999", "edgecolor": "#444444", "zorder": 1}
+    style: dict[str, Any] = {"edgecolor": "#444444", "zorder": 1}
     for shape, (x, y) in zip(scenario.obstacles, obstacles.tolist(), strict=True):
+        if not all(map(shape.blocks, scenario.layers)):
+            style |= {"facecolor": "#dddddd", "linestyle": "--"}
+        else:
+            style |= {"facecolor": "#999999", "linestyle": "-"}
         if shape.shape == "disc":
             axes.add_patch(Circle((x, y), shape.radius_m or 0.0, **style))
         else:
@@ -149,12 +155,14 @@ def _paint_robots(
     velocities: NDArray[np.float32],
 ) -> dict[str, Artist]:
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Circle
+    from matplotlib.patches import Circle, Patch
     from matplotlib.patheffects import withStroke
 
     legend: dict[str, Artist] = {}
     halo = [withStroke(linewidth=2.5, foreground="white")]
     looks = robot_looks(robot.kind for robot in scenario.robots)
+    layers = scenario.layers
+    edge: dict[str, Any]
     for robot, look, (x, y), velocity in zip(
         scenario.robots, looks, positions, velocities, strict=True
     ):
@@ -163,8 +171,9 @@ def _paint_robots(
             legend[robot.kind] = Line2D(
                 [], [], color=colour, marker="o", linestyle="", markersize=11
             )
+        edge = {"edgecolor": "k", "linestyle": _EDGES[layers.index(robot.layer) % len(_EDGES)]}
         axes.add_patch(
-            Circle((float(x), float(y)), robot.radius_m, facecolor=colour, edgecolor="k", zorder=3)
+            Circle((float(x), float(y)), robot.radius_m, facecolor=colour, zorder=3, **edge)
         )
         if np.isnan(x):
             continue
@@ -186,6 +195,9 @@ def _paint_robots(
                 arrowprops={"arrowstyle": "->", "linewidth": 1.5},
                 zorder=6,
             )
+    for index, layer in enumerate(layers[1:], 1):
+        edge = {"edgecolor": "k", "linestyle": _EDGES[index % len(_EDGES)]}
+        legend[f"outline of\nlayer {layer}"] = Patch(facecolor="none", **edge)
     legend["velocity"] = Line2D(
         [], [], color="k", marker=r"$\rightarrow$", linestyle="", markersize=14
     )

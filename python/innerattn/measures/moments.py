@@ -156,9 +156,9 @@ def _free_way(
     x, y = drive[..., 0], drive[..., 1]
     drive = np.stack([cos * x - sin * y, sin * x + cos * y], -1)
     drive *= (faults["motor_gain"] * (faults["unavailable"] == 0.0))[..., None]
-    gain = np.array([robot.drive_force_n / robot.mass_kg for robot in scenario.robots])
-    velocity = velocities * (1.0 - scenario.damping)
-    velocity = velocity + drive * (gain * scenario.dt_s)[:, None]
+    gain = np.array([robot.gain_mps(scenario.dt_s) for robot in scenario.robots])
+    kept = np.array([robot.kept(scenario.damping) for robot in scenario.robots], np.float32)
+    velocity = velocities * kept[:, None] + drive * gain[:, None]
     cap = np.array([robot.max_speed_mps for robot in scenario.robots]) * faults["speed_limit"]
     speed = np.linalg.norm(velocity, axis=-1)
     velocity = velocity * np.minimum(1.0, cap / np.maximum(speed, 1e-9))[..., None]
@@ -176,6 +176,8 @@ def _touching(
     )
     gaps = np.linalg.norm(positions[..., :, None, :] - positions[..., None, :, :], axis=-1)
     gaps -= radius[:, None] + radius + _TOUCH_M
+    layers = np.array([robot.layer for robot in scenario.robots])
+    gaps[..., layers[:, None] != layers] = np.inf
     gaps[..., np.arange(len(radius)), np.arange(len(radius))] = np.inf
     touching |= (gaps < 0.0).any(-1)
     for number, shape in enumerate(scenario.obstacles):
@@ -184,7 +186,7 @@ def _touching(
             half = np.array(shape.half_extents_m)
             away = away - np.clip(away, -half, half)
         gap = np.linalg.norm(away, axis=-1) - (shape.radius_m or 0.0) - radius
-        touching |= gap < _TOUCH_M
+        touching |= (gap < _TOUCH_M) & np.array([shape.blocks(layer) for layer in layers.tolist()])
     return touching
 
 

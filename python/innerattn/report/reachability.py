@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.config import Robot, Scenario
+from innerattn.config import Obstacle, Robot, Scenario
 
 _CELLS = 201
 _LEAST_SHARE = 0.01
@@ -52,7 +52,8 @@ def _near(scenario: Scenario, robot: Robot) -> Mask:
     radius = robot.radius_m - step
     half = scenario.arena_half_width_m
     inside = np.maximum(np.abs(x), np.abs(y)) <= half - radius
-    free = inside & (_clearance(scenario, x, y) >= radius)
+    blocking = [one for one in scenario.obstacles if one.blocks(robot.layer)]
+    free = inside & (_clearance(blocking, x, y) >= radius)
     if robot.start_m is not None:
         parts, _ = label(free, np.ones((3, 3)))
         free = free & (parts == parts[_cell(scenario, *robot.start_m)])
@@ -68,15 +69,15 @@ def _area(scenario: Scenario) -> Mask:
     half = scenario.arena_half_width_m - scenario.wall_clearance_m
     x_min, y_min, x_max, y_max = scenario.victim_area_m or (-half, -half, half, half)
     inside = (x_min <= x) & (x <= x_max) & (y_min <= y) & (y <= y_max)
-    return inside & (_clearance(scenario, x, y) > 0.0)
+    return inside & (_clearance(scenario.obstacles, x, y) > 0.0)
 
 
 def _clearance(
-    scenario: Scenario, x: NDArray[np.float64], y: NDArray[np.float64]
+    obstacles: Iterable[Obstacle], x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Distance to the nearest obstacle that has a place, below 0 inside one [m]."""
     nearest = np.full(x.shape, math.inf)
-    for one in scenario.obstacles:
+    for one in obstacles:
         if one.position_m is None:
             continue
         dx, dy = np.abs(x - one.position_m[0]), np.abs(y - one.position_m[1])

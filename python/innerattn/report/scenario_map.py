@@ -9,14 +9,14 @@ from innerattn.config.amounts import in_words
 
 _COLUMNS, _ROWS = 61, 31
 _CORNER, _SIDE, _UPRIGHT = "+", "-", "|"
-_FREE, _AREA, _PLACE, _SOLID = " ", "·", "x", "#"
+_FREE, _AREA, _PLACE, _SOLID, _PASSED = " ", "·", "x", "#", "%"
 
 
 def scenario_map(scenario: Scenario) -> str:
     """The arena with all that has a place of its own, and a legend; without a newline at the end.
 
-    Robots with a start are drawn by a letter, obstacles by ``#``, victims' places by ``x``, and the
-    area in which victims may appear by ``·``.
+    Robots with a start are drawn by a letter, obstacles by ``#``, those that some layers pass by
+    ``%``, victims' places by ``x``, and the area in which victims may appear by ``·``.
     """
     half = scenario.arena_half_width_m
     wall = _CORNER + _SIDE * _COLUMNS + _CORNER
@@ -33,8 +33,8 @@ def scenario_map(scenario: Scenario) -> str:
             x = half * (2.0 * (column + 0.5) / _COLUMNS - 1.0)
             if letter := starts.get((column, row)):
                 cells.append(letter)
-            elif any(_covers(obstacle, x, y) for obstacle in scenario.obstacles):
-                cells.append(_SOLID)
+            elif over := [one for one in scenario.obstacles if _covers(one, x, y)]:
+                cells.append(_SOLID if any(_blocks_all(scenario, one) for one in over) else _PASSED)
             elif (column, row) in places:
                 cells.append(_PLACE)
             else:
@@ -48,13 +48,17 @@ def _legend(scenario: Scenario) -> Iterator[str]:
     placed = [robot for robot in scenario.robots if robot.start_m is not None]
     for letter, robot in zip(_letters(), placed, strict=False):
         offers = ", ".join(in_words(robot.abilities)) or "no ability"
+        offers += f"; layer {robot.layer}" * (len(scenario.layers) > 1)
         yield f"{letter}  {robot.name} starts here ({offers})"
     if scenario.only_places_m:
         yield f"{_PLACE}  a victim may appear here"
     else:
         yield f"{_AREA}  victims appear here"
-    if any(obstacle.position_m is not None for obstacle in scenario.obstacles):
+    drawn = [one for one in scenario.obstacles if one.position_m is not None]
+    if any(_blocks_all(scenario, one) for one in drawn):
         yield f"{_SOLID}  an obstacle"
+    if not all(_blocks_all(scenario, one) for one in drawn):
+        yield f"{_PASSED}  an obstacle that robots of some layers pass"
     robots = len(scenario.robots) - len(placed)
     obstacles = sum(obstacle.position_m is None for obstacle in scenario.obstacles)
     anywhere = [f"{count} {what}" for count, what in ((robots, "robots"), (obstacles, "obstacles"))]
@@ -80,6 +84,10 @@ def _column(x: float, half: float) -> int:
 
 def _row(y: float, half: float) -> int:
     return min(int((1.0 - y / half) / 2.0 * _ROWS), _ROWS - 1)
+
+
+def _blocks_all(scenario: Scenario, obstacle: Obstacle) -> bool:
+    return all(map(obstacle.blocks, scenario.layers))
 
 
 def _covers(obstacle: Obstacle, x: float, y: float) -> bool:

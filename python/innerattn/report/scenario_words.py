@@ -22,12 +22,11 @@ _WHAT = {
 
 
 def scenario_words(scenario: Scenario) -> str:
-    """Sentences, a line each: tasks and who can do them, batteries, loads, doubts, the faults."""
+    """Sentences, a line each: tasks and who can do them, stores, layers, doubts, the faults."""
     faults = map(_fault, scenario.faults)
     gone = ["Robots that are out are not in the arena."] if scenario.robots_leave else []
-    return "\n".join(
-        [*_tasks(scenario), *_end(scenario), *_stores(scenario), *_doubts(scenario), *faults, *gone]
-    )
+    who = [*_tasks(scenario), *_end(scenario), *_stores(scenario), *_motion(scenario)]
+    return "\n".join([*who, *_doubts(scenario), *faults, *gone])
 
 
 def _tasks(scenario: Scenario) -> Iterator[str]:
@@ -83,6 +82,19 @@ def _stores(scenario: Scenario) -> Iterator[str]:
             yield f"{robot.name}: helps with {rescues}, then {until}"
 
 
+def _motion(scenario: Scenario) -> Iterator[str]:
+    """Who touches whom, and whose velocity is set."""
+    layers = scenario.layers
+    for layer in layers if len(layers) > 1 else ():
+        robots = ", ".join(robot.name for robot in scenario.robots if robot.layer == layer)
+        yield f"layer {layer}: {robots}; they touch no robot of another layer"
+    for index, one in enumerate(scenario.obstacles):
+        if passing := [layer for layer in layers if not one.blocks(layer)]:
+            yield f"obstacles[{index}]: robots of {' and '.join(passing)} pass it"
+    if quick := [robot.name for robot in scenario.robots if robot.drive == "velocity"]:
+        yield f"{', '.join(quick)}: actions set the velocity"
+
+
 def _reach_m(robot: Robot) -> float:
     """How far a robot drives at its highest speed with a full battery [m]."""
     if robot.battery is None:
@@ -120,7 +132,7 @@ def _doubts(scenario: Scenario) -> Iterator[str]:
     for robot in scenario.robots:
         if not needed & set(robot.abilities):
             yield f"{robot.name}: has no ability that a task needs"
-        if robot.drive_force_n == 0.0:
+        if robot.drive_force_n == 0.0 and robot.drive == "force":
             yield f"{robot.name}: cannot move, its drive_force_n is 0"
         if _reach_m(robot) < scenario.arena_half_width_m:
             yield (
@@ -137,11 +149,11 @@ def _doubts(scenario: Scenario) -> Iterator[str]:
     if scenario.end_when_done and last_s > time_s:
         yield f"end_when_done: a victim arrives after {last_s:g} s, and time is up at {time_s:g} s"
     for task in scenario.tasks:
-        radii = sorted(
-            robot.radius_m for robot in scenario.robots if set(task.needs) & set(robot.abilities)
-        )
-        least = sum(radii[:2]) / 2.0
-        if _needs_several(task, scenario) and scenario.rescue_radius_m < least:
+        able = [robot for robot in scenario.robots if set(task.needs) & set(robot.abilities)]
+        least = sum(sorted(robot.radius_m for robot in able)[:2]) / 2.0
+        overlap = len({robot.layer for robot in able}) > 1
+        several = _needs_several(task, scenario) and not overlap
+        if several and scenario.rescue_radius_m < least:
             yield (
                 f"{task.name}: helpers hardly meet; without overlap of bodies rescue_radius_m "
                 f"must be at least {least:g}"

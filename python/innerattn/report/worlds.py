@@ -19,6 +19,7 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
         "has_deadlines": scenario.has_deadlines,
         "has_order": scenario.has_order,
         "robots_leave": scenario.robots_leave,
+        "layers": scenario.layers,
         "tasks": [
             {"name": task.name, "needs": list(task.needs), "amounts": task.sums}
             for task in scenario.tasks
@@ -32,6 +33,7 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
                 "radius_m": robot.radius_m,
                 "has_battery": robot.battery is not None,
                 "load": robot.load,
+                "layer": robot.layer,
             }
             for robot in scenario.robots
         ],
@@ -46,7 +48,11 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
             {"position_m": one.position_m, "radius_m": one.radius_m} for one in scenario.depots
         ],
         "obstacles": [
-            {"radius_m": one.radius_m, "half_extents_m": one.half_extents_m}
+            {
+                "radius_m": one.radius_m,
+                "half_extents_m": one.half_extents_m,
+                "passed_by": [layer for layer in scenario.layers if not one.blocks(layer)],
+            }
             for one in scenario.obstacles
         ],
     }

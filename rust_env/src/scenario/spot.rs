@@ -26,6 +26,9 @@ impl Scenario {
         if !spots.is_empty() && smallest.is_infinite() {
             return broken(&number, &spots.len(), &format!("must be 0: no robot has a {what}"));
         }
+        let keeps_off = |one: &Obstacle| {
+            self.robots.iter().filter(|robot| served(robot)).all(|robot| one.blocks(&robot.layer))
+        };
         let half = self.arena_half_width_m;
         let beyond = |at: f64| (at.abs() - (half - smallest)).max(0.0);
         for (index, (at, radius_m)) in spots.iter().enumerate() {
@@ -35,7 +38,7 @@ impl Scenario {
             }
             within(&key("radius_m"), *radius_m, 0.001, 10.0, "m")?;
             let value = format!("{at:?}");
-            if let Some(obstacle) = self.obstacles.iter().position(|one| holds(one, *at)) {
+            if let Some(obstacle) = self.obstacles.iter().position(|one| holds(one, *at) && keeps_off(one)) {
                 return broken(&key("position_m"), &value, &format!("is inside obstacles[{obstacle}]"));
             }
             if beyond(at[0]).hypot(beyond(at[1])) > *radius_m {

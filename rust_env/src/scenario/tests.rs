@@ -95,6 +95,7 @@ fn without_contacts_nothing_is_in_the_way_and_nothing_rubs() {
             radius_m: Some(0.1),
             half_extents_m: None,
             position_m: None,
+            layers: None,
         }];
     });
     let rule = "must be none where engine = \"none\", in which nothing is in the way";
@@ -155,7 +156,7 @@ fn a_task_needs_distinct_able_robots() {
 #[test]
 fn an_obstacle_has_the_measures_of_its_shape() {
     let obstacle = |shape, radius_m, half_extents_m, position_m| {
-        let obstacles = vec![Obstacle { shape, radius_m, half_extents_m, position_m }];
+        let obstacles = vec![Obstacle { shape, radius_m, half_extents_m, position_m, layers: None }];
         Scenario { obstacles, ..Scenario::default() }.validate()
     };
     assert_eq!(obstacle(Shape::Disc, Some(0.1), None, Some([0.5, -0.5])), Ok(()));
@@ -305,8 +306,13 @@ fn a_list_of_arrivals_names_tasks_times_and_places() {
     let many =
         "scenario.arrivals[2].at_s = 1.5: 3 of task \"task_2\" in one control step; at most max_victims = 2";
     assert_eq!(refused(&|scenario| scenario.max_victims = 2), many);
-    let obstacle =
-        Obstacle { shape: Shape::Disc, radius_m: Some(0.1), half_extents_m: None, position_m: None };
+    let obstacle = Obstacle {
+        shape: Shape::Disc,
+        radius_m: Some(0.1),
+        half_extents_m: None,
+        position_m: None,
+        layers: None,
+    };
     let somewhere = refused(&|scenario| scenario.obstacles = vec![obstacle.clone()]);
     assert!(somewhere.starts_with("scenario.obstacles[0].position_m = none: must be given"), "{somewhere}");
 }
@@ -331,4 +337,54 @@ fn tasks_come_after_known_others_and_never_after_themselves() {
     let mut scenario = Scenario::default();
     scenario.tasks[1].after = vec!["task_1".into()];
     assert_eq!(scenario.validate(), Ok(()));
+}
+
+/// What is said of the usual scenario with a change; nothing if it is taken.
+fn words(change: impl Fn(&mut Scenario)) -> String {
+    let mut scenario = Scenario::default();
+    change(&mut scenario);
+    scenario.validate().err().map(|error| error.to_string()).unwrap_or_default()
+}
+
+#[test]
+fn layers_are_names_and_obstacles_block_those_of_robots() {
+    let mut block = Obstacle {
+        shape: Shape::Disc,
+        radius_m: Some(0.1),
+        half_extents_m: None,
+        position_m: None,
+        layers: None,
+    };
+    let mut refused = |layers: Option<&[&str]>| {
+        block.layers = layers.map(|layers| layers.iter().map(ToString::to_string).collect());
+        let obstacles = vec![block.clone()];
+        words(move |scenario| {
+            scenario.robots[3].layer = "air".into();
+            scenario.obstacles = obstacles.clone();
+        })
+    };
+    let of = |rest: &str| format!("scenario.obstacles[0].layers{rest}");
+    assert_eq!(refused(None), "");
+    assert_eq!(refused(Some(&["air"])), "");
+    assert_eq!(refused(Some(&["ground", "air"])), "");
+    assert_eq!(refused(Some(&[])), of(" (their number) = 0: must be in 1..=64"));
+    assert_eq!(refused(Some(&["air", "air"])), of(" = \"air\": is named twice"));
+    let unknown = of(" = \"sky\": no robot is in this layer; the layers are ground, air");
+    assert_eq!(refused(Some(&["air", "sky"])), unknown);
+    let name = words(|scenario| scenario.robots[1].layer = "the air".into());
+    assert!(name.starts_with("scenario.robots[1].layer = \"the air\": must be 1 to 64 letters"), "{name}");
+}
+
+#[test]
+fn masses_and_sizes_count_in_a_layer_alone() {
+    let apart = |layer: &str| {
+        let layer = layer.to_string();
+        words(move |scenario| {
+            (scenario.robots[1].mass_kg, scenario.robots[1].radius_m) = (50.0, 0.005);
+            scenario.robots[1].layer = layer.clone();
+            scenario.robots[1].max_speed_mps = 0.1;
+        })
+    };
+    assert!(apart("ground").starts_with("scenario.robots (heaviest to lightest mass_kg) = 100"));
+    assert_eq!(apart("air"), "");
 }

@@ -17,6 +17,7 @@ impl Scenario {
     pub(crate) fn validate(&self) -> Result<()> {
         self.validate_numbers()?;
         self.validate_robots()?;
+        self.validate_layers()?;
         self.validate_tasks()?;
         self.validate_order()?;
         self.validate_obstacles()?;
@@ -81,7 +82,7 @@ impl Scenario {
         counts("robots (their different abilities)", self.abilities().len(), 0, MAX_ABILITIES)
     }
 
-    /// Refuses masses so unlike that light robots are squeezed into heavier ones.
+    /// Refuses masses so unlike that light robots are squeezed into heavier ones of their layer.
     fn validate_masses(&self) -> Result<()> {
         let (most, instead) = match self.engine {
             Engine::Rapier => (
@@ -91,16 +92,18 @@ impl Scenario {
             Engine::Discs => (MAX_MASS_RATIO, String::new()),
             Engine::None => return Ok(()),
         };
-        match self.most_unlike() {
-            Some((heaviest, lightest)) if self.mass_ratio() > most * (1.0 + 1e-12) => {
+        for layer in self.layers() {
+            let alone = self.layer_alone(layer);
+            let ratio = alone.mass_ratio();
+            if let Some((heaviest, lightest)) = alone.most_unlike().filter(|_| ratio > most * (1.0 + 1e-12)) {
                 let rule = format!(
                     "{:?} weighs {} kg and {:?} {} kg; must be at most {most}{instead}",
                     heaviest.name, heaviest.mass_kg, lightest.name, lightest.mass_kg
                 );
-                broken("robots (heaviest to lightest mass_kg)", &self.mass_ratio(), &rule)
+                return broken("robots (heaviest to lightest mass_kg)", &ratio, &rule);
             }
-            _ => Ok(()),
         }
+        Ok(())
     }
 
     fn validate_tasks(&self) -> Result<()> {
@@ -270,11 +273,15 @@ impl Scenario {
     /// Refuses speeds at which rapier lets robots sink into each other.
     fn validate_travel(&self) -> Result<()> {
         let substep = self.dt_s / f64::from(self.substeps);
-        let smallest = self.robots.iter().map(|robot| robot.radius_m).fold(f64::INFINITY, f64::min);
-        let most = MAX_TRAVEL_RADII * smallest / substep;
-        let too_fast = |robot: &Robot| robot.max_speed_mps > most * (1.0 + 1e-12);
+        let smallest = |robot: &Robot| {
+            let same = self.robots.iter().filter(|other| other.layer == robot.layer);
+            same.map(|other| other.radius_m).fold(f64::INFINITY, f64::min)
+        };
+        let most = |robot: &Robot| MAX_TRAVEL_RADII * smallest(robot) / substep;
+        let too_fast = |robot: &Robot| robot.max_speed_mps > most(robot) * (1.0 + 1e-12);
         match self.robots.iter().position(too_fast) {
             Some(index) if self.engine == Engine::Rapier => {
+                let (most, smallest) = (most(&self.robots[index]), smallest(&self.robots[index]));
                 let rule = format!(
                     "must be at most {most:.6} m/s: no robot may move farther in a substep (dt_s / substeps = \
                      {substep:.6} s) than {MAX_TRAVEL_RADII} times the smallest radius_m ({smallest} m); use \

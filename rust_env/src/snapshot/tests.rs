@@ -65,8 +65,13 @@ fn worlds_that_do_not_fit_are_refused() {
 
 #[test]
 fn obstacles_stay_where_they_are_given() {
-    let disc =
-        |position_m| Obstacle { shape: Shape::Disc, radius_m: Some(0.1), half_extents_m: None, position_m };
+    let disc = |position_m| Obstacle {
+        shape: Shape::Disc,
+        radius_m: Some(0.1),
+        half_extents_m: None,
+        position_m,
+        layers: None,
+    };
     let rules =
         rules(Scenario { obstacles: vec![disc(Some([0.5, 0.5])), disc(None)], ..Scenario::default() });
     let refused = |index: usize, at: Vec2| {

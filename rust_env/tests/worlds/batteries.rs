@@ -192,6 +192,7 @@ fn what_is_of_no_use_is_refused() {
                     radius_m: Some(0.1),
                     half_extents_m: None,
                     position_m: Some([-0.35, -0.2]),
+                    layers: None,
                 }];
             },
             "scenario.stations[0].position_m = [-0.3, -0.2]: is inside obstacles[0]",

@@ -9,8 +9,8 @@ use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
-    Abilities, Actions, Arrival, Battery, Deadline, Depot, Engine, Interrupted, Obstacle, Robot, Scenario,
-    Shape, Situation, Station, Unavailable,
+    Abilities, Actions, Arrival, Battery, Deadline, Depot, DriveMode, Engine, Interrupted, Obstacle, Robot,
+    Scenario, Shape, Situation, Station, Unavailable,
 };
 use innerattn_env::tasks::{Loss, Rescue};
 
@@ -242,6 +242,21 @@ pub fn with_loads(mut scenario: Scenario) -> Scenario {
     Scenario { depots: vec![depot(-0.3), depot(0.3)], rescue_radius_m: 0.4, ..scenario }
 }
 
+/// The same with robots in three layers in turn, every second of which sets its velocity; the obstacles block
+/// one, two or all of them.
+pub fn with_layers(mut scenario: Scenario) -> Scenario {
+    let names = ["ground", "air", "water"];
+    for (index, robot) in scenario.robots.iter_mut().enumerate() {
+        robot.layer = names[index % names.len()].into();
+        robot.drive = [DriveMode::Force, DriveMode::Velocity][index / names.len() % 2];
+    }
+    let layers = scenario.layers().iter().map(ToString::to_string).collect::<Vec<_>>();
+    for (index, obstacle) in scenario.obstacles.iter_mut().enumerate() {
+        obstacle.layers = (index % 4 > 0).then(|| layers[..layers.len().min(index % 4)].to_vec());
+    }
+    Scenario { rescue_radius_m: 0.4, ..scenario }
+}
+
 /// A disc at a random place, a box at a random place, and a box that stays.
 pub fn some_obstacles() -> Vec<Obstacle> {
     let disc = |radius| Obstacle {
@@ -249,9 +264,15 @@ pub fn some_obstacles() -> Vec<Obstacle> {
         radius_m: Some(radius),
         half_extents_m: None,
         position_m: None,
+        layers: None,
     };
-    let block =
-        |half, at| Obstacle { shape: Shape::Box, radius_m: None, half_extents_m: Some(half), position_m: at };
+    let block = |half, at| Obstacle {
+        shape: Shape::Box,
+        radius_m: None,
+        half_extents_m: Some(half),
+        position_m: at,
+        layers: None,
+    };
     vec![disc(0.12), disc(0.06), block([0.1, 0.04], None), block([0.04, 0.25], Some([-0.3, 0.2]))]
 }
 

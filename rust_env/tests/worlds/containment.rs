@@ -4,11 +4,12 @@
 
 use innerattn_env::geometry::{Solid, Vec2};
 use innerattn_env::rng::Stream;
+use innerattn_env::robot::Body;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Actions, Engine, Scenario};
 use innerattn_env::world::World;
 
-use crate::common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles};
+use crate::common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles, with_layers};
 
 const ENVS: usize = 250;
 /// Largest overlap at a period's end as a share of the smaller radius: of all, and at the 99.9th percentile.
@@ -51,17 +52,30 @@ impl Play {
     }
 }
 
-/// The deepest overlap in a world, as a share of the smaller of the two; of a box that is half its shorter side.
+/// The obstacles that block a layer (one bit), and their centres.
+fn solids_in<'a>(
+    rules: &'a Rules,
+    world: &'a World,
+    layer: u64,
+) -> impl Iterator<Item = (&'a Solid, &'a Vec2)> {
+    let each = rules.solids.iter().zip(&world.obstacles).zip(rules.scenario.blocked());
+    each.filter(move |(_, blocked)| blocked & layer != 0).map(|(placed, _)| placed)
+}
+
+/// The deepest overlap of what can touch in a world, as a share of the smaller of the two; of a box that is half its shorter side.
 pub fn deepest(rules: &Rules, world: &World) -> f32 {
     let arena = rules.scenario.arena_half_width_m as f32;
     let mut worst = 0.0_f32;
     for (index, (at, body)) in world.positions.iter().zip(&rules.team).enumerate() {
         worst = worst.max((at.amax() + body.radius - arena) / body.radius);
         for (other, from) in world.positions[..index].iter().zip(&rules.team) {
+            if from.layer != body.layer {
+                continue;
+            }
             let overlap = body.radius + from.radius - (at - other).norm();
             worst = worst.max(overlap / body.radius.min(from.radius));
         }
-        for (solid, centre) in rules.solids.iter().zip(&world.obstacles) {
+        for (solid, centre) in solids_in(rules, world, body.layer) {
             let small = body.radius.min(solid.half_breadth());
             worst = worst.max((body.radius - solid.nearest(at - centre).0) / small);
         }
@@ -73,8 +87,8 @@ pub fn deepest(rules: &Rules, world: &World) -> f32 {
 /// nobody moves farther than three of the smallest radii: without forces, nobody turns round something else in one.
 pub fn check_uncrossed(rules: &Rules, world: &World, before: &[Vec2]) {
     for index in 0..before.len() {
-        let radius = rules.team[index].radius;
-        for other in 0..index {
+        let Body { radius, layer, .. } = rules.team[index];
+        for other in (0..index).filter(|other| rules.team[*other].layer == layer) {
             let near = nearest_to_origin(
                 before[index] - before[other],
                 world.positions[index] - world.positions[other],
@@ -84,7 +98,7 @@ pub fn check_uncrossed(rules: &Rules, world: &World, before: &[Vec2]) {
                 "robots {other} and {index} crossed: {world:?}"
             );
         }
-        for (solid, centre) in rules.solids.iter().zip(&world.obstacles) {
+        for (solid, centre) in solids_in(rules, world, layer) {
             let (start, end) = (before[index] - centre, world.positions[index] - centre);
             let inside = (0..=20).any(|part| {
                 let at = start.lerp(&end, part as f32 / 20.0);
@@ -163,6 +177,13 @@ fn obstacles_hold() {
 fn a_crowd_of_unlike_robots_stays_apart() {
     let scenario = Scenario { robots: mixed_team(16), spawn_clearance_m: 0.1, ..long_episodes() };
     play("sixteen", &ENGINES, &scenario, 12_500);
+}
+
+#[test]
+fn robots_of_a_layer_stay_apart() {
+    let crowd = Scenario { robots: mixed_team(12), spawn_clearance_m: 0.1, ..long_episodes() };
+    let crowd = Scenario { obstacles: some_obstacles(), ..crowd };
+    play("three layers", &ENGINES, &with_layers(crowd), 12_500);
 }
 
 #[test]

@@ -6,8 +6,8 @@ use innerattn_env::scenario::{Actions, Scenario, Shaping, Situation};
 
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
-    with_amounts, with_an_end, with_arrivals, with_batteries, with_leaving, with_list, with_loads,
-    with_order, with_times,
+    with_amounts, with_an_end, with_arrivals, with_batteries, with_layers, with_leaving, with_list,
+    with_loads, with_order, with_times,
 };
 
 const STEPS: usize = 150;
@@ -44,6 +44,7 @@ fn scenarios() -> Vec<Scenario> {
         with_batteries(tight.clone()),
         with_loads(with_leaving(tight.clone())),
         with_loads(with_batteries(tight.clone())),
+        with_layers(with_leaving(Scenario { robots: mixed_team(12), ..tight.clone() })),
         with_times(tight),
     ];
     let by = |engine| scenarios.clone().map(|scenario| Scenario { engine, ..scenario });

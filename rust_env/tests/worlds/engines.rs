@@ -113,7 +113,7 @@ fn compare(name: &str, scenario: &Scenario) {
             }
         }
         let velocities: Vec<Vec2> = (0..drives.len())
-            .map(|robot| rules.team[robot].driven(world.velocities[robot], drives[robot].into(), 0.25, 1.0))
+            .map(|robot| rules.team[robot].driven(world.velocities[robot], drives[robot].into(), 1.0))
             .collect();
         let truth = moved(&fine, &mut workspace, &world, &velocities);
         let discs = moved(&rules.physics, &mut workspace, &world, &velocities);

@@ -8,7 +8,7 @@ use innerattn_env::error::Error;
 use innerattn_env::rng::Stream;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
-    Actions, Engine, MAX_TRAVEL_RADII, Obstacle, Robot, Scenario, Shape, Situation, Task,
+    Actions, DriveMode, Engine, MAX_TRAVEL_RADII, Obstacle, Robot, Scenario, Shape, Situation, Task,
 };
 use innerattn_env::world::World;
 
@@ -38,7 +38,8 @@ fn one_of<T: Copy>(source: &mut Stream, values: &[T]) -> T {
     values[source.below(values.len())]
 }
 
-fn obstacle(source: &mut Stream, half: f64) -> Obstacle {
+/// An obstacle that blocks all, or the layer of one robot.
+fn obstacle(source: &mut Stream, half: f64, layers: &[String]) -> Obstacle {
     let size = |source: &mut Stream| scaled(source, 0.005, half * 0.4);
     let fixed = source.below(4) == 0;
     let round = source.below(2) == 0;
@@ -47,6 +48,7 @@ fn obstacle(source: &mut Stream, half: f64) -> Obstacle {
         radius_m: round.then(|| size(source)),
         half_extents_m: (!round).then(|| [size(source), size(source)]),
         position_m: fixed.then(|| [(2.0 * real(source) - 1.0) * half, (2.0 * real(source) - 1.0) * half]),
+        layers: (source.below(3) == 0).then(|| vec![layers[source.below(layers.len())].clone()]),
     }
 }
 
@@ -67,6 +69,7 @@ fn extreme(source: &mut Stream) -> Scenario {
     let ratio = if engine == Engine::Rapier { 16.0 } else { 100.0 };
     let ratio = one_of(source, &[1.0, ratio, 4.0]);
     let light = scaled(source, 0.01, 1000.0 / ratio);
+    let layers = one_of(source, &[&["ground"][..], &["ground", "air"]]);
     let dt_s = scaled(source, 0.001, 1.0);
     let substeps = scaled(source, 1.0, 40.0).round() as u32;
     let mut robots: Vec<Robot> = (0..count)
@@ -78,6 +81,8 @@ fn extreme(source: &mut Stream) -> Scenario {
             mass_kg: scaled(source, light, light * ratio),
             radius_m: scaled(source, small, large),
             drive_force_n: scaled(source, 0.001, 1e5),
+            drive: one_of(source, &[DriveMode::Force, DriveMode::Velocity]),
+            layer: one_of(source, layers).into(),
             start_m: None,
             battery: None,
             load: None,
@@ -85,18 +90,22 @@ fn extreme(source: &mut Stream) -> Scenario {
         .collect();
     if engine == Engine::Rapier {
         // No farther in a substep than is taken, and mostly as far.
-        let smallest = robots.iter().map(|robot| robot.radius_m).fold(f64::INFINITY, f64::min);
         let share = if source.below(2) == 0 { 1.0 } else { real(source).max(0.01) };
-        let most = (3.0 * smallest * f64::from(substeps) / dt_s * share).clamp(0.01, 100.0);
         let alike = source.below(2) == 0;
+        let sizes: Vec<(String, f64)> =
+            robots.iter().map(|robot| (robot.layer.clone(), robot.radius_m)).collect();
         for robot in &mut robots {
+            let same = sizes.iter().filter(|(layer, _)| *layer == robot.layer);
+            let smallest = same.map(|(_, radius)| *radius).fold(f64::INFINITY, f64::min);
+            let most = (3.0 * smallest * f64::from(substeps) / dt_s * share).clamp(0.01, 100.0);
             robot.max_speed_mps = if alike { most } else { robot.max_speed_mps.min(most) };
         }
     }
     let obstacles = one_of(source, &[0, 0, 1, 3, 8]);
+    let layers: Vec<String> = robots.iter().map(|robot| robot.layer.clone()).collect();
     Scenario {
         situation: one_of(source, &[Situation::Single, Situation::Mixed]),
-        obstacles: (0..obstacles).map(|_| obstacle(source, half)).collect(),
+        obstacles: (0..obstacles).map(|_| obstacle(source, half, &layers)).collect(),
         robots,
         tasks: vec![Task::new("task", vec!["aid".into()])],
         arena_half_width_m: half,

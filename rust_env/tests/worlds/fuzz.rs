@@ -14,8 +14,8 @@ use serde_json::{Value, json};
 
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
-    with_amounts, with_an_end, with_arrivals, with_batteries, with_leaving, with_list, with_loads,
-    with_order, with_times,
+    with_amounts, with_an_end, with_arrivals, with_batteries, with_layers, with_leaving, with_list,
+    with_loads, with_order, with_times,
 };
 
 const ENVS: usize = 2;
@@ -60,6 +60,7 @@ fn scenarios() -> Vec<Scenario> {
             with_leaving(Scenario { engine, ..tight.clone() }),
             with_batteries(Scenario { engine, ..tight.clone() }),
             with_loads(Scenario { engine, ..tight.clone() }),
+            with_layers(Scenario { engine, obstacles: some_obstacles(), ..Scenario::default() }),
         ]
     };
     ENGINES.into_iter().flat_map(with).collect()
@@ -140,6 +141,9 @@ fn strange(source: &mut Stream) -> Value {
         json!("discs"),
         json!("rapier"),
         json!("none"),
+        json!("air"),
+        json!(["air"]),
+        json!("velocity"),
         json!(large),
         json!([]),
         json!([0.1, 0.1]),

@@ -169,6 +169,7 @@ fn what_is_of_no_use_is_refused() {
                     radius_m: None,
                     half_extents_m: Some([0.1, 0.1]),
                     position_m: Some([0.15, -0.35]),
+                    layers: None,
                 }];
             },
             "scenario.depots[0].position_m = [0.2, -0.3]: is inside obstacles[0]",

@@ -14,6 +14,7 @@ mod extending;
 mod extremes;
 mod faults;
 mod fuzz;
+mod layers;
 mod leaving;
 mod loads;
 mod order;

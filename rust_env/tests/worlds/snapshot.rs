@@ -7,7 +7,8 @@ use proptest::prelude::*;
 
 use crate::common::{
     Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_amounts,
-    with_an_end, with_arrivals, with_batteries, with_leaving, with_list, with_loads, with_order, with_times,
+    with_an_end, with_arrivals, with_batteries, with_layers, with_leaving, with_list, with_loads, with_order,
+    with_times,
 };
 
 const ENVS: usize = 6;
@@ -36,6 +37,7 @@ fn scenarios() -> Vec<Scenario> {
         with_batteries(tight.clone()),
         with_loads(with_leaving(tight.clone())),
         with_loads(with_batteries(tight.clone())),
+        with_layers(tight.clone()),
         with_times(tight),
     ]
 }

@@ -132,3 +132,30 @@ def test_robots_arrive_in_time_and_stay(robot: int, kind: str) -> None:
         first = inside.index(True)
         assert 0.1 * (first + 1) <= 1.25 * soonest + 0.2  # a zigzag costs a little
         assert all(inside[first:])
+
+
+@given(
+    p=st.tuples(*[st.floats(-1, 1)] * 2),
+    v=st.tuples(*[st.floats(-1, 1)] * 2),
+    target=st.tuples(*[st.floats(-1, 1)] * 2),
+    continuous=st.booleans(),
+)
+def test_set_velocities_bring_robots_as_near_as_a_period_can(
+    p: tuple[float, float], v: tuple[float, float], target: tuple[float, float], continuous: bool
+) -> None:
+    robots = tuple(robot.replace(drive="velocity") for robot in SCENARIO.robots)
+    kind = "continuous" if continuous else "discrete"
+    steering = Steering(SCENARIO.replace(robots=robots, actions=kind))
+    np.testing.assert_array_equal(steering.lag, 0.0)
+    np.testing.assert_array_equal(steering.speed, [robot.max_speed_mps for robot in robots])
+    found = steering.actions(*(np.tile(np.array(one), (1, 4, 1)) for one in (p, v, target)))[0]
+    for robot, action in zip(robots, found, strict=True):
+        drive = action if continuous else DIRECTIONS[int(action)]
+        far = 0.1 * robot.max_speed_mps
+        left = math.dist(target, [p[k] + far * float(drive[k]) for k in range(2)])
+        if continuous:
+            best = max(0.0, math.dist(p, target) - far)
+        else:
+            ends = [[p[k] + far * way[k] for k in range(2)] for way in DIRECTIONS]
+            best = min(math.dist(target, end) for end in ends)
+        assert left <= best + 1e-6

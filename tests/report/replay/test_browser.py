@@ -1,6 +1,7 @@
 """The replay page in a real browser: what a person sees and does."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -270,3 +271,22 @@ def test_everybody_can_use_it(
         wide = page.evaluate("document.documentElement.scrollWidth")
         assert wide <= size[0]
         assert page.evaluate("document.documentElement.dataset.theme") == theme
+
+
+def test_layers_are_told_apart_and_explained(browser: Browser, tmp_path: Path) -> None:
+    layered = Scenario.preset("air-ground")
+    grounded = tuple(robot.replace(layer="ground") for robot in layered.robots)
+    shown, legends = [], []
+    for name, scenario in (("layered", layered), ("flat", layered.replace(robots=grounded))):
+        record = watched(layered, episodes=2)
+        (tmp_path / name).mkdir()
+        with visit(browser, written(tmp_path / name, replace(record, scenario=scenario))) as seen:
+            ready(seen.page)
+            legends.append(seen.page.locator("#legend").text_content() or "")
+            shown.append(pixels(seen.page))
+            assert not seen.problems
+    assert "a robot of layer air, which touches no robot of another layer" in legends[0]
+    assert "an obstacle that robots of air pass" in legends[0]
+    assert "layer" not in legends[1]
+    assert "pass" not in legends[1]
+    assert shown[0] != shown[1]

@@ -245,3 +245,14 @@ def test_a_team_with_batteries_is_trained_and_not_exported(tmp_path: Path) -> No
     with pytest.raises(ConfigError, match=r"robots\[1\].battery.capacity_j = 10: there must be no"):
         export_run(run, tmp_path / "export")
     assert not (tmp_path / "export").exists()
+
+
+def test_a_team_whose_velocity_is_set_is_trained_and_not_exported(tmp_path: Path) -> None:
+    robots = [robot.model_dump() for robot in Scenario().robots]
+    robots[2]["drive"] = "velocity"
+    run = make_run(
+        tmp_path / "run", run_config("ppo-inner", **FRAMED, **{"scenario.robots": robots})
+    )
+    with pytest.raises(ConfigError, match=r"robots\[2\].drive = 'velocity': must be 'force'; exp"):
+        export_run(run, tmp_path / "export")
+    assert not (tmp_path / "export").exists()

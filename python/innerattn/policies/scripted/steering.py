@@ -2,7 +2,8 @@
 
 Where faults of the drive are given, they are reckoned with. It follows the world's law of motion
 without contacts: each control period starts with
-v <- clip((1 - damping) v + F/m dt u, max_speed), and then p <- p + v dt.
+v <- clip((1 - damping) v + F/m dt u, max_speed), and then p <- p + v dt. Where actions set the
+velocity, it is v <- max_speed u.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ class Steering:
         """Take speeds, masses and forces from ``scenario``."""
         robots = scenario.robots
         self._dt = scenario.dt_s
-        self._keep = 1.0 - scenario.damping
+        self._keep = np.array([robot.kept(scenario.damping) for robot in robots])
         self._radius = scenario.rescue_radius_m
         self._limit = np.array([robot.max_speed_mps for robot in robots])
-        self._push = np.array([robot.drive_force_n / robot.mass_kg for robot in robots]) * self._dt
+        self._push = np.array([robot.gain_mps(self._dt) for robot in robots])
         self._continuous = scenario.actions == "continuous"
         self.speed, self.lag = self._speed_and_lag(self._push, self._limit)
         self._known: tuple[Array, Array, Array] | None = None
@@ -119,8 +120,8 @@ class Steering:
             (E, R) int64, or (E, R, 2) float32 in [-1, 1] where actions are continuous.
         """
         way = np.asarray(targets, np.float64) - positions
-        kept = self._keep * np.asarray(velocities, np.float64)
-        reach = self._dt * (1.0 + self._keep)
+        kept = self._keep[:, None] * np.asarray(velocities, np.float64)
+        reach = self._dt * (1.0 + self._keep)[:, None]
         push, limit, bias = self._push, self._limit, np.zeros(len(self._push))
         if faults is not None:
             push = push * faults["motor_gain"]
@@ -135,7 +136,7 @@ class Steering:
         after = kept[:, :, None] + drives
         speed = np.sqrt((after * after).sum(-1, keepdims=True))
         after *= np.minimum(1.0, limit[..., None, None] / np.maximum(speed, 1e-12))
-        miss = way[:, :, None] - reach * after
+        miss = way[:, :, None] - reach[:, None] * after
         return np.asarray((miss * miss).sum(-1).argmin(-1))
 
 

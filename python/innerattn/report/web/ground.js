@@ -85,6 +85,10 @@ function drawObstacle(scene, shape, index) {
   context.fillStyle = paint.obstacle;
   context.strokeStyle = paint["obstacle-line"];
   context.lineWidth = 1.5;
+  context.globalAlpha = shape.passed_by.length ? 0.4 : 1;
   context.fill();
+  context.globalAlpha = 1;
+  context.setLineDash(shape.passed_by.length ? EDGES[1] : []);
   context.stroke();
+  context.setLineDash([]);
 }

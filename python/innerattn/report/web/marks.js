@@ -4,6 +4,7 @@
 const SVG = "http://www.w3.org/2000/svg";
 const DASHES = [[], [6, 4], [2, 3], [9, 3, 2, 3], [12, 4], [4, 2]];
 const KINDS = 6;
+const EDGES = [[], [4, 3], [1.5, 2.5], [7, 2, 1.5, 2]]; // of robots, by their layer
 
 function svg(tag, attributes = {}, text = "") {
   const node = document.createElementNS(SVG, tag);
@@ -18,6 +19,10 @@ function kindColour(kindIndex) {
 
 function dashOf(robot) {
   return DASHES[robot.twin % DASHES.length];
+}
+
+function edgeOf(robot) {
+  return EDGES[robot.layerIndex % EDGES.length];
 }
 
 /** Corners of a task's shape around a centre, as [x, y] pairs. */
@@ -64,7 +69,8 @@ function symbol(...children) {
 
 function robotSymbol(worlds, robot) {
   const colour = kindColour(robot.kindIndex);
-  const disc = svg("circle", { r: 9, fill: colour, stroke: "var(--ink)", "stroke-width": 1 });
+  const edge = { "stroke-width": robot.layerIndex > 0 ? 2.5 : 1, "stroke-dasharray": edgeOf(robot).join(" ") };
+  const disc = svg("circle", { r: 9, fill: colour, stroke: "var(--ink)", ...edge });
   const letters = robot.abilities.map((ability) => worlds.letters[ability]).join("");
   const text = svg("text", {
     y: 4, "text-anchor": "middle", "font-size": letters.length > 2 ? 7 : 11, "font-weight": 700,

@@ -97,6 +97,15 @@ function fillLegend(list, worlds) {
     const robot = worlds.robots.find((one) => one.kind === kind);
     row(robotSymbol(worlds, robot), `${kind} robot, offers ${listed(withAmounts(robot.abilities, robot.amounts))}`);
   }
+  for (const layer of worlds.layers.slice(1)) {
+    const robot = worlds.robots.find((one) => one.layer === layer);
+    row(robotSymbol(worlds, robot), `such an outline: a robot of layer ${layer}, which touches no robot of another layer`);
+  }
+  for (const layers of new Set(worlds.obstacles.map((one) => one.passed_by.join(" and ")))) {
+    const box = { x: -9, y: -6, width: 18, height: 12, fill: "var(--obstacle)", "fill-opacity": 0.4 };
+    const edge = { stroke: "var(--obstacle-line)", "stroke-dasharray": EDGES[1].join(" ") };
+    if (layers) row(symbol(svg("rect", { ...box, ...edge })), `an obstacle that robots of ${layers} pass`);
+  }
   worlds.tasks.forEach((task, index) => {
     row(taskSymbol(index), `victim of ${task.name}, needs ${listed(withAmounts(task.needs, task.amounts))}`);
   });

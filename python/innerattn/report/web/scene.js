@@ -283,9 +283,11 @@ class Scene {
     context.arc(x, y, radius, 0, 7);
     context.fillStyle = away ? paint.floor : colour;
     context.fill();
-    context.lineWidth = away ? 3 : 1.5;
+    context.lineWidth = away || robot.layerIndex > 0 ? 3 : 1.5;
     context.strokeStyle = away ? colour : paint.ink;
+    context.setLineDash(edgeOf(robot));
     context.stroke();
+    context.setLineDash([]);
     this.drawHeading(robot, x, y, radius);
     const letters = robot.abilities.map((ability) => this.worlds.letters[ability]).join("");
     const size = Math.min(15, (1.5 * radius) / Math.max(1, 0.8 * letters.length));

@@ -9,6 +9,7 @@ class Worlds {
     this.robots.forEach((robot, index) => {
       robot.index = index;
       robot.kindIndex = this.kinds.indexOf(robot.kind);
+      robot.layerIndex = this.layers.indexOf(robot.layer);
       robot.twin = this.robots.slice(0, index).filter((other) => other.kind === robot.kind).length;
     });
     this.abilities = [...new Set(this.robots.flatMap((robot) => robot.abilities))];

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from innerattn.config import RunConfig
-from innerattn.config.battery import refuse_stores
+from innerattn.config.battery import refuse_stores_and_velocities
 from innerattn.config.files import sync_folder, write_whole
 from innerattn.envs import BatchEnv
 from innerattn.errors import ExportError, MissingLibraryError, missing_library
@@ -100,7 +100,7 @@ def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: 
     """Fill a folder, and check what is in it."""
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         names = env.observation_names()
-    refuse_stores(config.scenario, "exported policies")
+    refuse_stores_and_velocities(config.scenario, "exported policies")
     entities = entity_columns(names) if config.network.encoder == "entities" else None
     actor = inner_actor(learner, run)
     team = team_actors(config, actor, entities)
