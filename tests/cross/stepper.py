@@ -62,6 +62,7 @@ class Stepper:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         robots, tasks = scenario.robots, scenario.tasks
+        self.grazed: Bools = np.zeros(0, bool)  # worlds in which rounding decides who meets a wall
         self.radii = np.array([robot.radius_m for robot in robots])
         self.max_speed = np.array([robot.max_speed_mps for robot in robots])
         self.sets_velocity = np.array([robot.drive == "velocity" for robot in robots])
@@ -174,6 +175,7 @@ class Stepper:
         if self.scenario.engine == "none":
             wall = self.scenario.arena_half_width_m - self.radii[:, None]
             stopped = (abs(positions) > wall) & self.there(state)[..., None]
+            self.grazed = (abs(abs(positions) - wall) < 1e-6).any((-1, -2))
             positions = np.where(stopped, np.sign(positions) * wall, positions)
             velocities = np.where(stopped, 0.0, velocities)
         return positions, velocities
