@@ -1,8 +1,8 @@
 """Makes the worlds of the set `standard` and lists them in `docs/instances.md`.
 
-`python docs/publish_instances.py` draws 300 worlds, lets the scripts play them, and writes both. It
-takes some ten minutes of one core. `SEED` fixes the worlds; one that no script does well enough in
-is drawn anew.
+`python docs/publish_instances.py` draws 300 worlds if their file is not there, and lets the scripts
+play them. It takes some twenty minutes of one core. `SEED` fixes the worlds; one that no script
+does well enough in is drawn anew.
 """
 
 from __future__ import annotations
@@ -208,7 +208,16 @@ def frozen(feature: str, robots: int, number: int) -> WorldInstance:
 
 
 def main() -> None:
-    """Make the set, then fill the page."""
+    """Make the set if it is not there, then let the scripts play it and fill the page."""
+    if not WORLDS_FILE.exists():
+        make()
+    worlds = read_worlds("standard")
+    results = [evaluate_worlds(script, worlds) for script in REFERENCES]
+    fill(PAGE, "standard", worlds_markdown(results))
+
+
+def make() -> None:
+    """Draw all worlds, and write them."""
     names = [
         (feature, robots, number)
         for feature in FEATURES
@@ -219,12 +228,9 @@ def main() -> None:
     for done, one in enumerate(names, 1):
         worlds.append(frozen(*one))
         print(f"\r{done} of {len(names)}", end="", flush=True)
+    print()
     lines = (json.dumps(one.written(), separators=(",", ":")) for one in worlds)
     write_whole(WORLDS_FILE, ("[\n" + ",\n".join(lines) + "\n]\n").encode())
-    results = [
-        evaluate_worlds(script, read_worlds("standard")) for script in (*REFERENCES, "zoo:any")
-    ]
-    fill(PAGE, "standard", worlds_markdown(results))
 
 
 def _value(rng: np.random.Generator, low: float, high: float) -> float:

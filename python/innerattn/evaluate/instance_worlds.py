@@ -13,6 +13,7 @@ from innerattn.errors import InnerattnError
 from innerattn.evaluate.play import run_episodes
 from innerattn.evaluate.trained import load_trained
 from innerattn.policies import SCRIPTS, Policy, scripted_policy
+from innerattn.train.build import torch_threads
 
 SCHEMA_VERSION = 1
 
@@ -208,7 +209,8 @@ def evaluate_worlds(
             refused = refused or error
             worlds.append(PlayedWorld(instance, None, str(error)))
         else:
-            played = play_world(chosen, instance.scenario, seed)
+            with torch_threads(1):  # one world at a time is too little for more
+                played = play_world(chosen, instance.scenario, seed)
             worlds.append(PlayedWorld(instance, played))
         if progress is not None:
             progress(len(worlds), len(instances))
