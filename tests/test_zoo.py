@@ -39,8 +39,12 @@ def packed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return packing.pack(run.folder, "single", "quick", tmp_path / "zoo")
 
 
+WITHOUT_A_TEAM = {"air-ground"}
+"""Its obstacles have fixed places, so the recipes of the budgets, with symmetry, do not take it."""
+
+
 def test_there_is_a_team_of_each_preset() -> None:
-    assert set(zoo_names()) == {*SCENARIOS, "any"}
+    assert set(zoo_names()) == {*SCENARIOS, "any"} - WITHOUT_A_TEAM
 
 
 def test_the_zoo_is_small() -> None:
