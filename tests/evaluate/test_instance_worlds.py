@@ -20,6 +20,13 @@ CARRIER = {"kind": "carrier", "abilities": ["lift"], "max_speed_mps": 1.0, "mass
 LATE = [{"at_s": 0.5, "task": "load", "position_m": [0.5, 0.0]}]
 
 
+def test_the_name_is_told_whatever_it_is(tmp_path: Path) -> None:
+    entry = world("s", {}, (1, 1.0))
+    entry["scenario"]["episode_steps"] = 0
+    with pytest.raises(ConfigError, match=r"mine.json: s\.scenario.episode_steps = 0"):
+        read(tmp_path, entry)
+
+
 @cache
 def standard() -> tuple[WorldInstance, ...]:
     return read_worlds("standard")

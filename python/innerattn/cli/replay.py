@@ -39,14 +39,15 @@ class Replay(Command):
         tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN|POLICY|FILE ...")
     ]
     """Runs, evaluation/episodes.parquet files, or random, greedy, hungarian, planner, oracle; up
-    to four, shown side by side. With --instance of points: planner, greedy or random."""
+    to four, shown side by side. With --instance of points: planner (if none is named), greedy
+    or random."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("replay.html")
     """File to write: .html is a page, .gif or .mp4 a moving picture of one episode."""
     episodes: int | None = None
     """Episodes to play; None: those that were recorded, or 20."""
     seed: int | None = None
-    """Seed of the worlds to play in; None: as the first run says, or 12345. With --instance, of the
-    planner; None: 0."""
+    """Seed of the worlds to play in; None: as the first run says, or 12345. With --instance of
+    points, of the planner; None: 0."""
     scenario: Path | None = None
     """TOML file with the scenario to play in; None: that of the first run, or mixed."""
     episode: int | None = None

@@ -112,7 +112,9 @@ def _instance(sort: type[Sort], entry: Any, index: int, shown: str) -> Sort:
     try:
         return sort.model_validate(entry)
     except ValidationError as error:
-        told = config_error(error, root, shown, sort)
-        if root in str(told).removeprefix(shown):
-            raise told from error
-        raise ConfigError(f"{shown}: {root}.{str(told).removeprefix(f'{shown}: ')}") from error
+        told = str(config_error(error, root, model=sort))
+        if not told.startswith(
+            (f"{root}.", f"{root} ", f"{root}:")
+        ):  # a rule of the scenario's own
+            told = f"{root}.{told}"
+        raise ConfigError(f"{shown}: {told}") from error
