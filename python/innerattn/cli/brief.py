@@ -74,12 +74,13 @@ BRIEF: Mapping[str, Brief] = {
             ("--episodes N", "episodes that cooperation is counted in (80)"),
             ("--episode-steps N", "length of an episode (that of the run)"),
             ("--seed N", "seed of the worlds (12345), or of the planner (0)"),
-            ("--instances FILE", "measure planner, greedy or random on these (also ral)"),
+            ("--instances FILE", "measure in worlds (standard), or a planner on points (ral)"),
+            ("--engine NAME", "let bodies do what is planned: rapier, discs or none"),
             ("--time-limit-ms N", "how long planner searches for an instance (1000)"),
             _JSON,
             _QUIET,
         ),
-        ("latest", "zoo:double", "planner --instances ral", "runs/mine --json - > mine.json"),
+        ("latest", "planner --instances standard", "runs/mine --json - > mine.json"),
     ),
     "study": Brief(
         "[OPTIONS] run|work|status|report|retry|slurm STUDY",
@@ -157,7 +158,7 @@ BRIEF: Mapping[str, Brief] = {
         "[OPTIONS]",
         (
             ("--scenario FILE", "check a scenario, print it with all defaults, draw it"),
-            ("--instance FILE:NAME", "describe an instance (also ral:ral_03) and plan for it"),
+            ("--instance FILE:NAME", "describe an instance: ral:ral_03, standard:sums_8_3"),
             ("--schema NAME", "print the JSON Schema of a file: scenario, run or study"),
         ),
         ("", "--scenario flood.toml", "--instance ral:ral_03"),
@@ -176,7 +177,7 @@ BRIEF: Mapping[str, Brief] = {
             ("--seed N", "seed of the worlds to play in, or of the planner"),
             ("--episode N", "which episode a moving picture shows"),
             ("--robot NAME", "robot whose attention a moving picture shows"),
-            ("--instance FILE", "show a schedule of planner, greedy or random (ral:ral_03)"),
+            ("--instance FILE", "show an instance: ral:ral_03, standard:sums_8_3"),
             ("--time-limit-ms N", "how long planner searches for it (1000)"),
         ),
         (
