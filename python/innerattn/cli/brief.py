@@ -74,7 +74,7 @@ BRIEF: Mapping[str, Brief] = {
             ("--episodes N", "episodes that cooperation is counted in (80)"),
             ("--episode-steps N", "length of an episode (that of the run)"),
             ("--seed N", "seed of the worlds (12345), or of the planner (0)"),
-            ("--instances FILE", "measure in worlds (standard), or a planner on points (ral)"),
+            ("--instances FILE", "measure in worlds (standard) or on points (ral)"),
             ("--engine NAME", "let bodies do what is planned: rapier, discs or none"),
             ("--time-limit-ms N", "how long planner searches for an instance (1000)"),
             _JSON,
