@@ -102,3 +102,24 @@ def test_layers_are_told_apart_with_a_legend() -> None:
     labels, edges = shown(Scenario())
     assert not any("layer" in label for label in labels)
     assert len(set(edges)) == 1
+
+
+@pytest.mark.parametrize(
+    ("above", "side"), [((-0.7, 0.7), "bottom"), ((0.02, 0.13), "top"), ((0.02, -0.13), "bottom")]
+)
+def test_a_name_covers_no_other_robot(above: tuple[float, float], side: str) -> None:
+    places = PLACES.copy()
+    places[0], places[1] = (0.0, 0.0), above
+    figure = Figure(figsize=(8, 6))
+    victims = np.zeros(1, VICTIM)
+    none = np.zeros((0, 2), np.float32)
+    paint_figure(figure, Scenario(), places, np.zeros_like(places), victims, none)
+    (axes,) = figure.axes
+    (name,) = [text for text in axes.texts if text.get_text() == "food_0"]
+    assert name.get_va() == side
+    box = name.get_window_extent()
+    centre = axes.transData.transform(above)
+    beyond = np.maximum(np.abs(centre - [(box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2]), 0.0)
+    beyond = np.maximum(beyond - [box.width / 2, box.height / 2], 0.0)
+    radius = axes.transData.transform((0.05, 0.0))[0] - axes.transData.transform((0.0, 0.0))[0]
+    assert np.hypot(*beyond) >= radius

@@ -5,7 +5,7 @@ It draws from plain arrays and needs matplotlib only when it is called.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 _VICTIM_COLOUR = "#D55E00"
 _TASK_MARKERS = "*XDP^v"
 _EDGES = ("-", "--", ":", "-.")  # of robots, by their layer
+_LETTER_PT = (4.9, 10.0)  # width and height of a letter of a robot's name, with its halo
 _ARROW_S = 0.2  # an arrow's tip is where the robot would be after so many seconds
 
 
@@ -163,8 +164,9 @@ def _paint_robots(
     looks = robot_looks(robot.kind for robot in scenario.robots)
     layers = scenario.layers
     edge: dict[str, Any]
-    for robot, look, (x, y), velocity in zip(
-        scenario.robots, looks, positions, velocities, strict=True
+    sides = _sides_of_names(axes, scenario, positions)
+    for robot, look, (x, y), velocity, side in zip(
+        scenario.robots, looks, positions, velocities, sides, strict=True
     ):
         colour = look.colour
         if robot.kind not in legend:
@@ -179,10 +181,11 @@ def _paint_robots(
             continue
         axes.annotate(
             robot.name,
-            (float(x), float(y) + robot.radius_m),
-            xytext=(0, 2),
+            (float(x), float(y) + side * robot.radius_m),
+            xytext=(0, 2 * side),
             textcoords="offset points",
             ha="center",
+            va="bottom" if side > 0 else "top",
             fontsize="small",
             path_effects=halo,
             zorder=5,
@@ -202,3 +205,23 @@ def _paint_robots(
         [], [], color="k", marker=r"$\rightarrow$", linestyle="", markersize=14
     )
     return legend
+
+
+def _sides_of_names(
+    axes: Axes, scenario: Scenario, positions: NDArray[np.float32]
+) -> list[Literal[1, -1]]:
+    """Where each robot's name covers no other robot: above it (1), if it can, or below (-1)."""
+    radii = np.array([robot.radius_m for robot in scenario.robots])
+    low, high = axes.get_ylim()
+    metres = (high - low) / (axes.get_window_extent().height / axes.figure.dpi * 72)  # of a point
+    sides: list[Literal[1, -1]] = []
+    for robot, own in enumerate(scenario.robots):
+        half = np.array([len(own.name) * _LETTER_PT[0], _LETTER_PT[1]]) * metres / 2
+        others = np.arange(len(radii)) != robot
+        above = np.array([0.0, own.radius_m + half[1]])
+        covered = []
+        for middle in (positions[robot] + above, positions[robot] - above):
+            beyond = np.maximum(np.abs(positions[others] - middle) - half, 0.0)
+            covered.append(bool((np.hypot(*beyond.T) < radii[others]).any()))
+        sides.append(-1 if covered == [True, False] else 1)
+    return sides
