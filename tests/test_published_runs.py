@@ -4,7 +4,6 @@ import csv
 import math
 import re
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,8 +12,11 @@ from once import made_once
 
 from innerattn.cli.main import main
 from innerattn.experiments.archive import FILE, read_archive
+from innerattn.report.marks import marked
+from innerattn.report.study.publish import publish
 from innerattn.studies.folder import open_study
 from innerattn.studies.results import read_results
+from innerattn.studies.shipped import shipped_table
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -23,9 +25,6 @@ PAGES = ("reproduction", "paper_protocol", "crossed")
 NEEDS_STEPS = ("## Fig. 4: ", "## Fig. 5: ")
 NOT_RUN = re.compile(r"mixed-(8|16) .*|double .* (helpers|team)\S*, seed [3-9]")
 """Runs of a command's plan that its page says have not been run."""
-
-sys.path.insert(0, str(DOCS))
-from publish import KEPT, PLACES, TABLES, by_heading, report_name, sections  # noqa: E402
 
 
 def page(name: str) -> str:
@@ -36,6 +35,12 @@ def part(name: str, section: str) -> str:
     """What the command made of a page."""
     text = page(name).split(f"<!-- {section}: begin -->")[1]
     return text.split(f"<!-- {section}: end -->")[0].strip()
+
+
+def empty(path: Path, name: str) -> None:
+    """Take the text out of a part of a page."""
+    before, _, after = marked(path, name)
+    path.write_text(before + after, "utf-8")
 
 
 def make(words: list[str], archive: Path, pool: Path) -> Path:
@@ -69,10 +74,15 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: pools / name / words_of(name)[0] for name in PAGES}
 
 
-def made_sections(name: str, folder: Path) -> tuple[str, str]:
-    report = "crossed.md" if name == "crossed" else "report.md"
-    (place,) = [place for place in PLACES.values() if place[0].stem == name]
-    return sections((folder / report).read_text("utf-8"), *place)
+def made_sections(name: str, folder: Path, docs: Path) -> tuple[str, str]:
+    """What a report puts into the empty parts of its page."""
+    (docs / f"{name}.md").write_text(
+        "".join(f"<!-- {one}: begin -->\n<!-- {one}: end -->\n" for one in ("summary", "details"))
+    )
+    report = folder / ("crossed.md" if name == "crossed" else "report.md")
+    publish(open_study(folder), report, [], docs)
+    summary, details = (marked(docs / f"{name}.md", one)[1] for one in ("summary", "details"))
+    return summary.strip(), details.strip()
 
 
 def cells_fit(made: list[str], shown: list[str]) -> bool:
@@ -107,19 +117,28 @@ def cells_fit(made: list[str], shown: list[str]) -> bool:
 def test_tables_are_made_of_the_archive(
     target: str, budget: str, options: str, tmp_path: Path
 ) -> None:
-    archive = RECORDS / f"{KEPT[target, budget]}.parquet"
-    study = make([target, "--budget", budget, *options.split()], archive, tmp_path)
-    shown, (parts,) = TABLES[target, budget]
-    assert f"innerattn reproduce {target} --budget {budget} {options}" in shown.read_text("utf-8")
-    found = by_heading((study / report_name(target)).read_text("utf-8"))
-    for name, headings in parts.items():
-        assert part(shown.stem, name) == "\n\n".join(found[one] for one in headings if one in found)
+    pages = shipped_table(target)["report"]["pages"]
+    (asked,) = [one for one in pages if one["budget"] == budget]
+    archive, docs = DOCS / asked["archive"], tmp_path / "docs"
+    words = [target, "--budget", budget, *options.split()]
+    assert f"innerattn reproduce {' '.join(words)}" in page(Path(asked["page"]).stem)
+    docs.mkdir()
+    shutil.copy(DOCS / asked["page"], docs)
+    empty(docs / asked["page"], asked["part"])
+    make([*words, "--publish", str(docs)], archive, tmp_path)
+    assert (docs / asked["page"]).read_text("utf-8") == page(Path(asked["page"]).stem)
+    of_study, published = read_archive(docs / asked["archive"]), read_archive(archive)
+    digests = {one.folder.name: one.config_sha256 for one in published}
+    assert of_study
+    assert all(digests[one.folder.name] == one.config_sha256 for one in of_study)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", PAGES)
-def test_pages_show_what_is_made_of_the_archive(name: str, made: dict[str, Path]) -> None:
-    summary, details = made_sections(name, made[name])
+def test_pages_show_what_is_made_of_the_archive(
+    name: str, made: dict[str, Path], tmp_path: Path
+) -> None:
+    summary, details = made_sections(name, made[name], tmp_path)
     shown = part(name, "details")
     if name == "crossed":
         assert (summary, details) == (part(name, "summary"), shown)
@@ -192,7 +211,8 @@ def test_the_answer_about_seeds_is_what_was_measured() -> None:
 
 def test_the_table_of_learning_is_made_of_the_same_runs(tmp_path: Path) -> None:
     study = make(["learning", "--budget", "short"], RECORDS / "reproduction.parquet", tmp_path)
-    found = by_heading((study / "report.md").read_text("utf-8"))
+    text = (study / "report.md").read_text("utf-8")
+    found = {one.partition("\n")[0]: one for one in re.split("^## ", text, flags=re.M)}
     shown = rows_of(part("learning", "learning_short"))
     assert [*rows_of(found["Scores"]), *rows_of(found["Contrasts"])] == shown
     assert len(shown) == 1 + 12 + 2 * (1 + 6)

@@ -15,8 +15,9 @@ from innerattn.cli.main import main
 from innerattn.studies.new_study import new_study
 from innerattn.studies.plan import plan_study
 from innerattn.studies.schema import COPY, study_schema_text
+from innerattn.studies.shown import Report, ReportPage, StudyTable
 from innerattn.studies.space import Search
-from innerattn.studies.study import Faults, Study, StudyContrast, StudyTable, study_in
+from innerattn.studies.study import Faults, Study, StudyContrast, study_in
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +87,8 @@ def test_the_new_file_is_a_study_and_names_every_key(
     assert given["contrasts"][0].keys() == StudyContrast.model_fields.keys()
     assert given["tables"][0].keys() == StudyTable.model_fields.keys()
     assert given["faults"].keys() == Faults.model_fields.keys()
+    assert given["report"].keys() == Report.model_fields.keys()
+    assert given["report"]["pages"][0].keys() <= ReportPage.model_fields.keys()
     assert given["search"].keys() == Search.model_fields.keys() | {"ppo"}
     assert validator.is_valid(given)
     del given["search"]  # it stands without the other parts

@@ -97,7 +97,7 @@ BRIEF: Mapping[str, Brief] = {
             ("--workers N", "workers, or jobs of slurm"),
             ("--ray ADDRESS", "run workers on a Ray cluster; local: of this machine"),
             ("--until TIME", "when a worker saves its run and ends: 90s, 55m, 2h"),
-            ("--minutes N", "time limit of a job of slurm ({minutes})"),
+            ("--publish DIR", "fill the pages that the file names (report)"),
             _QUIET,
         ),
         ("run sharing.toml", "status studies/sharing", "work studies/sharing --until 55m"),

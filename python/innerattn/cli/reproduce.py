@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 import tyro
 
 from innerattn.cli.options import LongCommand, UsageError, check_target
-from innerattn.cli.study import do_jobs, do_runs, print_means, say_report, say_written
+from innerattn.cli.study import (
+    do_jobs,
+    do_runs,
+    print_means,
+    publish_report,
+    say_report,
+    say_written,
+)
 from innerattn.config import BUDGETS
 from innerattn.config.files import write_whole
 from innerattn.config.near import did_you_mean
@@ -58,6 +65,9 @@ class Reproduce(LongCommand):
     """Train and measure nothing: report on the runs that are finished, and name the others."""
     page: Path | None = None
     """Write a page about the finished runs too (.html), see innerattn report."""
+    publish: Path | None = None
+    """Folder, such as docs, in which the pages of the target's study take sections of its report;
+    see [report] in docs/studies.md."""
 
     def run(self) -> int:
         """Plan, train, print, write.
@@ -74,6 +84,8 @@ class Reproduce(LongCommand):
         from innerattn.studies.results import read_results
 
         target = TARGETS[self.target]
+        if self.publish is not None and self.target != "all" and target.file == TARGETS["all"].file:
+            raise UsageError(f"--publish: pages show all of the paper, not {self.target}: use all")
         if target.draws and target.report is not None:
             check_format(Path("figure.png"))
         study = self._begun(target)
@@ -87,9 +99,13 @@ class Reproduce(LongCommand):
         )
         runs = results.runs
         if target.report is None:
-            code = self._report(study, results)
+            code, name = self._report(study, results), "report.md"
         else:
-            code = self._special(target, target.report(), study, results)
+            report = target.report()
+            code = self._special(target, report, study, results)
+            name = next(one for one in report.files if one.endswith(".md"))
+        if self.publish is not None:
+            publish_report(self, study, study.path / name, runs, self.publish)
         note = smoke_note(self.budget)
         say_written(self.console(), self._write_page(runs, [note] if note else []))
         return int(code or bool(results.left_out))

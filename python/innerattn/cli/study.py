@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from innerattn.experiments.processes import Job
+    from innerattn.experiments.run import FinishedRun
     from innerattn.report.study.page import Found
     from innerattn.studies.folder import StudyFolder
     from innerattn.studies.ledger import State
@@ -63,6 +64,9 @@ class Study(LongCommand):
     """Time after which a worker saves its run and ends: 90s, 55m, 2h."""
     minutes: int = 60
     """Time limit of a job (slurm) [min]."""
+    publish: Path | None = None
+    """Folder in which the pages that the file names take sections of the report, and archives its
+    runs (report)."""
 
     def run(self) -> int:
         """Do it.
@@ -152,8 +156,11 @@ class Study(LongCommand):
         from innerattn.studies.search.state import Watched
 
         study = Watched(study or self._opened()).now().study
-        found, files = write_study(study, read_results(study))
-        return say_report(self, found, files)
+        found, files = write_study(study, results := read_results(study))
+        code = say_report(self, found, files)
+        if self.publish is not None:
+            publish_report(self, study, files[0], results.runs, self.publish)
+        return code
 
     def _retry(self) -> int:
         from innerattn.studies.search.state import Watched
@@ -334,6 +341,25 @@ def say_report(command: LongCommand, found: Found, files: Sequence[Path]) -> int
     done = sum(state == "done" for state in found.states.values())
     command.say_result(f"{found.study.path}: {done} of {len(found.states)} runs done")
     return int(any(one.startswith(("failed", "unreadable")) for one in reasons))
+
+
+def publish_report(
+    command: LongCommand,
+    study: StudyFolder,
+    report: Path,
+    runs: Sequence[FinishedRun],
+    root: Path,
+) -> None:
+    """Put a report into the pages of its study below ``root``, and name them.
+
+    Raises:
+        RunError: something is missing; no page is changed.
+        OSError: a file cannot be read or written.
+    """
+    from innerattn.report.study.publish import publish
+
+    written = ", ".join(map(str, publish(study, report, runs, root)))
+    command.console().print(f"Filled: {written}", soft_wrap=True, markup=False)
 
 
 def print_means(console: Console, results: Results) -> None:

@@ -65,6 +65,19 @@ family = "all"
 [[curves]]
 title = "Learning curves"
 
+# Which sections the report shows below its answer, in this order; none: all.
+#[report]
+#sections = ["Contrasts", "Scores", "Learning curves", "Over all scenarios", "Rules"]
+
+# Sections of the report go to a page between <!-- answer: begin --> and <!-- answer: end -->:
+# innerattn study report {file} --publish FOLDER-OF-PAGE
+#[[report.pages]]
+#page = "results.md"
+#part = "answer"
+#sections = ["Contrasts"]
+# the finished runs as one file
+#archive = "runs.parquet"
+
 # Faults that each finished run meets. They add the measures retained and retained_KIND: the share
 # of the rescues that a team keeps.
 #[faults]

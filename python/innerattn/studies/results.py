@@ -19,6 +19,7 @@ from innerattn.studies.faults import retained
 from innerattn.studies.folder import StudyFolder
 from innerattn.studies.ledger import Ledger, State
 from innerattn.studies.plan import MEASURES_OF_ALL, PlannedRun, pairs, run_digest
+from innerattn.studies.shown import StudyTable
 from innerattn.studies.space import Length, Value
 from innerattn.studies.study import (
     RETAINED,
@@ -26,7 +27,6 @@ from innerattn.studies.study import (
     Direction,
     Study,
     StudyContrast,
-    StudyTable,
     coordinates,
 )
 

@@ -15,12 +15,19 @@ from innerattn.config.run import digest_of
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.errors import ConfigError
 from innerattn.studies.seeds import listed_seeds
+from innerattn.studies.shown import (
+    CONTRASTS,
+    DATED_RULES,
+    OVER_ALL,
+    Curves,
+    Report,
+    Shown,
+    StudyTable,
+)
 from innerattn.studies.space import Length, Search, Value
 
 _WORD = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
 _MOST_CONTRASTS = 200
-_LONG = ", long"
-_MOST_MEASURES = 12
 
 Name = Annotated[str, Field(pattern=rf"^{_WORD}$")]
 Direction = Literal["two-sided", "greater", "less"]
@@ -146,44 +153,6 @@ class StudyContrast(Model):
         return coordinates(self.a), coordinates(self.b)
 
 
-class Shown(Model):
-    """A part of the report."""
-
-    title: str = Field(min_length=1, max_length=100, description="heading in the report")
-    of: dict[str, Any] = Field(
-        default_factory=dict, description="which runs: coordinates of the grid by value; none: all"
-    )
-
-
-class Curves(Shown):
-    """A figure of rescues in training, against env-steps and time."""
-
-    place: ClassVar[str] = "curves"
-
-
-class StudyTable(Shown):
-    """A table of means over seeds, a row for each place in the grid."""
-
-    place: ClassVar[str] = "tables"
-
-    measures: tuple[str, ...] = Field(
-        ("rescues_per_episode", "score", "score, long"),
-        min_length=1,
-        max_length=_MOST_MEASURES,
-        description="score, rescues_per_episode or registered measures of a run; ', long' behind "
-        "one means episodes of the second length",
-    )
-    seeds: bool = Field(True, description="whether the value of each seed is shown")
-
-    @property
-    def wanted(self) -> list[tuple[str, Length]]:
-        """Its measures and their lengths of episodes."""
-        return [
-            (one.removesuffix(_LONG), "long" if one.endswith(_LONG) else "standard")
-            for one in self.measures
-        ]
-
-
 SCORES = StudyTable(title="Scores")
 """The table of a study that lists none."""
 RETAINED = "retained"
@@ -250,6 +219,9 @@ class Study(Model):
     )
     faults: Faults | None = Field(None, description="faults that finished runs meet")
     search: Search | None = Field(None, description="which values of a run are to be found")
+    report: Report | None = Field(
+        None, description="what the report shows, and which pages take parts of it"
+    )
 
     @field_validator("grid", mode="before")
     @classmethod
@@ -261,10 +233,15 @@ class Study(Model):
         for what, names in (
             ("variants", [one.name for one in self.variants]),
             ("contrasts", [one.name for one in self.contrasts]),
-            ("tables and curves", [one.title for one in self.shown]),
+            (
+                "tables and curves",
+                [CONTRASTS, OVER_ALL, DATED_RULES, *(s.title for s in self.shown)],
+            ),
         ):
             if (twice := _first_twice(names)) is not None:
                 raise ValueError(f"{what}: the name {twice!r} stands twice")
+        if self.report is not None and self.report.sections is not None:
+            self._check_sections(self.report.sections)
         known = [one.name for one in self.variants]
         for name in (name for grid in self.grid for name in grid.variants or ()):
             if name not in known:
@@ -273,6 +250,19 @@ class Study(Model):
         if self.search is not None:
             self._check_search(self.search)
         return self
+
+    def _check_sections(self, sections: tuple[str, ...]) -> None:
+        """Refuse what no report of it can show."""
+        titles = [one.title for one in (*self.listed_tables, *self.curves)]
+        known = (CONTRASTS, *titles, OVER_ALL, DATED_RULES)
+        for one in sections:
+            if one not in known:
+                near = did_you_mean(one, known, repr)
+                raise ValueError(
+                    f"report.sections: {one!r}: must be of {', '.join(map(repr, known))}{near}"
+                )
+        if (twice := _first_twice(sections)) is not None:
+            raise ValueError(f"report.sections: {twice!r} stands twice")
 
     def _check_search(self, search: Search) -> None:
         """Refuse what a search does not stand beside."""
@@ -315,10 +305,13 @@ class Study(Model):
         return (*self.tables, *self.curves)
 
     def values(self) -> dict[str, Any]:
-        """What its file says, as JSON values; one grid is a table, and what it lacks is absent."""
-        values = self.model_dump(mode="json", exclude_none=True)
-        for key in ("tables", "curves"):  # added later: where absent, digests are as before
-            if not values[key]:
+        """What its file says, as JSON values; one grid is a table, and what it lacks is absent.
+
+        Which pages take parts of the report is no rule, and left out.
+        """
+        values = self.model_dump(mode="json", exclude_none=True, exclude={"report": {"pages"}})
+        for key in ("tables", "curves", "report"):  # added later: absent, digests are as before
+            if not values.get(key, True):
                 del values[key]
         if len(self.grid) == 1:
             (values["grid"],) = values["grid"]

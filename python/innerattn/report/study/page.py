@@ -27,8 +27,9 @@ from innerattn.studies.curves import EPISODES, LearningCurve
 from innerattn.studies.folder import Rules, StudyFolder
 from innerattn.studies.ledger import State
 from innerattn.studies.results import RULES, Compared, Mean, Results, Values
+from innerattn.studies.shown import CONTRASTS, DATED_RULES, OVER_ALL, StudyTable
 from innerattn.studies.space import Length, Value
-from innerattn.studies.study import RETAINED, StudyTable
+from innerattn.studies.study import RETAINED
 
 
 @dataclass(frozen=True)
@@ -81,22 +82,43 @@ def study_page(found: Found, figures: Mapping[str, str]) -> str:
         parts += search_page(found.search, figures.get("search"))
     if "scores" in figures:
         parts += [f"![Scores of all runs]({figures['scores']})\n", _DOTS]
-    if compared:
-        parts += ["## Contrasts\n", contrasts_tables(compared)]
-    for title, (shown, rows) in found.tables.items():
-        if rows:
-            of_faults = any(one.startswith(RETAINED) for one in shown.measures)
-            captions = [_SCORE, *[_PLANNED] * planned, *[_RETAINED] * of_faults]
-            parts += [f"## {title}\n", markdown(means_table(rows, shown.seeds)), *captions]
-    for title in found.curves:
-        if title in figures:
-            parts += [f"## {title}\n", f"![{title}]({figures[title]})\n", _CURVES]
-    if any(found.aggregates.values()):
-        table = aggregates_table(found.aggregates)
-        parts += ["## Over all scenarios\n", markdown(table), _AGGREGATES]
     of_search = [] if found.search is None else [search_rules(found.search.search)]
-    parts += ["## Rules\n", *of_search, RULES, "", *map(_dated, study.rules), ""]
+    sections = {
+        CONTRASTS: [contrasts_tables(compared)] if compared else [],
+        **{title: _means_section(*own, planned) for title, own in found.tables.items()},
+        **{
+            title: [f"![{title}]({figures[title]})\n", _CURVES]
+            for title in found.curves
+            if title in figures
+        },
+        OVER_ALL: (
+            [markdown(aggregates_table(found.aggregates)), _AGGREGATES]
+            if any(found.aggregates.values())
+            else []
+        ),
+        DATED_RULES: [*of_search, RULES, "", *map(_dated, study.rules), ""],
+    }
+    report = study.study.report
+    shown = sections if report is None or report.sections is None else report.sections
+    for title in shown:
+        if text := sections.get(title):
+            parts += [f"## {title}\n", *text]
     return "\n".join(parts)
+
+
+def _means_section(shown: StudyTable, rows: Sequence[Mean], planned: bool) -> list[str]:
+    """A table of means with its captions; nothing without rows.
+
+    Args:
+        shown: what it shows.
+        rows: its means.
+        planned: whether a score of 1 means `planner` in some of the worlds.
+    """
+    if not rows:
+        return []
+    of_faults = any(one.startswith(RETAINED) for one in shown.measures)
+    captions = [_SCORE, *[_PLANNED] * planned, *[_RETAINED] * of_faults]
+    return [markdown(means_table(rows, shown.seeds)), *captions]
 
 
 def _without_faults(results: Results) -> int:
