@@ -329,7 +329,7 @@ impl Batch {
         for (world, (places, speeds)) in zip(worlds, rows) {
             world.positions = places.chunks_exact(2).map(vector).collect();
             world.velocities = speeds.chunks_exact(2).map(vector).collect();
-            world.freeze(&self.rules);
+            world.perceive(&self.rules);
         }
         Ok(())
     }

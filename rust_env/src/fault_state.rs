@@ -229,8 +229,25 @@ impl FaultState {
         self.struck = [0; NUM_STRIKES];
     }
 
+    /// Robots that see nothing now, as bits: those in a blackout, but for those whose sensors take a reading that
+    /// they will repeat after it.
+    #[must_use]
+    pub fn blind(&self) -> u64 {
+        let each = self.levels.iter().enumerate().filter(|(_, levels)| freezing(levels));
+        let frozen = each.fold(0, |robots, (robot, _)| robots | 1 << robot);
+        self.struck(Kind::Blackout) & !frozen
+    }
+
+    /// Robots whose sensors repeat an older reading now, as bits.
+    #[must_use]
+    pub fn held(&self) -> u64 {
+        let kept = self.frozen.iter().fold(0, |robots, (robot, _)| robots | 1 << robot);
+        kept & self.struck(Kind::FrozenSensor)
+    }
+
     /// Robots that a fault of this kind, one that strikes, strikes now, as bits.
-    fn struck(&self, kind: Kind) -> u64 {
+    #[must_use]
+    pub fn struck(&self, kind: Kind) -> u64 {
         debug_assert!(matches!(kind.spec().effect, Effect::Strike), "{}", kind.name());
         self.struck[STRIKES_BEFORE[kind as usize]]
     }

@@ -63,6 +63,30 @@ impl Solid {
         }
     }
 
+    /// Whether the straight `way` on from a place, relative to the solid's centre, leads through its inside. It
+    /// says the same of mirrored ways, to the bit.
+    #[must_use]
+    pub fn is_crossed(&self, from: Vec2, way: Vec2) -> bool {
+        let length = way.norm_squared();
+        if length == 0.0 {
+            return false;
+        }
+        match self {
+            Self::Disc(radius) => {
+                let nearest = from + way * (-from.dot(&way) / length).clamp(0.0, 1.0);
+                nearest.norm_squared() < radius * radius
+            }
+            Self::Box(half) => {
+                // No axis parts the two: neither one of the box, nor the one across the way.
+                let (middle, reach) = (from + way * 0.5, way.abs() * 0.5);
+                let across = middle.x * way.y - middle.y * way.x;
+                middle.x.abs() < half.x + reach.x
+                    && middle.y.abs() < half.y + reach.y
+                    && across.abs() < half.x * way.y.abs() + half.y * way.x.abs()
+            }
+        }
+    }
+
     /// Half its shortest diameter, m.
     #[must_use]
     pub fn half_breadth(&self) -> f32 {
@@ -182,6 +206,29 @@ mod tests {
     const MENDING: Touch = Touch { slop: 5e-5, parting: 1e-2 };
     /// The very surface, and only what approaches.
     const EXACT: Touch = Touch { slop: 0.0, parting: -1e-5 };
+
+    #[test]
+    fn a_way_crosses_what_one_of_its_places_is_inside_of() {
+        let mut crossed = [0; 2];
+        for index in 0..3000_u32 {
+            let number = |salt: u32| (index * 7919 + salt * 104_729) % 1009;
+            let unit = |salt| number(salt) as f32 / 1009.0 - 0.5;
+            let solid = if index % 2 == 0 { Solid::Disc(0.2) } else { Solid::Box(Vec2::new(0.3, 0.1)) };
+            let (from, way) = (Vec2::new(unit(1), unit(2)) * 2.0, Vec2::new(unit(3), unit(4)) * 3.0);
+            let depths = (0..=1000).map(|part| solid.nearest(from + way * (part as f32 / 1000.0)).0);
+            let deepest = depths.fold(f32::INFINITY, f32::min);
+            if deepest.abs() > 1e-4 {
+                assert_eq!(solid.is_crossed(from, way), deepest < 0.0, "{solid:?} {from} {way}");
+                crossed[usize::from(deepest < 0.0)] += 1;
+            }
+            for mirror in [Vec2::new(-1.0, 1.0), Vec2::new(1.0, -1.0)] {
+                let mirrored = solid.is_crossed(from.component_mul(&mirror), way.component_mul(&mirror));
+                assert_eq!(mirrored, solid.is_crossed(from, way));
+            }
+        }
+        assert!(crossed.iter().all(|count| *count > 500), "{crossed:?}");
+        assert!(!Solid::Disc(0.2).is_crossed(Vec2::zeros(), Vec2::zeros()));
+    }
 
     #[test]
     fn discs_meet_when_the_gap_is_used_up() {

@@ -21,6 +21,7 @@ pub mod place;
 pub mod tasks;
 
 pub mod meeting;
+pub mod sight;
 pub mod supply;
 
 pub mod spawn;

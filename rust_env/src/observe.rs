@@ -6,6 +6,7 @@ use crate::fault::{HEALTHY, KINDS, Kind, Levels};
 use crate::geometry::Vec2;
 use crate::robot::Body;
 use crate::scenario::{MAX_VICTIMS, Scenario, VictimOrder};
+use crate::sight::Sight;
 use crate::tasks::deadline::Deadlines;
 use crate::tasks::order::Order;
 use crate::tasks::service::Service;
@@ -29,6 +30,8 @@ pub struct Scene<'a> {
     pub loads: &'a [u32],
     /// Victims by slot.
     pub victims: &'a [Option<Victim>],
+    /// When robots last saw each other and the victims, see [`Sight::look`]; none where all see everything.
+    pub sightings: &'a [u32],
     /// Steps done in the episode.
     pub step: u32,
 }
@@ -66,6 +69,7 @@ pub struct Layout {
     deadlines: Option<Deadlines>,
     order: Option<Order>,
     stores: Option<Stores>,
+    sight: Option<Sight>,
     /// The columns that never change, of all robots (R × D); zeros elsewhere.
     fixed: Vec<f32>,
 }
@@ -73,7 +77,7 @@ pub struct Layout {
 impl Layout {
     /// The columns of `scenario`.
     #[must_use]
-    pub(crate) fn new(scenario: &Scenario, tasks: &[Needs]) -> Self {
+    pub(crate) fn new(scenario: &Scenario, tasks: &[Needs], sight: Option<Sight>) -> Self {
         let abilities: Vec<String> = scenario.abilities().iter().map(ToString::to_string).collect();
         let amounts =
             |needs: &Needs| (0..abilities.len() as u32).map(|ability| needs.amount(ability)).collect();
@@ -87,6 +91,7 @@ impl Layout {
             deadlines: Deadlines::new(scenario),
             order: Order::new(scenario),
             stores: Stores::new(scenario),
+            sight,
             abilities,
             needs,
             fixed: vec![],
@@ -134,6 +139,11 @@ impl Layout {
         self.stores_from() + self.stores.as_ref().map_or(0, Stores::robot_width)
     }
 
+    /// Columns of one teammate: those of a robot, whether it is seen, and for how long it was not.
+    fn mate_width(&self) -> usize {
+        self.robot_width() + 2 * usize::from(self.sight.is_some())
+    }
+
     /// Columns of the ways to the nearest station and depot, behind a robot's own block.
     fn ways_width(&self) -> usize {
         self.stores.as_ref().map_or(0, Stores::ways_width)
@@ -141,15 +151,15 @@ impl Layout {
 
     /// Columns before those of victims.
     fn victims_from(&self) -> usize {
-        self.robots * self.robot_width() + self.ways_width()
+        self.robot_width() + self.ways_width() + (self.robots - 1) * self.mate_width()
     }
 
     /// The blocks of the robot itself and of its teammates.
     fn blocks<'a>(&self, row: &'a mut [f32]) -> impl Iterator<Item = &'a mut [f32]> {
         let (own, rest) = row.split_at_mut(self.robot_width());
-        let mates = (self.robots - 1) * self.robot_width();
+        let mates = (self.robots - 1) * self.mate_width();
         let mates = &mut rest[self.ways_width()..][..mates];
-        std::iter::once(own).chain(mates.chunks_exact_mut(self.robot_width()))
+        std::iter::once(own).chain(mates.chunks_exact_mut(self.mate_width()))
     }
 
     /// Columns of one victim.
@@ -158,6 +168,7 @@ impl Layout {
             + usize::from(self.services.is_some())
             + usize::from(self.deadlines.is_some())
             + usize::from(self.order.is_some())
+            + usize::from(self.sight.is_some())
     }
 
     /// Width D of a row.
@@ -167,7 +178,7 @@ impl Layout {
     }
 
     /// The name of every column; units are m and m/s, flags are 0 or 1, abilities are 0 or 1 or
-    /// amounts, needs are counts or amounts, `charge`, `load`, `served` and `time_left` are shares.
+    /// amounts, needs are counts or amounts, `charge`, `load`, `served`, `time_left` and `since_seen` are shares.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let mut names = Vec::with_capacity(self.width());
@@ -192,6 +203,8 @@ impl Layout {
             names.extend(stores.into_iter().flat_map(Stores::names).map(|name| format!("{who}.{name}")));
             if robot == 0 {
                 names.extend(stores.into_iter().flat_map(Stores::names_of_ways));
+            } else if self.sight.is_some() {
+                names.extend(["seen", "since_seen"].map(|name| format!("{who}.{name}")));
             }
         }
         for victim in 0..self.victims {
@@ -201,6 +214,7 @@ impl Layout {
             names.extend(self.services.iter().map(|_| format!("victim_{victim}.served")));
             names.extend(self.deadlines.iter().map(|_| format!("victim_{victim}.time_left")));
             names.extend(self.order.iter().map(|_| format!("victim_{victim}.blocked")));
+            names.extend(self.sight.iter().map(|_| format!("victim_{victim}.since_seen")));
         }
         names
     }
@@ -210,6 +224,7 @@ impl Layout {
         rows.copy_from_slice(&self.fixed);
         for (own, row) in rows.chunks_exact_mut(self.width()).enumerate() {
             self.write_row(scene, own, Vec2::zeros(), Vec2::zeros(), row);
+            self.hide_mates(scene, own, row);
         }
     }
 
@@ -228,6 +243,22 @@ impl Layout {
             }
             block[self.availability()] = (!senses.unavailable >> robot & 1) as f32;
             self.write_levels(senses.levels.get(robot).unwrap_or(&HEALTHY), block);
+        }
+        self.hide_mates(scene, own, row);
+    }
+
+    /// Where sights are limited, leaves nothing of teammates that the robot does not see, and says for how long
+    /// it has not seen each of them.
+    fn hide_mates(&self, scene: Scene, own: usize, row: &mut [f32]) {
+        let Some(sight) = &self.sight else { return };
+        let seen = sight.mates(own, scene.sightings);
+        for (block, last) in self.blocks(row).skip(1).zip(seen) {
+            if last != scene.step {
+                block.fill(0.0);
+            }
+            let flags = self.robot_width();
+            block[flags] = f32::from(u8::from(last == scene.step));
+            block[flags + 1] = sight.since(last, scene.step);
         }
     }
 
@@ -252,7 +283,7 @@ impl Layout {
         let others = (0..self.robots).filter(|other| *other != own);
         let (block, rest) = row.split_at_mut(self.robot_width());
         block[..4].copy_from_slice(&[position.x, position.y, velocity.x, velocity.y]);
-        let mates = rest[self.ways_width()..].chunks_exact_mut(self.robot_width());
+        let mates = rest[self.ways_width()..].chunks_exact_mut(self.mate_width());
         for (block, other) in mates.zip(others) {
             let (place, speed) = (scene.positions[other] - position, scene.velocities[other] - velocity);
             block[..4].copy_from_slice(&[place.x, place.y, speed.x, speed.y]);
@@ -264,7 +295,29 @@ impl Layout {
             }
             stores.write_ways(position, &mut row[self.robot_width()..]);
         }
-        self.write_victims(scene, &scene.team[own], position, &mut row[self.victims_from()..]);
+        let victims = &mut row[self.victims_from()..];
+        let Some(sight) = &self.sight else {
+            return self.write_victims(scene, &scene.team[own], position, victims);
+        };
+        let seen = sight.seen(own, scene.sightings, scene.step, scene.victims);
+        let in_sight = Scene { victims: &seen[..scene.victims.len()], ..scene };
+        self.write_victims(in_sight, &scene.team[own], position, victims);
+        self.write_since(sight, scene, own, victims);
+    }
+
+    /// Writes for how long the robot has not seen each victim. In the order of relevance those that it sees come
+    /// first, then those that it saw later than others, so that nothing tells of what it does not see.
+    fn write_since(&self, sight: &Sight, scene: Scene, own: usize, rows: &mut [f32]) {
+        let mut since = [1.0; MAX_VICTIMS];
+        let last = sight.victims(own, scene.sightings);
+        for (since, last) in since.iter_mut().zip(last) {
+            *since = sight.since(*last, scene.step);
+        }
+        if self.sorted == VictimOrder::Relevant {
+            since[..last.len()].sort_unstable_by(f32::total_cmp);
+        }
+        let width = self.victim_width();
+        rows.chunks_exact_mut(width).zip(since).for_each(|(row, since)| row[width - 1] = since);
     }
 
     fn write_victims(&self, scene: Scene, body: &Body, own: Vec2, rows: &mut [f32]) {
@@ -302,7 +355,8 @@ impl Layout {
                     deadlines.share_left(victim, step);
             }
             if let Some(order) = &self.order {
-                row[self.victim_width() - 1] = f32::from(u8::from(order.is_blocked(victim, victims)));
+                row[self.victim_width() - 1 - usize::from(self.sight.is_some())] =
+                    f32::from(u8::from(order.is_blocked(victim, victims)));
             }
         }
     }
@@ -330,7 +384,7 @@ mod tests {
         scenario.robots = vec![scenario.robots[0].clone(), scenario.robots[3].clone()];
         scenario.tasks[1].needs = vec!["food".into()].into();
         let (team, tasks) = (bodies(&scenario), Needs::of_tasks(&scenario));
-        let layout = Layout::new(&scenario, &tasks);
+        let layout = Layout::new(&scenario, &tasks, None);
         let victim = |task, x| Some(Victim::new(0, task, 0, Vec2::new(x, 0.0)));
         // The near one needs food alone; the far one food and medicine.
         let victims = [victim(1, 0.5), victim(0, -0.5)];
@@ -345,6 +399,7 @@ mod tests {
             charges: &[],
             loads: &[],
             victims: &victims,
+            sightings: &[],
             step: 0,
         };
         layout.write(scene, &mut rows);

@@ -11,6 +11,7 @@ use crate::physics::Physics;
 use crate::reward::Weights;
 use crate::robot::{Body, bodies};
 use crate::scenario::{Arrival, Engine, Scenario};
+use crate::sight::Sight;
 use crate::spawn::{Crowded, Spawn};
 use crate::supply::Supplies;
 use crate::tasks::Needs;
@@ -57,6 +58,8 @@ pub struct Rules {
     pub energy: Option<Energy>,
     /// Loads and depots, if any.
     pub supplies: Option<Supplies>,
+    /// How far robots see, where something limits it.
+    pub sight: Option<Sight>,
     /// The obstacles' forms.
     pub solids: Vec<Solid>,
     /// Motion and contacts.
@@ -100,9 +103,10 @@ impl Rules {
                 });
             }
         }
+        let sight = Sight::new(&scenario, &team, &solids);
         Ok(Self {
             physics: Physics::new(&scenario),
-            layout: Layout::new(&scenario, &tasks),
+            layout: Layout::new(&scenario, &tasks, sight.clone()),
             services: Service::of_tasks(&scenario),
             deadlines: Deadlines::new(&scenario),
             arrivals: Arrivals::new(&scenario),
@@ -111,6 +115,7 @@ impl Rules {
             supplies: Supplies::new(&scenario),
             weights: Weights::new(&scenario),
             faults: processes(&scenario),
+            sight,
             spawn,
             scenario,
             team,

@@ -8,6 +8,7 @@ mod check;
 mod depot;
 mod layers;
 mod order;
+mod sight;
 mod spot;
 mod task;
 mod validity;
@@ -198,6 +199,9 @@ pub struct Robot {
     /// How many rescues it can help with before a depot refills it; any number if absent.
     #[serde(default)]
     pub load: Option<u32>,
+    /// How far it sees from its centre, m; everything if absent.
+    #[serde(default)]
+    pub sight_m: Option<f64>,
 }
 
 fn default_radius_m() -> f64 {
@@ -244,6 +248,8 @@ pub struct Scenario {
     pub arrivals: Vec<Arrival>,
     /// Solid things in the arena.
     pub obstacles: Vec<Obstacle>,
+    /// Whether obstacles hide from robots what is behind them.
+    pub occlusion: bool,
     /// Places that charge batteries.
     pub stations: Vec<Station>,
     /// Places that refill loads.
@@ -320,6 +326,7 @@ impl Default for Scenario {
             start_m: None,
             battery: None,
             load: None,
+            sight_m: None,
         };
         let task = |name: &str, needs: [&str; 2]| Task::new(name, needs.map(String::from).to_vec());
         Self {
@@ -334,6 +341,7 @@ impl Default for Scenario {
             max_victims: 2,
             arrivals: vec![],
             obstacles: vec![],
+            occlusion: false,
             stations: vec![],
             depots: vec![],
             arena_half_width_m: 1.0,

@@ -72,8 +72,9 @@ pub fn most_bytes(rules: &Rules, num_envs: usize) -> usize {
     let faults = 2 * 5 * rules.faults.len() + NUM_KINDS * (10 + 4 * robots) + robots * (11 + 4 * width);
     let charges = if rules.energy.is_some() { 10 + 8 * robots } else { 0 };
     let loads = if rules.supplies.is_some() { 10 + 5 * robots } else { 0 };
+    let sightings = rules.sight.as_ref().map_or(0, |sight| 10 + 5 * sight.numbers());
     let head = MAGIC.len() + 2 * 10 + rules.scenario.to_json().len() + CHECKSUM_BYTES;
-    head + num_envs * (counts + places + faults + charges + loads)
+    head + num_envs * (counts + places + faults + charges + loads + sightings)
 }
 
 /// The image of `worlds`, which were made by `rules`.
@@ -95,6 +96,9 @@ pub fn save<'a>(rules: &Rules, num_envs: usize, worlds: impl Iterator<Item = &'a
         }
         if rules.supplies.is_some() {
             bytes = postcard::to_extend(&world.loads, bytes).expect("plain data serialises");
+        }
+        if rules.sight.is_some() {
+            bytes = postcard::to_extend(&world.sightings, bytes).expect("plain data serialises");
         }
         bytes
     };
@@ -155,6 +159,9 @@ pub fn load(rules: &Rules, num_envs: usize, bytes: &[u8]) -> Result<Vec<World>> 
         if rules.supplies.is_some() {
             (world.loads, later) = postcard::take_from_bytes(later).map_err(|_| unread())?;
         }
+        if rules.sight.is_some() {
+            (world.sightings, later) = postcard::take_from_bytes(later).map_err(|_| unread())?;
+        }
         if let Some(what) = misfit(rules, &world) {
             return refuse(format!("env {env} does not fit the scenario: its {what}"));
         }
@@ -209,7 +216,9 @@ fn misfit(rules: &Rules, world: &World) -> Option<&'static str> {
         ("charges", rules.energy.as_ref().is_none_or(|energy| energy.may_be(&world.charges))),
         ("faults", world.faults.fits(rules, world.now())),
     ];
-    checks.into_iter().find(|(_, fits)| !fits).map(|(what, _)| what)
+    let broken = checks.into_iter().find(|(_, fits)| !fits).map(|(what, _)| what);
+    // A look needs a world in which all else is right.
+    broken.or_else(|| (!world.sightings_fit(rules)).then_some("sightings"))
 }
 
 #[cfg(test)]

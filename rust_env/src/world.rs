@@ -17,6 +17,7 @@ use crate::rng::{Purpose, Stream};
 use crate::robot::Commands;
 use crate::rules::Rules;
 use crate::scenario::{MAX_ROBOTS, Shaping, Unavailable};
+use crate::sight::View;
 use crate::tasks::{Events, Victim};
 
 /// Whether and how an episode ended with a step.
@@ -70,6 +71,10 @@ pub struct World {
     /// Loads of the robots; none where no robot has one. Images have them apart.
     #[serde(skip)]
     pub loads: Vec<u32>,
+    /// When robots last saw each other and the victims, see [`crate::sight::Sight::look`]; none where all see
+    /// everything. Images have them apart.
+    #[serde(skip)]
+    pub sightings: Vec<u32>,
     /// Places of the obstacles, m.
     pub obstacles: Vec<Vec2>,
     /// Victims by slot.
@@ -97,6 +102,7 @@ impl World {
             velocities: vec![Vec2::zeros(); rules.team.len()],
             charges: vec![],
             loads: vec![],
+            sightings: vec![],
             obstacles: vec![Vec2::zeros(); rules.solids.len()],
             victims: vec![None; rules.scenario.num_victims()],
             faults: FaultState::default(),
@@ -114,8 +120,11 @@ impl World {
         let struck = if faults == 0 { 0 } else { FaultState::most_bytes(robots, rules.layout.width()) };
         let charges = if rules.energy.is_some() { robots * size_of::<f64>() } else { 0 };
         let loads = if rules.supplies.is_some() { robots * size_of::<u32>() } else { 0 };
+        let sightings = rules.sight.as_ref().map_or(0, |sight| sight.numbers() * size_of::<u32>());
         // Allocators round up, and keep a little beside each list.
-        size_of::<Self>() + (places + victims + struck + charges + loads + 8 * faults) * 9 / 8 + 8 * 16
+        size_of::<Self>()
+            + (places + victims + struck + charges + loads + sightings + 8 * faults) * 9 / 8
+            + 8 * 16
     }
 
     /// Starts `episode`: places everything anew from that episode's streams.
@@ -135,12 +144,15 @@ impl World {
         if let Some(supplies) = &rules.supplies {
             supplies.fill(&mut self.loads);
         }
+        if let Some(sight) = &rules.sight {
+            sight.forget(&mut self.sightings);
+        }
         let mut stream = Stream::new(self.seed, self.stream, episode, Purpose::Start);
         rules.spawn.place_start(&mut stream, &mut self.obstacles, &mut self.positions);
         let now = self.now();
         self.faults.begin(rules, now);
         self.fill_slots(rules, self.absent(rules));
-        self.freeze(rules);
+        self.perceive(rules);
     }
 
     /// Does one control step of world number `env` of a batch, whose `commands` are E × R. Adds what becomes
@@ -201,7 +213,7 @@ impl World {
         let now = self.now();
         self.faults.update(rules, now);
         self.come_and_go(rules, absent);
-        self.freeze(rules);
+        self.perceive(rules);
         let ending = Ending {
             terminated: self.goal_is_reached(rules),
             truncated: self.step >= rules.scenario.episode_steps,
@@ -260,7 +272,7 @@ impl World {
         let (now, absent) = (self.now(), self.absent(rules));
         self.faults.set(levels, now);
         self.come_and_go(rules, absent);
-        self.freeze(rules);
+        self.perceive(rules);
     }
 
     /// Robots that have left the arena, as bits.
@@ -290,8 +302,42 @@ impl World {
         }
     }
 
+    /// Notes what robots see, and keeps the readings of frozen sensors: once everything is where it is in this
+    /// step, and again if somebody has moved it.
+    pub fn perceive(&mut self, rules: &Rules) {
+        self.look(rules);
+        self.freeze(rules);
+    }
+
+    /// Notes what robots see at the present step.
+    fn look(&mut self, rules: &Rules) {
+        let Some(sight) = &rules.sight else { return };
+        let view = View {
+            positions: &self.positions,
+            obstacles: &self.obstacles,
+            victims: &self.victims,
+            step: self.step,
+            absent: self.absent(rules),
+            blind: self.faults.blind(),
+            deaf: self.faults.struck(Kind::LostCommunication),
+            held: self.faults.held(),
+        };
+        sight.look(&view, &mut self.sightings);
+    }
+
+    /// Whether robots of an otherwise valid world may have seen things when it says that they did.
+    #[must_use]
+    pub fn sightings_fit(&self, rules: &Rules) -> bool {
+        let Some(sight) = &rules.sight else { return true };
+        sight.may_be(&self.sightings, self.step, &self.victims) && {
+            let mut again = self.clone();
+            again.look(rules);
+            again.sightings == self.sightings
+        }
+    }
+
     /// Keeps what robots with frozen sensors see.
-    pub fn freeze(&mut self, rules: &Rules) {
+    fn freeze(&mut self, rules: &Rules) {
         if self.faults.has_frozen_sensors() {
             let mut rows = vec![0.0; rules.team.len() * rules.layout.width()];
             self.sense(rules, &mut rows);
@@ -316,6 +362,7 @@ impl World {
             charges: &self.charges,
             loads: &self.loads,
             victims: &self.victims,
+            sightings: &self.sightings,
             step: self.step,
         }
     }

@@ -8,7 +8,7 @@ starts, and the places and deadlines of new victims, are taken from the world th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -26,7 +26,8 @@ DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], dtype=np.float
 @dataclass
 class State:
     """E worlds: places and velocities (E, R, 2), obstacles (E, O, 2), victims (E, V) and faults
-    (E, R) structured, steps done (E,), charges and loads as shares (E, R)."""
+    (E, R) structured, steps done (E,), charges and loads as shares (E, R), and the steps at which
+    robots last saw each robot and each slot's victim (E, R, R + V)."""
 
     positions: Array
     velocities: Array
@@ -36,6 +37,7 @@ class State:
     steps: NDArray[np.int64]
     charge: Array
     load: Array
+    last_seen: NDArray[np.int64]
 
     @property
     def available(self) -> Bools:
@@ -86,6 +88,13 @@ class Stepper:
         self.full = np.array([robot.load or 0 for robot in robots])
         everyone = range(len(robots))
         self.others = np.array([[j for j in everyone if j != i] for i in everyone], dtype=int)
+
+    def seen(self, state: State) -> tuple[Bools, Array]:
+        """What each robot sees of robots and victims, and the shares of time since then, both
+        (E, R, R + V), as the state has it; `seeing.py` says whether it has it right."""
+        passed = (state.steps[:, None, None] - state.last_seen) * self.scenario.dt_s
+        since = np.where(state.last_seen < 0, 1.0, passed / (passed + 1.0))
+        return np.asarray(state.last_seen == state.steps[:, None, None]), since
 
     def there(self, state: State) -> Bools:
         """Robots in the arena, (E, R)."""
@@ -353,7 +362,14 @@ class Stepper:
         if robots > 1:
             relative = (motion[:, self.others] - motion[:, :, None]) * there[:, self.others]
             teammates = np.concatenate([relative, known[:, self.others]], axis=-1)
-            blocks.append(np.where(dark | deaf, 0.0, teammates.reshape(envs, robots, -1)))
+            teammates = np.where(deaf[..., None], 0.0, teammates)
+            if self.scenario.has_limited_sight:
+                seen, since = (
+                    np.take_along_axis(values, self.others[None], 2)[..., None]
+                    for values in self.seen(state)
+                )
+                teammates = np.concatenate([teammates * seen, seen, since], axis=-1)
+            blocks.append(np.where(dark, 0.0, teammates.reshape(envs, robots, -1)))
         victims, unsure = self._victims_seen(state)
         rows = np.concatenate([*blocks, np.where(dark, 0.0, victims)], axis=-1)
         return rows * there, unsure & there[..., 0]
@@ -363,12 +379,20 @@ class Stepper:
         place = state.places[:, None] - state.positions[:, :, None]  # (E, R, V, 2)
         distance = np.linalg.norm(place, axis=-1)
         there = np.broadcast_to(state.present[:, None], distance.shape)
+        since = np.zeros((*distance.shape, 0))
+        if self.scenario.has_limited_sight:
+            seen, since = (values[..., robots:] for values in self.seen(state))
+            there = there & seen
+            in_order = self.scenario.victim_order == "relevant"
+            since = (np.sort(since) if in_order else since)[..., None]
         needs = self.counts[state.victims["task"]]  # absent ones are blanked below
         needs = np.broadcast_to(needs[:, None], (*distance.shape, needs.shape[-1]))
         times = [
             np.broadcast_to(values[:, None, :, None], (*distance.shape, 1))
             for values in self._times_seen(state)
         ]
+        if self.scenario.has_order:
+            times.append(self._waiting_for_seen(state, there)[..., None])
         blocks = np.concatenate([there[..., None], needs, place, *times], axis=-1)
         blocks = blocks * there[..., None]
         unsure = np.zeros((envs, robots), dtype=bool)
@@ -381,10 +405,11 @@ class Stepper:
             sort = [np.take_along_axis(values, order, axis=-1) for values in (rank, key)]
             tied = (np.diff(sort[0], axis=-1) == 0) & (np.diff(sort[1], axis=-1) < 1e-5)
             unsure = (tied & (sort[0][..., 1:] < 2)).any(-1)
+        blocks = np.concatenate([blocks, since], axis=-1)
         return blocks.reshape(envs, robots, -1), unsure
 
     def _times_seen(self, state: State) -> list[Array]:
-        """The columns of services, deadlines and order that the scenario has, each (E, V)."""
+        """The columns of services and deadlines that the scenario has, each (E, V)."""
         found = []
         if self.service.any():
             found.append(state.victims["served"].astype(np.float64))
@@ -393,6 +418,13 @@ class Stepper:
             due = state.victims["deadline_step"]
             left = np.clip((due - state.steps[:, None]) / longest, 0.0, 1.0)
             found.append(np.where(due < 0, 1.0, left))
-        if any(task.after for task in self.scenario.tasks):
-            found.append(self.waiting(state).astype(np.float64))
         return found
+
+    def _waiting_for_seen(self, state: State, seen: Bools) -> Array:
+        """Victims that have to wait for others that a robot sees, (E, R, V)."""
+        rows = []
+        for own in range(seen.shape[1]):
+            victims = state.victims.copy()
+            victims["present"] &= seen[:, own]
+            rows.append(self.waiting(replace(state, victims=victims)))
+        return np.stack(rows, 1).astype(np.float64)

@@ -212,3 +212,16 @@ def with_layers(scenario: Scenario, rng: np.random.Generator) -> Scenario:
         for one in scenario.obstacles
     ]
     return scenario.replace(robots=tuple(robots), obstacles=tuple(obstacles))
+
+
+def with_sight(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, most of whose robots see only so far, and where obstacles may hide things."""
+    half = scenario.arena_half_width_m
+    robots = [
+        robot.replace(sight_m=float(rng.uniform(0.1, 1.2)) * half)
+        if index == 0 or rng.random() < 0.7
+        else robot
+        for index, robot in enumerate(scenario.robots)
+    ]
+    occlusion = bool(scenario.obstacles) and rng.random() < 0.8
+    return scenario.replace(robots=tuple(robots), occlusion=occlusion)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from seeing import check_sight
 from stepper import State, Stepper
 from teams import (
     random_scenario,
@@ -15,6 +16,7 @@ from teams import (
     with_list,
     with_loads,
     with_order,
+    with_sight,
     with_times,
 )
 from touching import may_touch
@@ -45,6 +47,7 @@ def state_of(env: BatchEnv) -> State:
         env.step_counts(),
         env.charge().astype(np.float64),
         env.load().astype(np.float64),
+        env.last_seen(),
     )
 
 
@@ -194,10 +197,13 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         assert_close(parts, wanted, "reward components", scale=size)
         assert_close(result.reward, wanted.sum(-1), "reward", scale=size + scenario.rescue_reward)
 
+        if scenario.has_limited_sight:
+            seen.update(check_sight(plain, before, after))
         ended = result.terminated | result.truncated
         assert (after.faults[~ended] == before.faults[~ended]).all()
         rows, tied = plain.observations(after)
         times = scenario.has_services + scenario.has_deadlines + scenario.has_order
+        times += scenario.has_limited_sight
         block = rows.shape[-1] - before.victims.shape[1] * (3 + len(plain.abilities) + times)
         scale = scenario.arena_half_width_m
         assert_close(result.obs[..., :block], rows[..., :block], "observation", scale)
@@ -391,3 +397,20 @@ def test_the_usual_team_in_every_situation(situation: str, shaping: str, credit:
     assert seen["free"] > 1000
     for what in ("touched", "rescues", "appeared", "terminated"):
         assert seen[what] > 40, (what, seen)
+
+
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_with_limited_sight_are_as_the_plain_stepper_says(chunk: int) -> None:
+    rng = np.random.default_rng(1000 + chunk)
+
+    def changed(scenario: Scenario) -> Scenario:
+        leaves = ("stay", "leave")[rng.integers(2)]
+        scenario = with_sight(scenario, rng).replace(unavailable_robots=leaves)
+        if rng.random() < 0.3:
+            return with_times(with_order(scenario, rng), rng)
+        return with_loads(scenario, rng) if rng.random() < 0.3 else scenario
+
+    total = compare_some(rng, changed)
+    for what in ("in sight", "out of sight", "remembered", "hidden", "rescues", "appeared"):
+        assert total[what] > 50, (what, total)
+    assert total["unsure of sight"] < 0.001 * total["in sight"]

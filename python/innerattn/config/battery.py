@@ -46,13 +46,14 @@ class Depot(Model):
     )
 
 
-def refuse_stores_and_velocities(scenario: Scenario, who: str) -> None:
+def refuse_stores_velocities_and_sights(scenario: Scenario, who: str) -> None:
     """Refuse a team with batteries or loads, for policies (``who``) that know neither.
 
-    Robots whose actions set a velocity are refused, too: such policies know forces alone.
+    Robots whose actions set a velocity, and limited sight, are refused, too: such policies know
+    forces alone, and see everything.
 
     Raises:
-        ConfigError: a robot has a battery or a load, or actions set its velocity.
+        ConfigError: a robot has a battery, a load or a limited sight, or actions set its velocity.
     """
     for index, robot in enumerate(scenario.robots):
         key = f"scenario.robots[{index}]"
@@ -64,3 +65,8 @@ def refuse_stores_and_velocities(scenario: Scenario, who: str) -> None:
             raise ConfigError(f"{found}: there must be no load; {who} see no loads")
         if robot.drive != "force":
             raise ConfigError(f"{key}.drive = {robot.drive!r}: must be 'force'; {who} set forces")
+        if robot.sight_m is not None:
+            found = f"{key}.sight_m = {robot.sight_m:g}"
+            raise ConfigError(f"{found}: must be left out; {who} see everything")
+    if scenario.occlusion:
+        raise ConfigError(f"scenario.occlusion = true: must be false; {who} see everything")

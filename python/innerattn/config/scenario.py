@@ -71,6 +71,11 @@ class Robot(Model):
         None,
         description="how many rescues it can help with before a depot refills it; None: any number",
     )
+    sight_m: Annotated[float | None, ADDED_LATER, Told(0.005, 1_000.0)] = Field(
+        None,
+        description="how far it sees teammates and victims, from its centre to theirs, above "
+        "radius_m [m]; None: it sees all",
+    )
 
     _check_abilities = field_validator("abilities", mode="before")(list_or_table)
 
@@ -225,6 +230,11 @@ class Scenario(Model, Shown):
     )
     obstacles: Annotated[tuple[Obstacle, ...], Told(0, 64)] = Field(
         (), description="fixed bodies in the way"
+    )
+    occlusion: Annotated[bool, ADDED_LATER] = Field(
+        False,
+        description="let obstacles hide what is behind them, from robots of the layers that they "
+        "block; true only where there are obstacles",
     )
     stations: Annotated[tuple[Station, ...], ADDED_LATER, Told(0, 64)] = Field(
         (), description="places that charge batteries"
@@ -427,6 +437,11 @@ class Scenario(Model, Shown):
     def has_loads(self) -> bool:
         """Whether some robots can help with so many rescues alone before a depot refills them."""
         return any(robot.load is not None for robot in self.robots)
+
+    @property
+    def has_limited_sight(self) -> bool:
+        """Whether there is something in an arena that some robot does not see."""
+        return self.occlusion or any(robot.sight_m is not None for robot in self.robots)
 
     @property
     def layers(self) -> tuple[str, ...]:

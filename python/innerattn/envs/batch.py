@@ -196,6 +196,14 @@ class BatchEnv(Shown):
         """
         return self._core.load()
 
+    def last_seen(self) -> NDArray[np.int64]:
+        """Steps of the episode at which each robot last saw each robot and each slot's victim.
+
+        (E, R, R + V) int64, -1 for what it never saw in this episode, as itself. A robot sees
+        something now where this is `step_counts`. Where no sight is limited, it is so everywhere.
+        """
+        return self._core.last_seen()
+
     def obstacles(self) -> NDArray[np.float32]:
         """Centres of the obstacles in scenario order, (E, O, 2) float32, m."""
         return self._core.obstacles()

@@ -71,12 +71,14 @@ def _observation_columns(scenario: Scenario, own: int, speeds: list[float]) -> I
         if robot == own:
             spots = bool(scenario.stations) + bool(scenario.depots)
             yield from [_both_ways(2 * half + far)] * (2 * spots)
+        elif scenario.has_limited_sight:
+            yield from (_FLAG, _FLAG)  # whether it is seen, and the time since then
     for _ in range(scenario.num_victims):
         yield _FLAG
         for ability in abilities:
             yield 0.0, _most(scenario.tasks, ability)
         yield from (_both_ways(2 * half + far), _both_ways(2 * half + far))
-        yield from [_FLAG] * _columns_by_choice(scenario)
+        yield from [_FLAG] * (_columns_by_choice(scenario) + scenario.has_limited_sight)
 
 
 def _most(ones: Sequence[Robot | Task], ability: str) -> float:

@@ -22,10 +22,11 @@ _WHAT = {
 
 
 def scenario_words(scenario: Scenario) -> str:
-    """Sentences, a line each: tasks and who can do them, stores, layers, doubts, the faults."""
+    """Sentences, a line each: tasks and who can do them, stores, layers, sights, doubts, faults."""
     faults = map(_fault, scenario.faults)
     gone = ["Robots that are out are not in the arena."] if scenario.robots_leave else []
     who = [*_tasks(scenario), *_end(scenario), *_stores(scenario), *_motion(scenario)]
+    who += _sight(scenario)
     return "\n".join([*who, *_doubts(scenario), *faults, *gone])
 
 
@@ -93,6 +94,16 @@ def _motion(scenario: Scenario) -> Iterator[str]:
             yield f"obstacles[{index}]: robots of {' and '.join(passing)} pass it"
     if quick := [robot.name for robot in scenario.robots if robot.drive == "velocity"]:
         yield f"{', '.join(quick)}: actions set the velocity"
+
+
+def _sight(scenario: Scenario) -> Iterator[str]:
+    """Who sees how far, and what is in the way."""
+    limits = dict.fromkeys(robot.sight_m for robot in scenario.robots if robot.sight_m is not None)
+    for sight_m in limits:
+        robots = ", ".join(one.name for one in scenario.robots if one.sight_m == sight_m)
+        yield f"{robots}: sees teammates and victims up to {sight_m:g} m away"
+    if scenario.occlusion:
+        yield "Obstacles hide what is behind them."
 
 
 def _reach_m(robot: Robot) -> float:

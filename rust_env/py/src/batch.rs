@@ -8,6 +8,7 @@ use innerattn_env::fault::NUM_KINDS;
 use innerattn_env::fault_state::FaultState;
 use innerattn_env::robot::Commands;
 use innerattn_env::scenario::Actions;
+use innerattn_env::sight::NEVER;
 use innerattn_env::snapshot::most_bytes;
 use innerattn_env::tasks::Rescue;
 use innerattn_env::world::World;
@@ -185,6 +186,19 @@ impl Batch {
     fn load<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let supplies = self.worlds.rules().supplies.as_ref();
         self.shares(py, |world, robot| supplies.map_or(1.0, |one| one.share(robot, &world.loads)))
+    }
+
+    fn last_seen<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<i64>>> {
+        let rules = self.worlds.rules();
+        let robots = rules.team.len();
+        let shape = [self.worlds.num_envs(), robots, robots + rules.scenario.num_victims()];
+        let of = |world: &World| match &rules.sight {
+            Some(_) => {
+                world.sightings.iter().map(|last| if *last == NEVER { -1 } else { (*last).into() }).collect()
+            }
+            None => vec![i64::from(world.step); shape[1] * shape[2]],
+        };
+        shaped(py, gather(shape.iter().product(), self.worlds.worlds().flat_map(of))?, shape)
     }
 
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {

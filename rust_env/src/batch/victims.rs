@@ -47,7 +47,7 @@ impl Batch {
                 *slot = Some(victim);
             }
             world.set_deadlines(&self.rules);
-            world.freeze(&self.rules);
+            world.perceive(&self.rules);
         }
         Ok(())
     }

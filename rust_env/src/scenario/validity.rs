@@ -21,6 +21,7 @@ impl Scenario {
         self.validate_tasks()?;
         self.validate_order()?;
         self.validate_obstacles()?;
+        self.validate_sight()?;
         self.validate_faults()?;
         self.validate_sizes()?;
         self.validate_starts()?;

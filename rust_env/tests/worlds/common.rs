@@ -257,6 +257,17 @@ pub fn with_layers(mut scenario: Scenario) -> Scenario {
     Scenario { rescue_radius_m: 0.4, ..scenario }
 }
 
+/// The same with robots that see from a quarter of the arena's half width to all of it, and every fourth
+/// everything that no obstacle hides.
+pub fn with_sight(mut scenario: Scenario) -> Scenario {
+    let half = scenario.arena_half_width_m;
+    for (index, robot) in scenario.robots.iter_mut().enumerate().filter(|(index, _)| index % 4 < 3) {
+        robot.sight_m = Some(half * [0.5, 1.0, 0.25][index % 4]);
+    }
+    let occlusion = !scenario.obstacles.is_empty();
+    Scenario { occlusion, rescue_radius_m: 0.4, ..scenario }
+}
+
 /// A disc at a random place, a box at a random place, and a box that stays.
 pub fn some_obstacles() -> Vec<Obstacle> {
     let disc = |radius| Obstacle {

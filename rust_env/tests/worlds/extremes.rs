@@ -86,6 +86,7 @@ fn extreme(source: &mut Stream) -> Scenario {
             start_m: None,
             battery: None,
             load: None,
+            sight_m: None,
         })
         .collect();
     if engine == Engine::Rapier {

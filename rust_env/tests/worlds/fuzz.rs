@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
     with_amounts, with_an_end, with_arrivals, with_batteries, with_layers, with_leaving, with_list,
-    with_loads, with_order, with_times,
+    with_loads, with_order, with_sight, with_times,
 };
 
 const ENVS: usize = 2;
@@ -61,6 +61,8 @@ fn scenarios() -> Vec<Scenario> {
             with_batteries(Scenario { engine, ..tight.clone() }),
             with_loads(Scenario { engine, ..tight.clone() }),
             with_layers(Scenario { engine, obstacles: some_obstacles(), ..Scenario::default() }),
+            with_sight(Scenario { engine, obstacles: some_obstacles(), ..Scenario::default() }),
+            with_sight(with_leaving(Scenario { engine, ..tight.clone() })),
         ]
     };
     ENGINES.into_iter().flat_map(with).collect()

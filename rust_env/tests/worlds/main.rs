@@ -18,6 +18,7 @@ mod layers;
 mod leaving;
 mod loads;
 mod order;
+mod sight;
 mod snapshot;
 mod speed;
 mod structure;

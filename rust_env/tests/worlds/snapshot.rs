@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use crate::common::{
     Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_amounts,
     with_an_end, with_arrivals, with_batteries, with_layers, with_leaving, with_list, with_loads, with_order,
-    with_times,
+    with_sight, with_times,
 };
 
 const ENVS: usize = 6;
@@ -38,6 +38,8 @@ fn scenarios() -> Vec<Scenario> {
         with_loads(with_leaving(tight.clone())),
         with_loads(with_batteries(tight.clone())),
         with_layers(tight.clone()),
+        with_sight(Scenario { faults: coming_and_going(&tight.robots), ..tight.clone() }),
+        with_sight(with_leaving(Scenario { obstacles: some_obstacles(), ..Scenario::default() })),
         with_times(tight),
     ]
 }

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from innerattn.config import RunConfig
-from innerattn.config.battery import refuse_stores_and_velocities
+from innerattn.config.battery import refuse_stores_velocities_and_sights
 from innerattn.config.files import sync_folder, write_whole
 from innerattn.envs import BatchEnv
 from innerattn.errors import ExportError, MissingLibraryError, missing_library
@@ -69,7 +69,7 @@ def export_run(run: str | Path, out: str | Path | None = None) -> tuple[Path, Co
         ExportError: the folder is already there or cannot be made, the run's policy is not one of
             this package, or the exported one differs from it.
         RunError, ConfigError: there is no readable run, it holds no weights, or its robots have a
-            battery or a load.
+            battery, a load or a limited sight.
         OSError: the run's manifest cannot be written.
     """
     needed_libraries()
@@ -100,7 +100,7 @@ def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: 
     """Fill a folder, and check what is in it."""
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         names = env.observation_names()
-    refuse_stores_and_velocities(config.scenario, "exported policies")
+    refuse_stores_velocities_and_sights(config.scenario, "exported policies")
     entities = entity_columns(names) if config.network.encoder == "entities" else None
     actor = inner_actor(learner, run)
     team = team_actors(config, actor, entities)
