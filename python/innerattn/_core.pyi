@@ -249,7 +249,7 @@ class Batch:
         """Loads of the robots as shares of their full load, (E, R)."""
 
     def last_seen(self) -> NDArray[np.int64]:
-        """Steps at which robots last saw each robot and each slot's victim, (E, R, R + V); -1: never."""
+        """Steps at which robots last saw robots and victims, (E, R, R + V); -1: never."""
 
     def positions(self) -> NDArray[np.float32]:
         """Places of the robots, (E, R, 2), m."""

@@ -252,6 +252,7 @@ ADDED_SINCE = {
         "stations",
         "depots",
         "end_when_done",
+        "occlusion",
     ),
     "network": ("swapped_robots", "shared_gradients", "joint_critic", "symmetry"),
     "train": (
@@ -270,7 +271,7 @@ def test_a_digest_is_that_of_the_values_in_use() -> None:
         for name in names:
             del values[section][name]  # at its default
     for robot in values["scenario"]["robots"]:
-        for name in ("start_m", "battery", "load", "drive", "layer"):
+        for name in ("start_m", "battery", "load", "sight_m", "drive", "layer"):
             del robot[name]
     for task in values["scenario"]["tasks"]:
         for name in ("service_s", "service", "deadline_s", "after", "arrival_rate_hz"):

@@ -14,7 +14,6 @@ _SLACK_M = 1e-5
 
 def check_sight(plain: Stepper, before: State, after: State) -> Counter[str]:
     """Hold what robots last saw after a step against what they can see; counts what was seen."""
-    robots = len(plain.scenario.robots)
     seen, unsure, hidden = in_sight(plain, after)
     stays = after.victims["id"] == before.victims["id"]
     stays = np.concatenate([np.ones(after.positions.shape[:2], bool), stays], 1)[:, None]

@@ -4,8 +4,8 @@ use super::Scenario;
 use super::check::{broken, within};
 use crate::error::Result;
 
-/// Farthest sight, m; no arena is so wide.
-const MAX_SIGHT_M: f64 = 1000.0;
+/// Shortest and farthest sight, m: the radius of the smallest robot, and more than any arena is wide.
+const SIGHTS_M: (f64, f64) = (0.005, 1000.0);
 
 impl Scenario {
     /// Whether there is something in an arena that some robot does not see.
@@ -19,7 +19,7 @@ impl Scenario {
         for (index, robot) in self.robots.iter().enumerate() {
             let Some(sight) = robot.sight_m else { continue };
             let key = format!("robots[{index}].sight_m");
-            within(&key, sight, 0.0, MAX_SIGHT_M, "m")?;
+            within(&key, sight, SIGHTS_M.0, SIGHTS_M.1, "m")?;
             if sight <= robot.radius_m {
                 let rule =
                     format!("must be above radius_m = {} m: it counts from its centre", robot.radius_m);

@@ -45,7 +45,11 @@ fn scenarios() -> Vec<Scenario> {
         with_loads(with_leaving(tight.clone())),
         with_loads(with_batteries(tight.clone())),
         with_layers(with_leaving(Scenario { robots: mixed_team(12), ..tight.clone() })),
-        with_sight(with_layers(Scenario { obstacles: some_obstacles(), ..Scenario::default() })),
+        with_sight(with_layers(Scenario {
+            obstacles: some_obstacles(),
+            contact_cost: 0.1,
+            ..Scenario::default()
+        })),
         with_sight(Scenario { faults: coming_and_going(&tight.robots), ..tight.clone() }),
         with_times(tight),
     ];
