@@ -36,7 +36,7 @@ def test_a_run_is_played(run_dir: Path) -> None:
         address = process.stdout.readline().split()[-1]
         status, opened = posted(address, "sessions", {})
         assert status == 200
-        scripts = ["random", "greedy", "hungarian", "planner", "oracle"]
+        scripts = ["random", "greedy", "hungarian", "planner", "oracle", "greedy-seen"]
         assert opened["policies"] == [run_dir.name, *scripts]
         assert opened["attention"]
         for name in ("oracle", run_dir.name, "random"):
@@ -59,7 +59,8 @@ def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
         taken.listen()
         port = str(taken.getsockname()[1])
         nobody = (
-            "nobody: neither a run's folder nor one of random, greedy, hungarian, planner, oracle"
+            "nobody: neither a run's folder nor one of random, greedy, hungarian, planner, oracle, "
+            "greedy-seen"
         )
         cases = [
             (1, ["nobody"], nobody),

@@ -66,7 +66,7 @@ BRIEF: Mapping[str, Brief] = {
             (
                 "RUN|POLICY",
                 "a run (folder, latest, zoo:NAME, or how its name begins), or a "
-                "script: random, greedy, hungarian, planner, oracle",
+                "script: random, greedy, greedy-seen, hungarian, planner, oracle",
             ),
             ("--scenario FILE", "TOML file with the scenario to measure in"),
             ("--situation NAME", "single, double or mixed (that of the run)"),
@@ -128,7 +128,8 @@ BRIEF: Mapping[str, Brief] = {
         (
             (
                 "RUN|POLICY",
-                "a run (also zoo:NAME), or a script: random, greedy, hungarian, planner, oracle",
+                "a run (also zoo:NAME), or a script: random, greedy, greedy-seen, hungarian, "
+                "planner, oracle",
             ),
             ("--scenario FILE", "TOML file with the scenario to play in (that of the run)"),
             ("--seed N", "seed of the world"),
@@ -168,8 +169,8 @@ BRIEF: Mapping[str, Brief] = {
         (
             (
                 "RUN|POLICY|FILE",
-                "up to four: runs (also zoo:NAME), scripts (random, greedy, hungarian, "
-                "planner, oracle) or episodes.parquet files",
+                "up to four: runs (also zoo:NAME), scripts (random, greedy, greedy-seen, "
+                "hungarian, planner, oracle) or episodes.parquet files",
             ),
             ("-o, --output FILE", "what to write: .html, .gif or .mp4 ({output})"),
             ("--episodes N", "play N new episodes instead of showing recorded ones"),

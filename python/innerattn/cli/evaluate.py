@@ -55,8 +55,9 @@ class Evaluate(LongCommand):
     """Measure a trained or scripted policy, or a planner on instances."""
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
-    """A run, or one of random, greedy, hungarian, planner, oracle. A run is a folder, latest, or
-    the beginning of the name of one in runs. With --instances ral: planner, greedy or random."""
+    """A run, or one of random, greedy, hungarian, planner, oracle, greedy-seen. A run is a folder,
+    latest, or the beginning of the name of one in runs. With --instances ral: planner, greedy or
+    random."""
     scenario: Path | None = None
     """TOML file with the scenario to measure in; None: that of the run, or mixed."""
     situation: Literal["single", "double", "mixed"] | None = None

@@ -25,7 +25,7 @@ class Play(Command):
     """Play with a team in a browser on this machine: move, push, break robots; Ctrl-C ends it."""
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
-    """A run, or one of random, greedy, hungarian, planner, oracle; it acts first."""
+    """A run, or one of random, greedy, hungarian, planner, oracle, greedy-seen; it acts first."""
     scenario: Path | None = None
     """TOML file with the scenario to play in; None: that of the run, or mixed."""
     seed: int | None = None

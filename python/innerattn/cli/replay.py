@@ -38,9 +38,9 @@ class Replay(Command):
     policies: Annotated[
         tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN|POLICY|FILE ...")
     ]
-    """Runs, evaluation/episodes.parquet files, or random, greedy, hungarian, planner, oracle; up
-    to four, shown side by side. With --instance of points: planner (if none is named), greedy
-    or random."""
+    """Runs, evaluation/episodes.parquet files, or random, greedy, hungarian, planner, oracle,
+    greedy-seen; up to four, shown side by side. With --instance of points: planner (if none is
+    named), greedy or random."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("replay.html")
     """File to write: .html is a page, .gif or .mp4 a moving picture of one episode."""
     episodes: int | None = None

@@ -17,7 +17,7 @@ from innerattn.config.schedule import ScheduleConfig
 Method = Annotated[str, OneOf(methods)]
 Attention = Annotated[str, OneOf(lambda: (*attentions(), "none"))]
 WarmStart = Literal["none", "hungarian", "greedy", "planner"]
-Script = Literal["none", "random", "greedy", "hungarian", "planner", "oracle"]
+Script = Literal["none", "random", "greedy", "hungarian", "planner", "oracle", "greedy-seen"]
 
 
 class NetworkConfig(Model):

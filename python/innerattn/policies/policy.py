@@ -22,6 +22,7 @@ class WorldState(NamedTuple):
         step_counts: (E,) int64 steps done in the episodes; deadlines are counted in them.
         charge: (E, R) float32 charges as shares; None where no robot has a battery.
         load: (E, R) float32 loads as shares; None where no robot has one.
+        last_seen: (E, R, R + V) int64, see `BatchEnv.last_seen`; None where no sight is limited.
     """
 
     positions: NDArray[np.float32]
@@ -31,6 +32,7 @@ class WorldState(NamedTuple):
     step_counts: NDArray[np.int64]
     charge: NDArray[np.float32] | None = None
     load: NDArray[np.float32] | None = None
+    last_seen: NDArray[np.int64] | None = None
 
     @classmethod
     def of(cls, env: BatchEnv) -> Self:
@@ -43,6 +45,7 @@ class WorldState(NamedTuple):
             env.step_counts(),
             env.charge() if env.scenario.has_batteries else None,
             env.load() if env.scenario.has_loads else None,
+            env.last_seen() if env.scenario.has_limited_sight else None,
         )
 
 

@@ -75,7 +75,8 @@ def test_random_actions_are_even_and_seeded() -> None:
 
 def test_an_unknown_name_is_refused() -> None:
     with pytest.raises(
-        ConfigError, match="'best': known are random, greedy, hungarian, planner, oracle"
+        ConfigError,
+        match="'best': known are random, greedy, hungarian, planner, oracle, greedy-seen",
     ):
         scripted_policy("best", DOUBLE)
 

@@ -1,7 +1,7 @@
 """Scripted policies to measure trained ones against, from `random` to `planner` and `oracle`.
 
 They see the true state of the worlds and plan for all worlds of a batch at once; none learns. Only
-`oracle` knows of faults.
+`oracle` knows of faults. `greedy-seen` uses of the state what each robot has seen itself.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from innerattn.policies.scripted.coalitions import Coalitions
 from innerattn.policies.scripted.loading import Loading
 from innerattn.policies.scripted.lookahead import Lookahead
 from innerattn.policies.scripted.steering import Steering
+from innerattn.policies.scripted.sweeping import Sweep
 from innerattn.policies.scripted.timing import Timing
 
 _FAR_M2 = 1e6
@@ -81,7 +82,7 @@ class _Dispatcher(ABC):
         places = np.stack([state.victims["x"], state.victims["y"]], -1).astype(np.float64)
         chosen = self.choose(state, places)
         targets = np.take_along_axis(places, np.maximum(chosen, 0)[..., None], 1)
-        targets = np.where(chosen[..., None] >= 0, targets, 0.0)
+        targets = np.where(chosen[..., None] >= 0, targets, self._idle(state))
         if self._charging.is_needed:
             targets = self._charging.targets(state, targets, chosen)
         if self._loading.is_needed:
@@ -92,6 +93,11 @@ class _Dispatcher(ABC):
     def reset(self, seed: int) -> None:
         """See `Policy.reset`; there is nothing to forget and nothing is drawn."""
         del seed
+
+    def _idle(self, state: WorldState) -> NDArray[np.float64] | float:
+        """Where robots without a victim go, in the form of (E, R, 2) [m]."""
+        del state
+        return 0.0
 
     def _faults(self, state: WorldState) -> NDArray[np.void] | None:
         return state.faults if self.knows_faults else None
@@ -126,6 +132,41 @@ class GreedyPolicy(_Dispatcher):
         if self._timing.has_order:
             distance = distance + _FAR_M2 * state.victims["blocked"][:, None]
         return np.where(helpful.any(-1), distance.argmin(-1), -1)
+
+
+class GreedySeenPolicy(_Dispatcher):
+    """Every robot goes to the nearest victim that it can help and has seen itself, or searches.
+
+    Victims stay where they are, so one that was seen is known until all hear that it is gone. A
+    robot that knows of none to help follows a place that sweeps the arena. It uses nothing of what
+    it has not seen: neither victims nor teammates, nor whether somebody else makes it in time.
+    """
+
+    name = "greedy-seen"
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Take the team and the tasks from ``scenario``."""
+        super().__init__(scenario)
+        self._sweep = Sweep(scenario, self.steering.speed)
+
+    def choose(self, state: WorldState, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        """See `_Dispatcher.choose`."""
+        victims = state.victims
+        helpful = self.needs.permitted(victims["present"], victims["task"]).any(-1)
+        if state.last_seen is not None:
+            helpful &= state.last_seen[:, :, helpful.shape[1] :] >= 0
+        if self._charging.is_needed:
+            helpful &= self._charging.within_reach(state, places)
+        if self._loading.is_needed:
+            helpful &= self._loading.can_help(state)[..., None]
+        way = places[:, None] - state.positions[:, :, None]
+        distance = np.where(helpful, (way * way).sum(-1), np.inf)
+        times = self.steering.arrival_times(state.positions, state.velocities, places)
+        distance = np.where(helpful & self._timing.held(state, times), -1.0, distance)
+        return np.where(helpful.any(-1), distance.argmin(-1), -1)
+
+    def _idle(self, state: WorldState) -> NDArray[np.float64]:
+        return self._sweep.places(state.step_counts)
 
 
 class HungarianPolicy(_Dispatcher):
@@ -209,16 +250,19 @@ class OraclePolicy(HungarianPolicy):
 SCRIPTED = ("random", "greedy", "hungarian")
 """Names of the scripted policies that every evaluation measures."""
 
-SCRIPTS = (*SCRIPTED, "planner", "oracle")
+SCRIPTS = (*SCRIPTED, "planner", "oracle", "greedy-seen")
 """Names of all scripted policies."""
 
 
 def scripts_of(scenario: Scenario) -> tuple[str, ...]:
     """The scripted policies that evaluations in a scenario measure.
 
-    `planner` is one of them where times, energy, sums or the order of tasks ask for plans.
+    `planner` is one of them where times, energy, sums or the order of tasks ask for plans, and
+    `greedy-seen` where some robot does not see everything.
     """
-    return (*SCRIPTED, "planner") if scenario.asks_for_plans else SCRIPTED
+    planner = ("planner",) if scenario.asks_for_plans else ()
+    seen = ("greedy-seen",) if scenario.has_limited_sight else ()
+    return (*SCRIPTED, *planner, *seen)
 
 
 def best_script(measured: Collection[str]) -> str:
@@ -242,4 +286,6 @@ def scripted_policy(name: str, scenario: Scenario, seed: int = 0) -> Policy:
         return PlannerPolicy(scenario)
     if name == "oracle":
         return OraclePolicy(scenario)
+    if name == "greedy-seen":
+        return GreedySeenPolicy(scenario)
     raise ConfigError(f"unknown policy {name!r}: known are {', '.join(SCRIPTS)}")

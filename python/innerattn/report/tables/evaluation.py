@@ -26,6 +26,7 @@ _POLICIES = (
     "hungarian: robots assigned to victims by arrival time",
 )
 _PLANNER = "planner: the first step of a plan for all victims that are there"
+_SEEN = "greedy-seen: each robot to the nearest victim it has seen and can help, or searching"
 _SEEDS = (
     "score: 0 plays like random, 1 like the best script",
     "mean: ± is half the 95 % interval over seeds (Student's t), in the same worlds",
@@ -121,14 +122,15 @@ def _rescues(summary: Summary) -> Table:
     rows.append(Row((name, *own), strong=True))
     counts = [cell for one in lengths for cell in (f"{one.episodes:,}", "")]
     best = best_script(summary.standard.scripted)
-    planner = (_PLANNER,) if best == "planner" else ()
+    others = (_PLANNER,) if best == "planner" else ()
+    others += (_SEEN,) if "greedy-seen" in summary.standard.scripted else ()
     score = f"score: 0 plays like random, 1 like {best}; ± is half the 95 % interval"
     warm = () if summary.warm_start == "none" else (_warm_start(summary),)
     return Table(
         columns(["policy"], _heads([one.episode_steps for one in lengths])),
         (section(rows), section([["episodes", *counts]])),
         f"Rescues per episode, situation {summary.situation}",
-        (*_POLICIES, *planner, score, *warm),
+        (*_POLICIES, *others, score, *warm),
     )
 
 
