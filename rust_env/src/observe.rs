@@ -70,8 +70,22 @@ pub struct Layout {
     order: Option<Order>,
     stores: Option<Stores>,
     sight: Option<Sight>,
+    widths: Widths,
     /// The columns that never change, of all robots (R × D); zeros elsewhere.
     fixed: Vec<f32>,
+}
+
+/// Numbers of columns, counted once.
+#[derive(Debug, Clone, Copy, Default)]
+struct Widths {
+    /// Of one robot.
+    robot: usize,
+    /// Of the ways to the nearest station and depot, behind a robot's own block.
+    ways: usize,
+    /// Of one teammate: those of a robot, whether it is seen, and for how long it was not.
+    mate: usize,
+    /// Of one victim.
+    victim: usize,
 }
 
 impl Layout {
@@ -92,10 +106,12 @@ impl Layout {
             order: Order::new(scenario),
             stores: Stores::new(scenario),
             sight,
+            widths: Widths::default(),
             abilities,
             needs,
             fixed: vec![],
         };
+        layout.widths = layout.count_columns();
         layout.fixed = layout.fixed_columns(scenario);
         layout
     }
@@ -134,47 +150,36 @@ impl Layout {
         }
     }
 
-    /// Columns of one robot.
-    fn robot_width(&self) -> usize {
-        self.stores_from() + self.stores.as_ref().map_or(0, Stores::robot_width)
-    }
-
-    /// Columns of one teammate: those of a robot, whether it is seen, and for how long it was not.
-    fn mate_width(&self) -> usize {
-        self.robot_width() + 2 * usize::from(self.sight.is_some())
-    }
-
-    /// Columns of the ways to the nearest station and depot, behind a robot's own block.
-    fn ways_width(&self) -> usize {
-        self.stores.as_ref().map_or(0, Stores::ways_width)
+    fn count_columns(&self) -> Widths {
+        let stores = self.stores.as_ref();
+        let robot = self.stores_from() + stores.map_or(0, Stores::robot_width);
+        let limited = usize::from(self.sight.is_some());
+        let victim = 3
+            + self.abilities.len()
+            + usize::from(self.services.is_some())
+            + usize::from(self.deadlines.is_some())
+            + usize::from(self.order.is_some())
+            + limited;
+        Widths { robot, ways: stores.map_or(0, Stores::ways_width), mate: robot + 2 * limited, victim }
     }
 
     /// Columns before those of victims.
     fn victims_from(&self) -> usize {
-        self.robot_width() + self.ways_width() + (self.robots - 1) * self.mate_width()
+        self.widths.robot + self.widths.ways + (self.robots - 1) * self.widths.mate
     }
 
     /// The blocks of the robot itself and of its teammates.
     fn blocks<'a>(&self, row: &'a mut [f32]) -> impl Iterator<Item = &'a mut [f32]> {
-        let (own, rest) = row.split_at_mut(self.robot_width());
-        let mates = (self.robots - 1) * self.mate_width();
-        let mates = &mut rest[self.ways_width()..][..mates];
-        std::iter::once(own).chain(mates.chunks_exact_mut(self.mate_width()))
-    }
-
-    /// Columns of one victim.
-    fn victim_width(&self) -> usize {
-        3 + self.abilities.len()
-            + usize::from(self.services.is_some())
-            + usize::from(self.deadlines.is_some())
-            + usize::from(self.order.is_some())
-            + usize::from(self.sight.is_some())
+        let (own, rest) = row.split_at_mut(self.widths.robot);
+        let mates = (self.robots - 1) * self.widths.mate;
+        let mates = &mut rest[self.widths.ways..][..mates];
+        std::iter::once(own).chain(mates.chunks_exact_mut(self.widths.mate))
     }
 
     /// Width D of a row.
     #[must_use]
     pub fn width(&self) -> usize {
-        self.victims_from() + self.victims * self.victim_width()
+        self.victims_from() + self.victims * self.widths.victim
     }
 
     /// The name of every column; units are m and m/s, flags are 0 or 1, abilities are 0 or 1 or
@@ -224,7 +229,9 @@ impl Layout {
         rows.copy_from_slice(&self.fixed);
         for (own, row) in rows.chunks_exact_mut(self.width()).enumerate() {
             self.write_row(scene, own, Vec2::zeros(), Vec2::zeros(), row);
-            self.hide_mates(scene, own, row);
+            if let Some(sight) = &self.sight {
+                self.hide_mates(sight, scene, own, row);
+            }
         }
     }
 
@@ -244,19 +251,21 @@ impl Layout {
             block[self.availability()] = (!senses.unavailable >> robot & 1) as f32;
             self.write_levels(senses.levels.get(robot).unwrap_or(&HEALTHY), block);
         }
-        self.hide_mates(scene, own, row);
+        if let Some(sight) = &self.sight {
+            self.hide_mates(sight, scene, own, row);
+        }
     }
 
-    /// Where sights are limited, leaves nothing of teammates that the robot does not see, and says for how long
-    /// it has not seen each of them.
-    fn hide_mates(&self, scene: Scene, own: usize, row: &mut [f32]) {
-        let Some(sight) = &self.sight else { return };
+    /// Leaves nothing of teammates that the robot does not see, and says for how long it has not seen each of
+    /// them.
+    #[inline(never)]
+    fn hide_mates(&self, sight: &Sight, scene: Scene, own: usize, row: &mut [f32]) {
         let seen = sight.mates(own, scene.sightings);
         for (block, last) in self.blocks(row).skip(1).zip(seen) {
             if last != scene.step {
                 block.fill(0.0);
             }
-            let flags = self.robot_width();
+            let flags = self.widths.robot;
             block[flags] = f32::from(u8::from(last == scene.step));
             block[flags + 1] = sight.since(last, scene.step);
         }
@@ -266,7 +275,7 @@ impl Layout {
     /// charge, load.
     pub fn darken(&self, row: &mut [f32]) {
         row[..4].fill(0.0);
-        row[self.robot_width()..].fill(0.0);
+        row[self.widths.robot..].fill(0.0);
     }
 
     /// Writes what changes in a row, of a robot that takes itself to be elsewhere by these errors.
@@ -281,9 +290,9 @@ impl Layout {
         let position = scene.positions[own] + position_error;
         let velocity = scene.velocities[own] + velocity_error;
         let others = (0..self.robots).filter(|other| *other != own);
-        let (block, rest) = row.split_at_mut(self.robot_width());
+        let (block, rest) = row.split_at_mut(self.widths.robot);
         block[..4].copy_from_slice(&[position.x, position.y, velocity.x, velocity.y]);
-        let mates = rest[self.ways_width()..].chunks_exact_mut(self.mate_width());
+        let mates = rest[self.widths.ways..].chunks_exact_mut(self.widths.mate);
         for (block, other) in mates.zip(others) {
             let (place, speed) = (scene.positions[other] - position, scene.velocities[other] - velocity);
             block[..4].copy_from_slice(&[place.x, place.y, speed.x, speed.y]);
@@ -293,16 +302,22 @@ impl Layout {
             for (block, robot) in self.blocks(row).zip(std::iter::once(own).chain(others)) {
                 stores.write(scene, robot, &mut block[self.stores_from()..]);
             }
-            stores.write_ways(position, &mut row[self.robot_width()..]);
+            stores.write_ways(position, &mut row[self.widths.robot..]);
         }
         let victims = &mut row[self.victims_from()..];
-        let Some(sight) = &self.sight else {
-            return self.write_victims(scene, &scene.team[own], position, victims);
-        };
+        match &self.sight {
+            None => self.write_victims(scene, &scene.team[own], position, victims),
+            Some(sight) => self.write_seen(sight, scene, own, position, victims),
+        }
+    }
+
+    /// Writes the victims that the robot sees, and for how long it has not seen each.
+    #[inline(never)] // worlds in which all is seen are faster without it
+    fn write_seen(&self, sight: &Sight, scene: Scene, own: usize, position: Vec2, rows: &mut [f32]) {
         let seen = sight.seen(own, scene.sightings, scene.step, scene.victims);
         let in_sight = Scene { victims: &seen[..scene.victims.len()], ..scene };
-        self.write_victims(in_sight, &scene.team[own], position, victims);
-        self.write_since(sight, scene, own, victims);
+        self.write_victims(in_sight, &scene.team[own], position, rows);
+        self.write_since(sight, scene, own, rows);
     }
 
     /// Writes for how long the robot has not seen each victim. In the order of relevance those that it sees come
@@ -316,10 +331,11 @@ impl Layout {
         if self.sorted == VictimOrder::Relevant {
             since[..last.len()].sort_unstable_by(f32::total_cmp);
         }
-        let width = self.victim_width();
+        let width = self.widths.victim;
         rows.chunks_exact_mut(width).zip(since).for_each(|(row, since)| row[width - 1] = since);
     }
 
+    #[inline(always)]
     fn write_victims(&self, scene: Scene, body: &Body, own: Vec2, rows: &mut [f32]) {
         let Scene { tasks, victims, step, .. } = scene;
         let mut sorted = [(0_u8, 0.0_f32, 0_u8); MAX_VICTIMS];
@@ -337,7 +353,7 @@ impl Layout {
             }
             sorted[place] = (kind, distance, slot as u8);
         }
-        for ((_, _, slot), row) in sorted.iter().zip(rows.chunks_exact_mut(self.victim_width())) {
+        for ((_, _, slot), row) in sorted.iter().zip(rows.chunks_exact_mut(self.widths.victim)) {
             let Some(victim) = &victims[usize::from(*slot)] else { continue };
             let place = victim.position - own;
             let abilities = self.abilities.len();
@@ -355,7 +371,7 @@ impl Layout {
                     deadlines.share_left(victim, step);
             }
             if let Some(order) = &self.order {
-                row[self.victim_width() - 1 - usize::from(self.sight.is_some())] =
+                row[self.widths.victim - 1 - usize::from(self.sight.is_some())] =
                     f32::from(u8::from(order.is_blocked(victim, victims)));
             }
         }

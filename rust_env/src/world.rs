@@ -17,7 +17,7 @@ use crate::rng::{Purpose, Stream};
 use crate::robot::Commands;
 use crate::rules::Rules;
 use crate::scenario::{MAX_ROBOTS, Shaping, Unavailable};
-use crate::sight::View;
+use crate::sight::{Sight, View};
 use crate::tasks::{Events, Victim};
 
 /// Whether and how an episode ended with a step.
@@ -305,13 +305,15 @@ impl World {
     /// Notes what robots see, and keeps the readings of frozen sensors: once everything is where it is in this
     /// step, and again if somebody has moved it.
     pub fn perceive(&mut self, rules: &Rules) {
-        self.look(rules);
+        if let Some(sight) = &rules.sight {
+            self.look(rules, sight);
+        }
         self.freeze(rules);
     }
 
     /// Notes what robots see at the present step.
-    fn look(&mut self, rules: &Rules) {
-        let Some(sight) = &rules.sight else { return };
+    #[inline(never)]
+    fn look(&mut self, rules: &Rules, sight: &Sight) {
         let view = View {
             positions: &self.positions,
             obstacles: &self.obstacles,
@@ -331,7 +333,7 @@ impl World {
         let Some(sight) = &rules.sight else { return true };
         sight.may_be(&self.sightings, self.step, &self.victims) && {
             let mut again = self.clone();
-            again.look(rules);
+            again.look(rules, sight);
             again.sightings == self.sightings
         }
     }
