@@ -84,8 +84,12 @@ struct Widths {
     ways: usize,
     /// Of one teammate: those of a robot, whether it is seen, and for how long it was not.
     mate: usize,
+    /// Before those of victims.
+    victims_from: usize,
     /// Of one victim.
     victim: usize,
+    /// Of a whole row.
+    row: usize,
 }
 
 impl Layout {
@@ -160,12 +164,11 @@ impl Layout {
             + usize::from(self.deadlines.is_some())
             + usize::from(self.order.is_some())
             + limited;
-        Widths { robot, ways: stores.map_or(0, Stores::ways_width), mate: robot + 2 * limited, victim }
-    }
-
-    /// Columns before those of victims.
-    fn victims_from(&self) -> usize {
-        self.widths.robot + self.widths.ways + (self.robots - 1) * self.widths.mate
+        let ways = stores.map_or(0, Stores::ways_width);
+        let mate = robot + 2 * limited;
+        let victims_from = robot + ways + (self.robots - 1) * mate;
+        let row = victims_from + self.victims * victim;
+        Widths { robot, ways, mate, victims_from, victim, row }
     }
 
     /// The blocks of the robot itself and of its teammates.
@@ -179,7 +182,7 @@ impl Layout {
     /// Width D of a row.
     #[must_use]
     pub fn width(&self) -> usize {
-        self.victims_from() + self.victims * self.widths.victim
+        self.widths.row
     }
 
     /// The name of every column; units are m and m/s, flags are 0 or 1, abilities are 0 or 1 or
@@ -304,7 +307,7 @@ impl Layout {
             }
             stores.write_ways(position, &mut row[self.widths.robot..]);
         }
-        let victims = &mut row[self.victims_from()..];
+        let victims = &mut row[self.widths.victims_from..];
         match &self.sight {
             None => self.write_victims(scene, &scene.team[own], position, victims),
             Some(sight) => self.write_seen(sight, scene, own, position, victims),

@@ -304,6 +304,7 @@ impl World {
 
     /// Notes what robots see, and keeps the readings of frozen sensors: once everything is where it is in this
     /// step, and again if somebody has moved it.
+    #[inline]
     pub fn perceive(&mut self, rules: &Rules) {
         if let Some(sight) = &rules.sight {
             self.look(rules, sight);

@@ -122,8 +122,8 @@ def _rescues(summary: Summary) -> Table:
     rows.append(Row((name, *own), strong=True))
     counts = [cell for one in lengths for cell in (f"{one.episodes:,}", "")]
     best = best_script(summary.standard.scripted)
-    others = (_PLANNER,) if best == "planner" else ()
-    others += (_SEEN,) if "greedy-seen" in summary.standard.scripted else ()
+    others = [_PLANNER] if best == "planner" else []
+    others += [_SEEN] if "greedy-seen" in summary.standard.scripted else []
     score = f"score: 0 plays like random, 1 like {best}; ± is half the 95 % interval"
     warm = () if summary.warm_start == "none" else (_warm_start(summary),)
     return Table(
