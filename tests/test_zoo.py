@@ -40,8 +40,8 @@ def packed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 WITHOUT_A_TEAM = {"air-ground", "mixed-sight"}
-"""The obstacles of the first have fixed places, so the recipes of the budgets, with symmetry, do not
-take it; the package has no room for a team of the second."""
+"""The obstacles of the first have fixed places, so the recipes of the budgets, with symmetry, do
+not take it; that of the second is on its page, and takes two minutes."""
 
 
 def test_there_is_a_team_of_each_preset() -> None:

@@ -182,7 +182,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
             *TEAM[1:],
             {**TEAM[0], "radius_m": 0.04, "drive_force_n": 3.5, "start_m": [0.25, -0.5]},
             {**TEAM[0], "name": "last", "battery": {**BATTERY, "idle_w": 0.25}, "load": 4},
-            {**TEAM[0], "name": "drone", "drive": "velocity", "layer": "air"},
+            {**TEAM[0], "name": "drone", "drive": "velocity", "layer": "air", "sight_m": 0.75},
         ],
         "tasks": [
             {
@@ -204,6 +204,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
                 "layers": ["air"],
             }
         ],
+        "occlusion": True,
         "stations": [{**STATION, "radius_m": 0.25}],
         "depots": [{**DEPOT, "radius_m": 0.375}],
         "arena_half_width_m": 2.0,

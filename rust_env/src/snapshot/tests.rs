@@ -213,6 +213,41 @@ fn loads_are_kept_and_checked() {
 }
 
 #[test]
+fn sightings_are_kept_and_checked() {
+    use crate::sight::NEVER;
+    type Change = fn(&mut World);
+    let mut scenario = Scenario { situation: Situation::Double, ..Scenario::default() };
+    scenario.robots[0].sight_m = Some(0.06); // it sees nobody
+    let rules = rules(scenario);
+    let mut world = World::new(&rules, 5, 7);
+    (world.step, world.fresh) = (4, false);
+    world.perceive(&rules);
+    (world.sightings[1], world.sightings[5]) = (3, 0);
+    let bytes = |world: &World| save(&rules, 1, [world].into_iter());
+    assert_eq!(load(&rules, 1, &bytes(&world)), Ok(vec![world.clone()]));
+    assert!(bytes(&world).len() <= most_bytes(&rules, 1));
+    let changes: [Change; 8] = [
+        |world| world.sightings[0] = 3,      // itself
+        |world| world.sightings[1] = 4,      // whom it does not see
+        |world| world.sightings[1] = 5,      // in the future
+        |world| world.sightings[7] = 3,      // whom it sees now
+        |world| world.sightings[10] = NEVER, // a victim that it sees now
+        |world| world.sightings.truncate(23),
+        |world| world.sightings.push(NEVER),
+        |world| {
+            world.victims[1] = None; // of which nothing is left to have been seen
+            world.rescued = 1;
+        },
+    ];
+    for (number, change) in changes.into_iter().enumerate() {
+        let mut forged = world.clone();
+        change(&mut forged);
+        let error = load(&rules, 1, &bytes(&forged)).expect_err("a forged image").to_string();
+        assert_eq!(error, "snapshot: env 0 does not fit the scenario: its sightings", "{number}");
+    }
+}
+
+#[test]
 fn images_of_worlds_whose_victims_take_no_time_are_what_they_were() {
     let rules = rules(Scenario::default());
     let world = World::new(&rules, 0, 0);
