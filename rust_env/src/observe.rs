@@ -338,6 +338,7 @@ impl Layout {
         rows.chunks_exact_mut(width).zip(since).for_each(|(row, since)| row[width - 1] = since);
     }
 
+    #[allow(clippy::inline_always)] // twice, and one of the two is the hottest path of all
     #[inline(always)]
     fn write_victims(&self, scene: Scene, body: &Body, own: Vec2, rows: &mut [f32]) {
         let Scene { tasks, victims, step, .. } = scene;

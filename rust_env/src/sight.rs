@@ -91,24 +91,22 @@ impl Sight {
     pub fn look(&self, view: &View, last: &mut [u32]) {
         for (own, row) in last.chunks_exact_mut(self.width()).enumerate() {
             let (mates, slots) = row.split_at_mut(self.reach.len());
-            for (last, victim) in zip(&mut *slots, view.victims) {
-                if victim.is_none_or(|victim| victim.appeared_step == view.step) {
-                    *last = NEVER;
-                }
-            }
             let is = |robots: u64| robots >> own & 1 == 1;
-            if is(view.held) {
-                continue;
-            }
-            let looks = !is(view.blind | view.absent);
-            for (other, last) in mates.iter_mut().enumerate() {
+            let (held, looks) = (is(view.held), !is(view.blind | view.absent));
+            for (other, last) in mates.iter_mut().enumerate().filter(|_| !held) {
                 let there = other != own && view.absent >> other & 1 == 0;
                 let seen = looks && !is(view.deaf) && there && self.sees(own, view, view.positions[other]);
                 note(seen, view.step, last);
             }
             for (last, victim) in zip(slots, view.victims) {
                 let seen = |victim: &Victim| looks && self.sees(own, view, victim.position);
-                note(victim.as_ref().is_some_and(seen), view.step, last);
+                if !held {
+                    note(victim.as_ref().is_some_and(seen), view.step, last);
+                }
+                // What was seen before this victim appeared was another one.
+                if victim.is_none_or(|victim| *last < victim.appeared_step) {
+                    *last = NEVER;
+                }
             }
         }
     }
@@ -229,6 +227,21 @@ mod tests {
         assert_eq!(sight.victims(1, &last), [5, NEVER]);
         sight.look(&view(6, &[None, None]), &mut last);
         assert_eq!(sight.victims(1, &last), [NEVER, NEVER], "all hear that it is gone");
+    }
+
+    #[test]
+    fn a_reading_that_is_kept_of_a_victim_that_just_appeared_is_kept() {
+        let sight = sight(|scenario| scenario.robots[0].sight_m = Some(0.5));
+        let victims = [Some(Victim::new(0, 0, 4, Vec2::new(0.2, 0.0))), None];
+        let mut last = vec![];
+        sight.forget(&mut last);
+        sight.look(&view(4, &victims), &mut last);
+        assert_eq!(sight.victims(0, &last), [4, NEVER]);
+        sight.look(&View { held: 0b1111, ..view(4, &victims) }, &mut last);
+        assert_eq!(sight.victims(0, &last), [4, NEVER]);
+        let away = [Some(Victim::new(0, 0, 4, Vec2::new(0.9, 0.0))), None];
+        sight.look(&view(4, &away), &mut last);
+        assert_eq!(sight.victims(0, &last), [NEVER, NEVER], "taken back, to before it appeared");
     }
 
     #[test]
