@@ -15,7 +15,7 @@ LEARNING_RATE = 0.003
 @pytest.mark.parametrize(
     "method",
     [
-        "td-uniform",
+        pytest.param("td-uniform", marks=pytest.mark.long),
         "ppo-inner",
         *(
             pytest.param(one, marks=pytest.mark.slow)

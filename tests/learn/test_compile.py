@@ -141,7 +141,7 @@ def test_the_traced_update_agrees_by_kind() -> None:
 @pytest.mark.parametrize(
     ("algorithm", "robots"),
     [
-        ("ppo", 4),
+        pytest.param("ppo", 4, marks=pytest.mark.long),
         pytest.param("td", 1, marks=pytest.mark.long),
         pytest.param("td", 4, marks=pytest.mark.slow),
     ],

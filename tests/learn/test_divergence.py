@@ -110,7 +110,7 @@ def overflow(learner: TD | PPO) -> None:
     [
         ("td", False),
         ("ppo", False),
-        ("ppo", True),
+        pytest.param("ppo", True, marks=pytest.mark.long),
         pytest.param("td", True, marks=pytest.mark.long),
     ],
 )

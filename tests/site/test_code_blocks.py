@@ -129,7 +129,7 @@ def test_toml_blocks(tmp_path: Path) -> None:
                 Scenario.from_toml(file)
             elif keys == {"family"}:
                 load_run_config(method="team-inner", family=file)
-            elif "grid" in keys:
+            elif keys & {"grid", "report"}:
                 study = study_in(code.encode(), file)
                 if page.name != "measure.md":  # of its own: tests/test_extending_measure.py
                     plan_study(study, tmp_path.joinpath)

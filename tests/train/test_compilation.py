@@ -99,7 +99,7 @@ def at_env_step(count: int) -> Callable[[Progress], None]:
     ("method", "warm_start"),
     [
         pytest.param("td-inner", "hungarian", marks=pytest.mark.long),
-        ("ppo-inner", "none"),
+        pytest.param("ppo-inner", "none", marks=pytest.mark.long),
         pytest.param("td-inner", "none", marks=pytest.mark.slow),
         pytest.param("ppo-inner", "hungarian", marks=pytest.mark.slow),
     ],

@@ -160,7 +160,11 @@ def whole(
 
 @pytest.mark.parametrize(
     "case",
-    [pytest.param(one, marks=pytest.mark.slow) if one in ALIKE else one for one in CASES],
+    [
+        *(one for one in CASES if one not in (*ALIKE, "two threads")),
+        pytest.param("two threads", marks=pytest.mark.long),
+        *(pytest.param(one, marks=pytest.mark.slow) for one in ALIKE),
+    ],
 )
 def test_a_run_that_was_cut_is_the_run_that_was_not(
     small_config: Configure,

@@ -16,6 +16,8 @@ from innerattn.experiments.robustness.documents import GroupResult, group_result
 from innerattn.experiments.robustness.results import Robustness, over_groups
 from innerattn.stats import Estimate
 
+pytestmark = pytest.mark.long
+
 SEEN = ("heading_bias", "motor_gain")
 SCRIPTS = ("greedy", "hungarian", "oracle")
 Documents = dict[str, dict[str, Any]]
@@ -47,7 +49,6 @@ def assert_over_seeds(found: Estimate | None, values: list[float]) -> None:
     assert found.runs == len(values)
 
 
-@pytest.mark.long
 def test_retention_of_every_policy(study: tuple[Documents, Robustness]) -> None:
     documents, found = study
     (deployment,) = found.deployments
