@@ -69,7 +69,7 @@ CALLS: dict[str, Callable[[], list[str]]] = {
     "train.method = 'td-inner' learns 'discrete' actions only": lambda: [
         *("train", "--method", "td-inner", "--scenario.actions", "continuous"),
     ],
-    "neither a run's folder nor one of random, greedy, hungarian, planner, oracle, greedy-seen": lambda: [
+    "neither a run's folder nor one of random, greedy, hungarian": lambda: [
         "evaluate",
         "none",
     ],

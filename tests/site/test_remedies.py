@@ -80,8 +80,8 @@ FIXED: dict[str, Words] = {
         *("train", "--run-dir", "new", *tiny, "--method", "ppo-inner"),
         *("--scenario.actions", "continuous"),
     ],
-    "neither a run's folder nor one of random, greedy, hungarian, planner, oracle, greedy-seen": lambda run, _: (
-        evaluate_one(run, "mixed-a")
+    "neither a run's folder nor one of random, greedy, hungarian": lambda run, _: evaluate_one(
+        run, "mixed-a"
     ),
     "latest: no run is in runs yet": lambda run, _: ["evaluate", str(run), *FEW],
     "2 runs in runs begin so": lambda run, _: evaluate_one(run, "mixed-b"),
