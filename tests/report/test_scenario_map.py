@@ -29,7 +29,7 @@ def test_places_are_where_they_belong() -> None:
     legend = scenario_map(scenario)
     assert "A  food_0 starts here (food)" in legend
     assert "B  navigation_0 starts here (information)" in legend
-    assert "At new random places in each episode: 1 robots, 1 obstacles" in legend
+    assert "At new random places in each episode: 1 robot, 1 obstacle" in legend
 
 
 def test_areas_and_places_of_victims() -> None:

@@ -61,9 +61,9 @@ def _legend(scenario: Scenario) -> Iterator[str]:
         yield f"{_PASSED}  an obstacle that robots of some layers pass"
     robots = len(scenario.robots) - len(placed)
     obstacles = sum(obstacle.position_m is None for obstacle in scenario.obstacles)
-    anywhere = [f"{count} {what}" for count, what in ((robots, "robots"), (obstacles, "obstacles"))]
+    anywhere = ((robots, "robot"), (obstacles, "obstacle"))
     if robots or obstacles:
-        shown = [text for text in anywhere if not text.startswith("0 ")]
+        shown = [f"{count} {what}{'s' * (count != 1)}" for count, what in anywhere if count]
         yield f"At new random places in each episode: {', '.join(shown)}"
 
 
