@@ -111,7 +111,10 @@ def test_a_page_takes_all_sections_with_their_headings(tmp_path: Path, docs: Pat
         ([{"part": "other"}], r"page\.md: no marks <!-- other: begin -->"),
         ([{}, {"sections": ["Curves"]}], r"report\.md: has no section 'Curves'; runs are missing"),
         ([{"sections": ["Curves"], "required": False}], "has none of the sections"),
-        ([{}, {"figure": "none.png"}], r"none\.png: missing; write the report again"),
+        (
+            [{"archive": "no.parquet"}, {"figure": "none.png"}],
+            r"none\.png: missing; write the report again",
+        ),
     ],
 )
 def test_what_is_missing_is_said_and_nothing_changes(
@@ -201,6 +204,21 @@ def test_the_command_shows_chosen_sections_and_keeps_an_archive(
     assert {one.folder.name: one.config_sha256 for one in read_archive(archive)} == {
         one.folder.name: one.config_sha256 for one in runs
     }
+
+
+def test_a_page_that_is_missing_is_said_before_the_training(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """A run would take minutes, and is not begun."""
+    words = ["--budget", "fast", "--presets", "mixed", "--seeds", "1", "--out", str(tmp_path)]
+    assert main(["reproduce", "attention", *words, "--publish", str(tmp_path / "none")]) == 1
+    assert "none/attention.md: missing; --publish names the folder" in capsys.readouterr().err
+    file = tmp_path / "mine.toml"
+    file.write_text('[[report.pages]]\npage = "mine.md"\npart = "answer"\n')
+    words = ["--out", str(tmp_path / "mine"), "--publish", str(tmp_path)]
+    assert main(["study", "run", str(file), *words]) == 1
+    assert "mine.md: missing; --publish names the folder" in capsys.readouterr().err
+    assert not list(tmp_path.rglob("metrics.jsonl"))
 
 
 def test_pages_show_all_of_the_paper(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -90,6 +90,10 @@ class Reproduce(LongCommand):
             check_format(Path("figure.png"))
         study = self._begun(target)
         self._check_page(study)  # before hours of training, not after
+        if self.publish is not None:
+            from innerattn.report.study.publish import asked_pages
+
+            asked_pages(study, self.publish)
         study.take_over()
         if not self.report_only:
             do_runs(self, study)

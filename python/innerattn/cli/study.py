@@ -66,7 +66,7 @@ class Study(LongCommand):
     """Time limit of a job (slurm) [min]."""
     publish: Path | None = None
     """Folder in which the pages that the file names take sections of the report, and archives its
-    runs (report)."""
+    runs (run, report)."""
 
     def run(self) -> int:
         """Do it.
@@ -89,6 +89,10 @@ class Study(LongCommand):
         from innerattn.studies.faults import to_measure
 
         study = self._begun()
+        if self.publish is not None:
+            from innerattn.report.study.publish import asked_pages
+
+            asked_pages(study, self.publish)  # before hours of training, not after
         do_runs(self, study, workers=self.workers, ray=self.ray, gpus=self.gpus)
         failed = do_jobs(self, to_measure(study), self.workers)
         return max(self._report(study), int(bool(failed)))

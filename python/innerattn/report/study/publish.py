@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from innerattn.config.files import write_whole
 from innerattn.errors import RunError
 from innerattn.experiments.archive import read_archive, write_archive
 from innerattn.experiments.run import FinishedRun
@@ -36,6 +36,31 @@ class _Filled:
     files: Mapping[Path, Path]
 
 
+def asked_pages(study: StudyFolder, root: Path) -> list[ReportPage]:
+    """The parts of pages below ``root`` that sections of a study's report are to fill.
+
+    Raises:
+        RunError: the file of the study names none for its runs, or a page or its part is missing.
+        OSError: a page cannot be read.
+    """
+    asked = study.study.report
+    budgets = set(study.study.grid[0].budgets)
+    pages = [
+        one
+        for one in (() if asked is None else asked.pages)
+        if one.budget is None or {one.budget} == budgets
+    ]
+    if not pages:
+        of = f" for {', '.join(sorted(budgets))}" if asked and asked.pages else ""
+        raise RunError(f"{study.path}: [[report.pages]] of its file names no page{of}")
+    for one in pages:
+        page = root / one.page
+        if not page.exists():
+            raise RunError(f"{page}: missing; --publish names the folder of the pages")
+        marked(page, one.part)
+    return pages
+
+
 def publish(
     study: StudyFolder, report: Path, runs: Sequence[FinishedRun], root: Path
 ) -> list[Path]:
@@ -54,49 +79,37 @@ def publish(
         The pages and archives that were written.
 
     Raises:
-        RunError: the file of the study names no page for its runs, the report, a page, its part, a
-            section or a linked file is missing; nothing is changed then.
+        RunError: as of `asked_pages`; the report, a section or a linked file is missing; or the
+            archive cannot take the runs. No page is changed then.
         OSError: a file cannot be read or written; each is written whole or not at all.
     """
-    asked = study.study.report
-    budgets = set(study.study.grid[0].budgets)
-    pages = [
-        one
-        for one in (() if asked is None else asked.pages)
-        if one.budget is None or {one.budget} == budgets
-    ]
-    if not pages:
-        of = f" for {', '.join(sorted(budgets))}" if asked and asked.pages else ""
-        raise RunError(f"{study.path}: [[report.pages]] of its file names no page{of}")
+    pages = asked_pages(study, root)
     if not report.exists():
         raise RunError(f"{report}: missing; write the report first")
-    text = report.read_text("utf-8")
-    filled = [one for page in pages if (one := _filled(page, text, report, root)) is not None]
+    found = _sections(report.read_text("utf-8"))
+    filled = [one for page in pages if (one := _filled(page, *found, report, root)) is not None]
     if not filled:
         raise RunError(f"{report}: has none of the sections that its pages take; runs are missing")
     archives = dict.fromkeys(root / one.archive for one in pages if one.archive is not None)
+    for archive in archives:
+        _add(runs, archive)
     for one in filled:
         for source, target in one.files.items():
             target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source, target)
+            write_whole(target, source.read_bytes())
         fill(one.page, one.part, one.text)
-    for archive in archives:
-        _add(runs, archive)
     return [*dict.fromkeys(one.page for one in filled), *archives]
 
 
-def _filled(asked: ReportPage, text: str, report: Path, root: Path) -> _Filled | None:
+def _filled(
+    asked: ReportPage, opening: str, sections: Mapping[str, str], report: Path, root: Path
+) -> _Filled | None:
     """A part of a page; None where the report may lack it, and does.
 
     Raises:
-        RunError: something is missing.
-        OSError: the page cannot be read.
+        RunError: a section or a linked file is missing.
     """
     page = root / asked.page
-    if not page.exists():
-        raise RunError(f"{page}: missing; --publish names the folder of the pages")
-    marked(page, asked.part)
-    opening, sections = _sections(text)
     if not asked.sections:
         part = "\n\n".join(f"## {heading}\n\n{own}" for heading, own in sections.items())
     else:
