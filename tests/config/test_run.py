@@ -254,7 +254,7 @@ ADDED_SINCE = {
         "end_when_done",
         "occlusion",
     ),
-    "network": ("swapped_robots", "shared_gradients", "joint_critic", "symmetry"),
+    "network": ("swapped_robots", "shared_gradients", "joint_critic", "symmetry", "memory_width"),
     "train": (
         *("episode_steps", "engine", "stagger_starts", "schedule"),
         *("potential", "potential_discount", "potential_env_steps"),
@@ -367,6 +367,7 @@ def test_a_removed_key_stays_in_digests() -> None:
     assert set(values) == {*PPOConfig.model_fields, "value_clip"} - {
         "bootstrap",
         "afterstate_epochs",
+        "sequence_steps",
     }
 
 

@@ -1,16 +1,21 @@
 """Records against a plain loop, and the promise that policies meet the same starts."""
 
+from contextlib import closing
 from dataclasses import fields
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from innerattn.config import Scenario
+from innerattn.config import RunConfig, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.evaluate import play as episodes
 from innerattn.evaluate.play import run_episodes
+from innerattn.evaluate.trained import TrainedPolicy
+from innerattn.learn.types import RememberingLearner
 from innerattn.policies import PolicyInput, WorldState, scripted_policy
 from innerattn.records.record import FIELDS, Record
+from innerattn.train.build import build_learner
 
 SEED = 12_345
 
@@ -96,6 +101,48 @@ def test_batches_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
     assert done == [4, 4, 2]
     later = record_of("hungarian", scenario, 3, first_episode=7)
     np.testing.assert_array_equal(later.rescue_counts(), whole.rescue_counts()[7:])
+
+
+class Recalling:
+    """A policy whose actions depend on how often it acted since it forgot."""
+
+    name, needs_true_state = "recalling", False
+    steps = 7
+
+    def act(self, view: PolicyInput) -> NDArray[np.int64]:
+        self.steps += 1
+        return np.full(view.obs.shape[:2], self.steps % 5)
+
+    def reset(self, seed: int) -> None: ...
+
+    def forget(self) -> None:
+        self.steps = 0
+
+
+def test_policies_forget_before_each_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(episodes, "_WORLDS_AT_ONCE", 2)
+    record = run_episodes(Recalling(), Scenario.preset("mixed"), 4, 0, record=("actions",))
+    steps = np.arange(1, record.lengths.max() + 1) % 5
+    for actions in record.steps["actions"]:
+        np.testing.assert_array_equal(actions, np.tile(steps[:, None], (1, actions.shape[1])))
+
+
+def test_a_trained_team_forgets_at_a_reset() -> None:
+    scenario = Scenario.preset("mixed")
+    values = {"network": {"memory_width": 8, "hidden_width": 16}, "train": {"method": "ppo-inner"}}
+    with closing(BatchEnv(scenario, 3, num_threads=1)) as env:
+        learner = build_learner(RunConfig.model_validate(values), env)
+        obs = env.reset()
+    assert isinstance(learner, RememberingLearner)
+    policy = TrainedPolicy(learner, "ppo-inner")
+    policy.reset(1)
+    first = policy.act(PolicyInput(obs))
+    for _ in range(2):
+        policy.act(PolicyInput(obs))
+    assert learner.remembered().abs().max() > 0
+    policy.reset(1)
+    np.testing.assert_array_equal(policy.act(PolicyInput(obs)), first)
+    assert learner.remembered().abs().max() == 0
 
 
 def test_an_episode_that_ends_early_counts_no_further() -> None:

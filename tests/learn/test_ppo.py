@@ -104,7 +104,7 @@ def test_rollouts_and_updates_agree_with_the_plain_form(
             chosen = torch.arange(first, first + 6)
             rows = rollout.take(chosen)
             figures = plain.update(rows, rows.obs.transpose(0, 1), rows.actions.t())
-            found = dict(zip(ppo._METRICS, learner.update(rows).tolist(), strict=True))
+            found = dict(zip(ppo.METRICS, learner.update(rows).tolist(), strict=True))
             assert found == pytest.approx(figures, rel=1e-10, abs=1e-10)
             clipped += found["clip_share"]
             state = learner.state()
@@ -125,7 +125,7 @@ def test_learning_waits_for_a_full_rollout_and_then_uses_every_row() -> None:
     learner.observe(*steps[-1])
     found = learner.learn()
     assert found is not None
-    assert found.keys() == set(ppo._METRICS)
+    assert found.keys() == set(ppo.METRICS)
     assert learner.updates == 2 * 3, "two epochs of 12 rows in minibatches of 5"
     assert learner.learn() is None
 
@@ -161,7 +161,7 @@ def test_a_large_divergence_ends_the_epochs() -> None:
     free, held = make(2, numbers=numbers), make(2, numbers=numbers | {"stop_at_kl": 0.01})
     divergences: list[float] = []
     original = held.update
-    kl = ppo._METRICS.index("kl")
+    kl = ppo.METRICS.index("kl")
 
     def watched(rows: ppo.Rollout) -> Tensor:
         figures = original(rows)

@@ -58,6 +58,7 @@ FAULTS = {
         for kind, value in (("position_noise", 0.2), ("frozen_sensor", 0.5))
     ]
 }
+MEMORY = {"ppo.sequence_steps": 7}
 ARRIVALS = {"ppo.bootstrap": "afterstate", "scenario.rescue_radius_m": 0.9}
 ALIKE = (
     "td-uniform",
@@ -95,6 +96,14 @@ CASES: dict[str, dict[str, Any]] = {
         "train.method": "mappo",
         "network.symmetry": "canonical",
         **ARRIVALS,
+    },
+    "ppo-inner memory": {"train.method": "ppo-inner", "network.memory_width": 8, **MEMORY},
+    "mappo memory canonical": {
+        "train.method": "mappo",
+        "network.memory_width": 4,
+        "network.symmetry": "canonical",
+        "network.parameter_sharing": "kind",
+        **MEMORY,
     },
     "two threads": {"train.method": "td-inner", "train.threads": 2},
 }

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from innerattn.config import Fault, Obstacle, RunConfig, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
+from innerattn.learn.types import RememberingLearner
 from innerattn.nn import NUM_ELEMENTS, SquareSymmetry
 from innerattn.train.build import build_learner
 from innerattn.train.columns import vector_columns
@@ -62,6 +63,36 @@ def test_a_turned_world_gets_the_turned_actions(method: str, situation: str) -> 
             turned = learner.attention(there, symmetry.turn_actions(actions, element))
             assert turned is not None
             assert torch.equal(turned, weights)
+
+
+@pytest.mark.parametrize("method", ["ppo-inner", "mappo"])
+def test_a_turned_episode_gets_the_turned_actions_of_robots_that_remember(method: str) -> None:
+    """What is remembered turns with the world, through steps whose frames differ."""
+    scenario = Scenario.preset("mixed")
+    config = run(method, scenario)
+    config = config.replace(network=config.network.replace(memory_width=8))
+    with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
+        plain, turned = build_learner(config, env), build_learner(config, env)
+        symmetry = SquareSymmetry(vector_columns(env.observation_names()), torch.device("cpu"))
+    for number in range(1, NUM_ELEMENTS):
+        for learner in (plain, turned):
+            assert isinstance(learner, RememberingLearner)
+            learner.forget()
+        with closing(BatchEnv(scenario, 50, seed=3, num_threads=1)) as env:
+            obs = torch.from_numpy(env.reset())
+            for _ in range(6):
+                element = torch.full(obs.shape[:2], number)
+                actions = plain.act(obs, greedy=True)
+                there = symmetry.turn(obs, element)
+                found = turned.act(there, greedy=True)
+                assert torch.equal(found, symmetry.turn_actions(actions, element))
+                weights = plain.attention(obs, actions)
+                if weights is not None:
+                    assert torch.equal(turned.attention(there, found), weights)
+                obs = torch.from_numpy(env.step(actions.numpy()).obs)
+        known = plain.remembered()
+        assert known is not None
+        assert known.abs().max() > 0
 
 
 def test_without_frames_it_does_not() -> None:

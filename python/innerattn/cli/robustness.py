@@ -76,6 +76,12 @@ class Robustness(LongCommand):
             left_out = "where attention goes" if robots > 1 else "attention, its bounds included"
             why = f"left out: {left_out}, which has no choice in a team of {robots}"
             print(f"innerattn: {why}", file=sys.stderr)
+        elif without := found.methods.keys() - found.bounds.keys():
+            names = ", ".join(sorted(without))
+            print(
+                f"innerattn: left out: bounds on attention of {names}: its critic has a memory",
+                file=sys.stderr,
+            )
         if self.json != Path("-"):
             print_robustness(
                 self.console(), found.grid, found.retention, found.bounds, found.attention

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.resources.abc import Traversable
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from pydantic import Field
 
@@ -17,8 +17,13 @@ Needs = Mapping[str, Mapping[str, object]]
 
 
 class AlgorithmConfig(Model, ABC):
-    """Base of the configuration section of an algorithm; `place` is the name of the section."""
+    """Base of the configuration section of an algorithm; `place` is the name of the section.
 
+    Attributes:
+        remembers: Whether the learner's networks may have a memory (`network.memory_width`).
+    """
+
+    remembers: ClassVar[bool] = False
     gamma: float = Field(0.95, ge=0.0, le=1.0, description="discount per control step")
 
     @property

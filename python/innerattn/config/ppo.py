@@ -16,6 +16,7 @@ class PPOConfig(AlgorithmConfig):
     """On-policy learning by proximal policy optimisation."""
 
     place: ClassVar[str] = "ppo"
+    remembers: ClassVar[bool] = True
     removed: ClassVar[Mapping[str, object]] = {"value_clip": None}
 
     gae_lambda: float = Field(
@@ -57,6 +58,13 @@ class PPOConfig(AlgorithmConfig):
         ge=1,
         le=1_000,
         description="passes over a rollout's afterstates; None: as many as over the rollout",
+    )
+    sequence_steps: Annotated[int, ADDED_LATER] = Field(
+        5,
+        ge=1,
+        le=MOST_ROWS,
+        description="control steps that gradients of a memory (network.memory_width) go back; "
+        "must then divide rollout_steps [steps]",
     )
     attention_logit_penalty: float = Field(
         0.0,

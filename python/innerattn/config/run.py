@@ -169,6 +169,7 @@ class RunConfig(Model):
         self._check_potential()
         self._check_workers()
         self._check_any_team()
+        self._check_memory()
         gamma, world = self.algorithm.gamma, self.scenario
         if world.shaping == "potential" and self.train.schedule.gamma is not None:
             raise ValueError(
@@ -243,6 +244,31 @@ class RunConfig(Model):
             )
         if train.env_steps == 0:
             raise ValueError("train.env_steps = 0: must be at least 1")
+
+    def _check_memory(self) -> None:
+        """Refuse a memory for what cannot train one."""
+        network, train = self.network, self.train
+        if not network.memory_width:
+            return
+        key = f"network.memory_width = {network.memory_width}"
+        if not self.algorithm.remembers:
+            able = ", ".join(n for n, one in methods().items() if one.algorithm.config.remembers)
+            raise ValueError(
+                f"{key}: train.method = {train.method!r} has no memory; must be 0, or a method of "
+                f"{able}"
+            )
+        if train.warm_start != "none":
+            raise ValueError(
+                f"{key}: train.warm_start = {train.warm_start!r} imitates single steps; must be "
+                "'none'"
+            )
+        if isinstance(self.algorithm, PPOConfig):
+            rollout, sequence = self.ppo.rollout_steps, self.ppo.sequence_steps
+            if rollout % sequence:
+                raise ValueError(
+                    f"ppo.sequence_steps = {sequence}: must divide ppo.rollout_steps = {rollout}, "
+                    f"because {key}"
+                )
 
     def _check_potential(self) -> None:
         """Refuse keys of a potential that do not go together."""

@@ -66,6 +66,14 @@ class NetworkConfig(Model):
         "its first victim lies at x >= y >= 0, and actions turned back; augmented: worlds turned "
         "at random in training",
     )
+    memory_width: Annotated[int, ADDED_LATER] = Field(
+        0,
+        ge=0,
+        le=1_024,
+        multiple_of=4,
+        description="numbers that a robot remembers from step to step of an episode, in a gated "
+        "recurrent unit before actor and critic; 0: no memory; PPO methods only",
+    )
     precision: Literal["float32", "bfloat16"] = Field(
         "float32", description="of matrix products in an update; weights are always float32"
     )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from innerattn.config import Scenario
 from innerattn.config.streams import Purpose, stream_seed
 from innerattn.envs import BatchEnv
-from innerattn.policies import Policy, PolicyInput, WorldState
+from innerattn.policies import Policy, PolicyInput, RememberingPolicy, WorldState
 from innerattn.records.record import FIELDS, LOST_DTYPE, Record, joined, rescue_dtype
 
 _WORLDS_AT_ONCE = 1024
@@ -96,6 +96,8 @@ def _run_batch(
     """One episode of every world of ``env``; what happens after its end is not counted."""
     total_steps = env.scenario.episode_steps
     obs = env.reset()
+    if isinstance(policy, RememberingPolicy):
+        policy.forget()
     running = np.ones(env.num_envs, bool)
     lengths = np.zeros(env.num_envs, np.int64)
     rewards_total = np.zeros((env.num_envs, env.num_robots, len(env.reward_component_names)))

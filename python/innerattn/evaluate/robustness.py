@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from innerattn.config import NetworkConfig
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.evaluate.bounds.measure import bounds_of_run
 from innerattn.evaluate.bounds.results import Bounds
@@ -44,7 +45,7 @@ class Robustness:
         grid: the faults.
         retention: of each policy by name, first the runs in their order, then the scripts.
         methods: method of training of each run, by name.
-        bounds: of each run's critic, by name; none for teams of one robot.
+        bounds: of each run's critic without a memory, by name; none for teams of one robot.
         attention: of each run with learnt attention, by name; none for teams of less than three.
     """
 
@@ -98,9 +99,10 @@ def measure_robustness(
     grid = Grid(scenario, kinds=tuple(kinds), episodes=episodes, seed=worlds_seed)
     policies: list[tuple[str, Policy]] = []
     methods: dict[str, str] = {}
+    networks: dict[str, NetworkConfig] = {}
     for name, run in zip(names, runs, strict=True):
         trained, policy = load_trained(run, scenario)
-        methods[name] = trained.train.method
+        methods[name], networks[name] = trained.train.method, trained.network
         policies.append((name, policy))
     policies += [(name, scripted_policy(name, scenario, worlds_seed)) for name in SCRIPTS]
     with torch_threads(thread_count(config)):
@@ -110,11 +112,13 @@ def measure_robustness(
     bounds: dict[str, Bounds] = {}
     if scenario.num_robots > 1:
         for name, run in zip(names, runs, strict=True):
+            if networks[name].memory_width:  # bounds are of attention to one observation
+                continue
             bounds[name] = bounds_of_run(run, seed=seed, progress=on("checking bounds"))
     attention: dict[str, FaultAttention] = {}
     if scenario.num_robots > 2:
         for name, run in zip(names, runs, strict=True):
-            if bounds[name].attention == "inner":  # weights that are not learnt do not move
+            if networks[name].attention == "inner":  # weights that are not learnt do not move
                 attention[name] = fault_attention_of_run(
                     run,
                     kinds=kinds,

@@ -14,7 +14,7 @@ from innerattn.config import RunConfig, Scenario
 from innerattn.config.team import TeamConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
-from innerattn.learn.types import Learner
+from innerattn.learn.types import Learner, RememberingLearner
 from innerattn.policies import PolicyInput
 from innerattn.train import load_policy
 
@@ -38,6 +38,12 @@ class TrainedPolicy:
     def reset(self, seed: int) -> None:
         """See `Policy.reset`."""
         self._learner.seed_draws(seed)
+        self.forget()
+
+    def forget(self) -> None:
+        """See `RememberingPolicy.forget`."""
+        if isinstance(self._learner, RememberingLearner):
+            self._learner.forget()
 
     def attention(self, view: PolicyInput, actions: NDArray[Any]) -> NDArray[np.float32] | None:
         """See `Attentive.attention`."""

@@ -21,11 +21,18 @@ from innerattn.learn.compiled import CompilerError, failed_to_compile, first_lin
 from innerattn.learn.divergence import DivergenceError, not_finite, refuse_not_finite_gradients
 from innerattn.learn.gradients import average_over_robots
 from innerattn.learn.interruptions import Interruptions, NoInterruptions
+from innerattn.learn.memories import Memories, parts_of
 from innerattn.learn.networks import DrawNetworks, draw_networks
 from innerattn.learn.resume import State, take, take_generator, take_whole, whole
 from innerattn.learn.types import Team
 from innerattn.learn.undo import Undo
-from innerattn.nn import CriticOutput, action_noise, robots_of_each_kind
+from innerattn.nn import (
+    CriticOutput,
+    RememberingActor,
+    RememberingCritic,
+    action_noise,
+    robots_of_each_kind,
+)
 
 MOMENTS = ("actor_adam", "critic_adam")
 """First parts of the names of the optimisers' moments in a state; acting does not need them."""
@@ -119,6 +126,10 @@ class ActorCritic:
         if network.shared_gradients == "mean" and team.kinds is not None:
             self._robots_of_each_kind = robots_of_each_kind(team.kinds).to(device, dtype)
         self._acted: tuple[Tensor, Tensor] | None = None
+        self._memories: Memories | None = None
+        if isinstance(self.actor, RememberingActor):
+            assert isinstance(self.critic, RememberingCritic)  # as they are drawn
+            self._memories = Memories(self.actor, self.critic, self._number(0.0))
         self._team, self._actions = team, team.actions
         self._updates = 0
         self.interruptions: Interruptions = NoInterruptions()
@@ -150,9 +161,13 @@ class ActorCritic:
         self._noise.manual_seed(seed)
 
     @torch.no_grad()
-    def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
-        """Choose actions (E, R, ...) for observations (E, R, D); see `Learner.act`."""
-        outputs = self.actor(self._robots_first(obs))
+    def act(self, obs: Tensor, greedy: bool = False, elements: Tensor | None = None) -> Tensor:
+        """Choose actions (E, R, ...) for observations (E, R, D); see `RememberingLearner.act`."""
+        seen = self._robots_first(obs)
+        if self._memories is None:
+            outputs = self.actor(seen)
+        else:
+            outputs = self._memories.act(seen, self._turned_by(elements))
         self._acted = (obs, outputs)
         if greedy:
             actions = self._actions.likeliest(outputs)
@@ -180,12 +195,32 @@ class ActorCritic:
         """Let the learning rate fall linearly; see `Learner.set_progress`."""
         self._rate = (1.0 - (1.0 - self._final_share) * share) * self._first_rate
 
-    def attention(self, obs: Tensor, actions: Tensor) -> Tensor | None:
-        """Attention weights (B, H, R, R) of the critic, if it has any; see `Learner.attention`."""
+    def forget(self) -> None:
+        """Begin new episodes in all worlds; see `RememberingLearner`."""
+        if self._memories is not None:
+            self._memories.forget()
+
+    def remembered(self) -> Tensor | None:
+        """What robots remembered before they acted last; see `RememberingLearner`."""
+        return None if self._memories is None else self._memories.before.transpose(0, 1)
+
+    def attention(
+        self,
+        obs: Tensor,
+        actions: Tensor,
+        remembered: Tensor | None = None,
+        elements: Tensor | None = None,
+    ) -> Tensor | None:
+        """Attention weights (B, H, R, R) of the critic; see `RememberingLearner.attention`."""
         obs = self._robots_first(obs)
+        recall: tuple[Tensor | None, ...] = ()
+        if self._memories is not None:
+            given = None if remembered is None else self._robots_first(remembered)
+            _, of_critic = parts_of(self._memories.before if given is None else given)
+            recall = of_critic, None, self._turned_by(elements)
         with torch.no_grad():
             output: CriticOutput = self.critic(
-                obs, actions.to(self._device).transpose(0, 1), self._available(obs)
+                obs, actions.to(self._device).transpose(0, 1), self._available(obs), *recall
             )
         return None if output.attended is None else output.attended.weights
 
@@ -234,7 +269,7 @@ class ActorCritic:
                 tensors |= {f"{name}.{key}.{part}": moments[part] for part in sorted(moments)}
         return tensors
 
-    def _update(self, *tensors: Tensor) -> Tensor:
+    def _update(self, *tensors: Tensor | None) -> Tensor:
         """Do `_update_networks` with matrix products in `network.precision`, and count it.
 
         Raises:
@@ -261,7 +296,7 @@ class ActorCritic:
         self._undo.keep()
         return self._undo
 
-    def _refuse(self, metrics: Tensor, tensors: Sequence[Tensor]) -> NoReturn:
+    def _refuse(self, metrics: Tensor, tensors: Sequence[Tensor | None]) -> NoReturn:
         """Find out which gradient of an update is not finite, by its plain form done once more.
 
         Raises:
@@ -390,6 +425,10 @@ class ActorCritic:
     def _robots_first(self, obs: Tensor) -> Tensor:
         """Bring (B, R, D) to (R, B, D), as the networks take it, on their device and dtype."""
         return obs.to(self._device, self._dtype).transpose(0, 1)
+
+    def _turned_by(self, elements: Tensor | None) -> Tensor | None:
+        """Bring elements (B, R), if there are any, to (R, B) on the networks' device."""
+        return None if elements is None else elements.to(self._device).t()
 
     def _available(self, obs: Tensor) -> Tensor | None:
         """(B, R) bool from observations (R, B, D); None where no robot is to be masked."""

@@ -15,7 +15,13 @@ from innerattn.learn import workers
 from innerattn.learn.interruptions import Interruptions
 from innerattn.learn.resume import State, inside, take_generator, under
 from innerattn.learn.ring import Ring
-from innerattn.learn.types import Afterstates, Learner, ResumableLearner, Transitions
+from innerattn.learn.types import (
+    Afterstates,
+    Learner,
+    RememberingLearner,
+    ResumableLearner,
+    Transitions,
+)
 from innerattn.nn import NUM_ELEMENTS, SquareSymmetry
 
 
@@ -78,7 +84,11 @@ class FramedLearner:
         """Choose actions (E, R) int64 for observations (E, R, D); see `Learner.act`."""
         element, seen = self._look(obs)
         self._acted = (obs, element, seen)
-        return self._symmetry.turn_actions_back(self.learner.act(seen, greedy), element)
+        if isinstance(self.learner, RememberingLearner):
+            actions = self.learner.act(seen, greedy, element)
+        else:
+            actions = self.learner.act(seen, greedy)
+        return self._symmetry.turn_actions_back(actions, element)
 
     def observe(self, batch: Transitions, truncated: Tensor) -> None:
         """Store one control step of E worlds; see `Learner.observe`."""
@@ -92,6 +102,8 @@ class FramedLearner:
             actions=self._symmetry.turn_actions(batch.actions, element),
             next_obs=self._symmetry.turn(batch.next_obs, after),
             afterstates=self._turned(batch.afterstates),
+            elements=element,
+            next_elements=after,
         )
         self.learner.observe(turned, truncated)
 
@@ -107,9 +119,29 @@ class FramedLearner:
         turned = self._symmetry.turn_actions(actions, element)
         return self.learner.imitate(seen, turned, learning_rate)
 
-    def attention(self, obs: Tensor, actions: Tensor) -> Tensor | None:
-        """Attention weights (B, H, R, R) of the critic; see `Learner.attention`."""
-        return self.learner.attention(*self.as_seen(obs, actions))
+    def attention(
+        self, obs: Tensor, actions: Tensor, remembered: Tensor | None = None
+    ) -> Tensor | None:
+        """Attention weights (B, H, R, R) of the critic; see `RememberingLearner.attention`.
+
+        Elements that are drawn in training are left out.
+        """
+        element = None if self._generator is not None else self._symmetry.frame(obs)
+        seen = self.as_seen(obs, actions)
+        if isinstance(self.learner, RememberingLearner):
+            return self.learner.attention(*seen, remembered, element)
+        return self.learner.attention(*seen)
+
+    def forget(self) -> None:
+        """Begin new episodes in all worlds; see `RememberingLearner`."""
+        if isinstance(self.learner, RememberingLearner):
+            self.learner.forget()
+
+    def remembered(self) -> Tensor | None:
+        """What robots remembered before they acted last; see `RememberingLearner`."""
+        if isinstance(self.learner, RememberingLearner):
+            return self.learner.remembered()
+        return None
 
     def as_seen(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor]:
         """Observations (B, R, D) and actions (B, R) as the learner inside has them when it plays.

@@ -17,15 +17,20 @@ from innerattn.nn import (
     Critic,
     EntityColumns,
     JointCritic,
+    Memory,
     OracleAttention,
     PartnerColumns,
+    RememberingActor,
+    RememberingCritic,
     TeammateAttention,
     VectorCritic,
     share_by_kind,
     swap_robots,
 )
 
-DrawNetworks = Callable[[Team, NetworkConfig, torch.Generator], tuple[Actor, nn.Module]]
+DrawNetworks = Callable[
+    [Team, NetworkConfig, torch.Generator], tuple[Actor | RememberingActor, nn.Module]
+]
 """Makes an actor and a critic, which gives a `CriticOutput` as `Critic.forward` does."""
 
 
@@ -34,8 +39,8 @@ def draw_networks(
     network: NetworkConfig,
     generator: torch.Generator,
     critic_outputs: int | None = None,
-) -> tuple[Actor, nn.Module]:
-    """Actors and critics with initial parameters, float32 on the CPU.
+) -> tuple[Actor | RememberingActor, nn.Module]:
+    """Actors and critics with initial parameters, float32 on the CPU; with a memory, if asked for.
 
     A critic without attention takes whole observations and shares nothing between robots: its input
     is the same for all.
@@ -55,25 +60,36 @@ def draw_networks(
     entities = _entities(team) if network.encoder == "entities" else None
     kinds = _kinds(team) if network.parameter_sharing == "kind" else None
     robots, obs_width, num_actions, *_ = team
-    width, outputs_of_actor = network.hidden_width, team.actions.outputs
+    width, remembered = network.hidden_width, network.memory_width
+    sizes = robots, obs_width, team.actions.outputs, width
+    actor: Actor | RememberingActor
     if network.attention == "none":
-        actor = Actor(robots, obs_width, outputs_of_actor, width, generator, entities)
+        actor = Actor(*sizes, generator, entities, remembered)
         outputs = critic_outputs or num_actions
         joint = CentralCritic if network.joint_critic == "central" else JointCritic
-        critic: nn.Module = joint(robots, obs_width, outputs, width, generator)
+        critic: nn.Module = joint(robots, obs_width + remembered, outputs, width, generator)
     else:
         kind: type[TeammateAttention] = resolve_name(attentions()[network.attention])
         attention = kind(width, network.attention_heads, generator)
         if isinstance(attention, OracleAttention):
             attention.partners = _partners(team)
-        actor = Actor(robots, obs_width, outputs_of_actor, width, generator, entities)
+        actor = Actor(*sizes, generator, entities, remembered)
         form = VectorCritic if team.action_width else Critic
         inputs = team.action_width or num_actions
-        critic = form(robots, obs_width, inputs, attention, generator, critic_outputs, entities)
+        critic = form(
+            robots, obs_width, inputs, attention, generator, critic_outputs, entities, remembered
+        )
         if kinds is not None:
             share_by_kind(critic, kinds)
     if kinds is not None:
         share_by_kind(actor, kinds)
+    if remembered:
+        memories = [Memory(robots, obs_width, remembered, generator) for _ in range(2)]
+        if kinds is not None:
+            for memory in memories:
+                share_by_kind(memory, kinds)
+        actor = RememberingActor(memories[0], actor)
+        critic = RememberingCritic(memories[1], critic)
     if team.swapped is not None:
         for net in (actor, critic):
             swap_robots(net, *team.swapped)

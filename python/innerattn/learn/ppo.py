@@ -14,12 +14,11 @@ from torch import Tensor
 
 from innerattn.config import NetworkConfig, PPOConfig
 from innerattn.learn import losses, workers
-from innerattn.learn.actor_critic import ActorCritic, Networks
-from innerattn.learn.adam import Forward, Gradients
 from innerattn.learn.advantage import ReturnScale, generalised_advantage
 from innerattn.learn.afterstate import AfterstateCritic
-from innerattn.learn.gradients import average_over_robots, clip_norm, clip_norm_by_robot
+from innerattn.learn.clipped_update import METRICS, ClippedUpdate, recalls
 from innerattn.learn.networks import draw_networks
+from innerattn.learn.recall import Recall
 from innerattn.learn.resume import (
     State,
     inside,
@@ -30,19 +29,16 @@ from innerattn.learn.resume import (
     whole,
 )
 from innerattn.learn.ring import Ring
-from innerattn.learn.rollout import Rollout, RolloutBuffer, rows_of, standardised, steps_of
+from innerattn.learn.rollout import (
+    Rollout,
+    RolloutBuffer,
+    in_sequences,
+    rows_of,
+    standardised,
+    steps_of,
+)
 from innerattn.learn.types import Scheduled, Team, Transitions
 
-_METRICS = (
-    "critic_loss",
-    "q_mean",
-    "critic_grad_norm",
-    "actor_loss",
-    "policy_entropy",
-    "actor_grad_norm",
-    "kl",
-    "clip_share",
-)
 _CHUNK = 1024
 """Rows whose values are computed at a time."""
 
@@ -54,7 +50,8 @@ class _Passes:
     Attributes:
         rollout: What is trained on.
         epoch: Passes that are done.
-        order: (B,) the rows of the present pass in their order; None before it has begun.
+        order: (B,) the rows of the present pass in their order, or (S,) the sequences; None before
+            it has begun.
         done: Minibatches of the present pass that are done.
         learnt: Those of them that were learnt from.
     """
@@ -66,7 +63,7 @@ class _Passes:
     learnt: int = 0
 
 
-class PPO(ActorCritic):
+class PPO(ClippedUpdate):
     """The on-policy learner; its contract is `innerattn.learn.types.Learner`.
 
     The baseline of robot i does not depend on its own action. With `advantage = "counterfactual"`
@@ -76,8 +73,6 @@ class PPO(ActorCritic):
     Attributes:
         scale: Running standard deviation of returns, by which rewards are divided.
     """
-
-    _metric_names = _METRICS
 
     def __init__(
         self,
@@ -113,7 +108,8 @@ class PPO(ActorCritic):
         )
         self._config = ppo
         self._shuffle = torch.Generator().manual_seed(self._data_seed)
-        self._buffer = RolloutBuffer(ppo.rollout_steps, team, device, dtype)
+        self._memory_width = 2 * network.memory_width  # of actor and critic
+        self._buffer = RolloutBuffer(ppo.rollout_steps, team, device, dtype, self._memory_width)
         self._steps_of_frozen = False
         self._afterstates: AfterstateCritic | None = None
         if ppo.bootstrap == "afterstate":
@@ -133,7 +129,19 @@ class PPO(ActorCritic):
             self._buffer.clear()
             self.scale.forget_open_returns()
             self._steps_of_frozen = self.actor_frozen
-        self._buffer.add(batch, truncated, self._log_probs_of(batch.obs))
+        log_probs = self._log_probs_of(batch.obs)
+        self._buffer.add(batch, truncated, log_probs, self._memories_of(batch.obs))
+        if self._memories is not None:
+            self._memories.forget(batch.terminated | truncated)
+
+    def _memories_of(self, obs: Tensor) -> tuple[Tensor, Tensor] | None:
+        """(R, E, M) what robots remembered before these observations, and after; None: nothing."""
+        if self._memories is None:
+            return None
+        if self._acted is None or self._acted[0] is not obs:
+            with torch.no_grad():
+                self._memories.act(self._robots_first(obs))
+        return self._memories.before, self._memories.now
 
     def follow(self, scheduled: Scheduled) -> None:
         """Take over discount and entropy weight; see `ScheduledLearner.follow`."""
@@ -169,113 +177,20 @@ class PPO(ActorCritic):
         """
         rollout = passes.rollout
         if passes.order is None:
-            passes.order = torch.randperm(rollout.obs.shape[1], generator=self._shuffle)
-        minibatches = _split(passes.order, self._config.minibatch_size, workers.count())
+            passes.order = torch.randperm(rollout.units, generator=self._shuffle)
+        rows_of_unit = rollout.obs.shape[1] // rollout.units
+        size = max(1, self._config.minibatch_size // rows_of_unit)
+        minibatches = _split(passes.order, size, workers.count())
         for chosen in minibatches[passes.done :]:
             rows = rollout.take(chosen.to(self._device))
-            passes.learnt += self._do_update(len(chosen), partial(self.update, rows))
+            passes.learnt += self._do_update(rows.obs.shape[1], partial(self.update, rows))
             passes.done += 1
         found = self._rows[len(self._rows) - passes.learnt :]
         passes.epoch, passes.order, passes.done, passes.learnt = passes.epoch + 1, None, 0, 0
         stop = self._config.stop_at_kl
         if stop is None or not found or self.actor_frozen:  # imitation changes a frozen policy
             return False
-        return float(torch.stack(found)[:, _METRICS.index("kl")].mean()) > stop
-
-    @torch.no_grad()
-    def update(self, rows: Rollout) -> Tensor:
-        """Update the critic, then the actors, from some rows of a rollout.
-
-        Args:
-            rows: At least one row.
-
-        Returns:
-            (8,) the metrics that `learn` names, in that order.
-        """
-        return self._update(*rows, self._number(self._entropy_weight))
-
-    def _update_networks(
-        self,
-        nets: Networks,
-        obs: Tensor,
-        actions: Tensor,
-        log_prob: Tensor,
-        advantage: Tensor,
-        target: Tensor,
-        entropy_weight: Tensor,
-        rate: Tensor,
-    ) -> Tensor:
-        of_critic, (critic_loss, q_mean) = self._critic_gradients(nets, obs, actions, target)
-        of_actor, found = self._actor_gradients(
-            nets, obs, actions, log_prob, advantage, entropy_weight
-        )
-        (of_critic, of_actor), numbers = self._averaged(
-            {"critic": of_critic, "actor": of_actor}, [critic_loss, q_mean, *found]
-        )
-        critic_loss, q_mean, actor_loss, entropy, kl, clipped = numbers
-        critic_norm = self._step_critic(nets, of_critic, rate)
-        actor_norm = self._step_actor(nets, of_actor, rate)
-        return torch.stack(
-            [critic_loss, q_mean, critic_norm, actor_loss, entropy, actor_norm, kl, clipped]
-        )
-
-    def _critic_gradients(
-        self, nets: Networks, obs: Tensor, actions: Tensor, target: Tensor
-    ) -> tuple[Gradients, tuple[Tensor, Tensor]]:
-        """Gradients of the critic towards the targets; its loss and mean value."""
-        config = self._config
-
-        def loss_of(critic: Forward) -> tuple[Tensor, tuple[Tensor, Tensor]]:
-            output = critic(obs, actions, self._available(obs))
-            value = self._fitted(output.q, actions)
-            loss = losses.critic_loss(value, target)
-            loss = loss + losses.attention_logit_regularisation(
-                output.attended, config.attention_logit_penalty
-            )
-            return loss, (loss.detach(), value.detach().mean())
-
-        found: tuple[Gradients, tuple[Tensor, Tensor]] = nets.critic.gradients(loss_of)
-        return found
-
-    def _step_critic(self, nets: Networks, gradients: Gradients, rate: Tensor) -> Tensor:
-        """One step of the critic; () the norm of its gradient."""
-        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
-        norm = clip_norm(gradients, self._config.critic_grad_clip)
-        nets.critic.step(gradients, rate)
-        return norm
-
-    def _actor_gradients(
-        self,
-        nets: Networks,
-        obs: Tensor,
-        actions: Tensor,
-        before: Tensor,
-        advantage: Tensor,
-        entropy_weight: Tensor,
-    ) -> tuple[Gradients, tuple[Tensor, Tensor, Tensor, Tensor]]:
-        """Gradients of the policies; their loss, entropy, KL and clipped share."""
-        config = self._config
-
-        def loss_of(actor: Forward) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
-            taken, entropies = self._actions.scored(actor(obs), actions)
-            entropy = entropies.mean(dim=1)
-            surrogate = losses.clipped_policy_loss(taken, before, advantage, config.clip)
-            loss = surrogate - entropy_weight * entropy.sum()
-            return loss, (loss.detach(), entropy.detach().mean(), taken.detach() - before)
-
-        gradients, (loss, entropy, change) = nets.actor.gradients(loss_of)
-        ratio = change.exp()
-        kl = (ratio - 1.0 - change).mean()
-        clipped = ((ratio - 1.0).abs() > config.clip).to(kl.dtype).mean()
-        return gradients, (loss, entropy, kl, clipped)
-
-    def _step_actor(self, nets: Networks, gradients: Gradients, rate: Tensor) -> Tensor:
-        """One step of the policies, unless they are frozen; () the mean norm of their gradients."""
-        average_over_robots(gradients, self._team.num_robots, self._robots_of_each_kind)
-        norms = clip_norm_by_robot(gradients, self._config.actor_grad_clip)
-        if not self.actor_frozen:
-            nets.actor.step(gradients, rate)
-        return norms.mean()
+        return float(torch.stack(found)[:, METRICS.index("kl")].mean()) > stop
 
     @torch.no_grad()
     def _rollout(self) -> Rollout:
@@ -286,14 +201,17 @@ class PPO(ActorCritic):
         scale = self.scale.std(config.return_deviation_floor).unsqueeze(1)
         reward = (steps.reward / scale).to(self._dtype)
 
-        log_prob, baseline = self._evaluate(steps.obs, steps.actions, steps.log_probs)
+        log_prob, baseline = self._evaluate(steps.obs, steps.actions, steps.recall, steps.log_probs)
         value = steps_of(baseline, len(reward))
         # Within an episode, the value of the next state is that of the next step. After its last
         # step, and after the last of the rollout, it takes actions drawn for that state.
         next_value = torch.cat([value[1:], torch.zeros_like(value[:1])])
         step, env = steps.cut.nonzero(as_tuple=True)
-        next_actions = self._actions.draw(self.actor(steps.after), self._noise)
-        next_value[step, :, env] = self._evaluate(steps.after, next_actions)[1].t()
+        outputs = self.actor(steps.after, *recalls(steps.after_recall)[0])
+        next_actions = self._actions.draw(outputs, self._noise)
+        next_value[step, :, env] = self._evaluate(steps.after, next_actions, steps.after_recall)[
+            1
+        ].t()
         if self._afterstates is not None and steps.arrivals is not None:
             next_value = self._afterstates.replaced(steps.arrivals, next_value, self._rate)
         advantage = generalised_advantage(
@@ -305,7 +223,7 @@ class PPO(ActorCritic):
             self._gamma,
             config.gae_lambda,
         )
-        return Rollout(
+        rollout = Rollout(
             obs=steps.obs,
             actions=steps.actions,
             log_prob=log_prob,
@@ -313,28 +231,37 @@ class PPO(ActorCritic):
             advantage=standardised(rows_of(advantage)) * self.scale.has_spread().unsqueeze(1),
             target=rows_of(advantage + value),
         )
+        if self._memories is None:
+            return rollout
+        return in_sequences(rollout, steps, self._config.sequence_steps)
 
     def _evaluate(
-        self, obs: Tensor, actions: Tensor, log_probs: Tensor | None = None
+        self,
+        obs: Tensor,
+        actions: Tensor,
+        recall: Recall | None,
+        log_probs: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:
         """Log-probabilities of the actions and baselines of rows, (R, B) each.
 
         Args:
             obs: (R, B, D).
             actions: (R, B) int64, or (R, B, W).
+            recall: What robots remembered before each row; None without a memory.
             log_probs: (R, A, B) of all discrete actions, if they are known.
         """
         parts = []
         for first in range(0, obs.shape[1], _CHUNK):
             chunk = slice(first, first + _CHUNK)
             some_obs, some_actions = obs[:, chunk], actions[:, chunk]
-            q = self.critic(some_obs, some_actions, self._available(some_obs)).q
+            of_actor, of_critic = recalls(None if recall is None else recall.steps(chunk))
+            q = self.critic(some_obs, some_actions, self._available(some_obs), *of_critic).q
             if self._team.action_width:
-                taken = self._actions.log_prob(self.actor(some_obs), some_actions)
+                taken = self._actions.log_prob(self.actor(some_obs, *of_actor), some_actions)
                 baseline = q.squeeze(1)
             else:
                 if log_probs is None:
-                    log_prob = self.actor(some_obs).log_softmax(dim=1)
+                    log_prob = self.actor(some_obs, *of_actor).log_softmax(dim=1)
                 else:
                     log_prob = log_probs[:, :, chunk]
                 taken = losses.gather_actions(log_prob, some_actions)
@@ -345,12 +272,6 @@ class PPO(ActorCritic):
             parts.append((taken, baseline))
         taken, baselines = (torch.cat(found, dim=1) for found in zip(*parts, strict=True))
         return taken, baselines
-
-    def _fitted(self, q: Tensor, actions: Tensor) -> Tensor:
-        """(R, B) the values that are fitted to targets: of the actions taken, or of the state."""
-        if self._config.advantage == "counterfactual":
-            return losses.gather_actions(q, actions)
-        return q.squeeze(1)
 
     def rings(self) -> dict[str, Ring]:
         """None: a rollout is small; see `ResumableLearner.rings`."""
@@ -366,9 +287,11 @@ class PPO(ActorCritic):
         }
         if self._afterstates is not None:
             state |= under("afterstates", self._afterstates.resume_state())
+        if self._memories is not None:
+            state |= under("memories", self._memories.resume_state())
         if self._passes is not None:
             passes = self._passes
-            state |= under("rollout", passes.rollout._asdict())
+            state |= under("rollout", passes.rollout.resume_state())
             state |= {"epoch": whole(passes.epoch), "done": whole(passes.done)}
             state |= {"learnt": whole(passes.learnt)}
             state |= {} if passes.order is None else {"order": passes.order}
@@ -383,10 +306,13 @@ class PPO(ActorCritic):
         self._buffer.load_resume_state(inside("buffer", state))
         if self._afterstates is not None:
             self._afterstates.load_resume_state(inside("afterstates", state))
+        if self._memories is not None:
+            self._memories.load_resume_state(inside("memories", state))
         self._passes = None
         if "epoch" in state:
-            rollout = Rollout.taken_from(inside("rollout", state), self._team, self._number(0.0))
-            size = rollout.obs.shape[1]
+            found, like = inside("rollout", state), self._number(0.0)
+            rollout = Rollout.taken_from(found, self._team, like, self._memory_width)
+            size = rollout.units
             self._passes = _Passes(rollout, take_whole(state, "epoch", 0, self._config.epochs))
             if "order" in state:
                 self._passes.order = take_within(state, "order", torch.int64, 0, size - 1, size)

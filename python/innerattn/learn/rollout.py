@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from innerattn.learn import workers
-from innerattn.learn.resume import State, take, take_within
+from innerattn.learn.recall import Recall, RecalledSteps, sequences_of
+from innerattn.learn.resume import State, inside, take, take_within, under
 from innerattn.learn.types import Team, Transitions
 
 _ROUNDING = 8.0  # units in the last place of the largest advantage, by which equal ones differ
@@ -41,6 +42,8 @@ class Steps(NamedTuple):
         cut: (T, E) bool, steps whose successor is not in the rollout: ends, and the last step.
         after: (R, n, D) observations after the n cut steps, of the same episode, in order.
         arrivals: Where victims appeared; None if that was not told with every step.
+        recall: What robots remembered before each step; None without a memory.
+        after_recall: What they remembered after the n cut steps; None likewise.
     """
 
     obs: Tensor
@@ -52,12 +55,21 @@ class Steps(NamedTuple):
     cut: Tensor
     after: Tensor
     arrivals: Arrivals | None
+    recall: Recall | None
+    after_recall: Recall | None
 
 
 class RolloutBuffer:
     """T control steps, written where the updates read them. It is used again and again."""
 
-    def __init__(self, steps: int, team: Team, device: torch.device, dtype: torch.dtype) -> None:
+    def __init__(
+        self,
+        steps: int,
+        team: Team,
+        device: torch.device,
+        dtype: torch.dtype,
+        memory_width: int = 0,
+    ) -> None:
         """Reserve nothing yet: the first step says how many worlds there are.
 
         Args:
@@ -65,13 +77,15 @@ class RolloutBuffer:
             team: Sizes of the team.
             device: Where the buffer is held.
             dtype: Type of observations and log-probabilities.
+            memory_width: M, numbers that a robot remembers; 0: none.
         """
-        self._num_steps, self._team = steps, team
+        self._num_steps, self._team, self._memory_width = steps, team, memory_width
         self._device, self._dtype = device, dtype
         self._envs = 0
         self._filled = 0
         self._all_known = True
         self._after: list[Tensor] = []
+        self._recalled: RecalledSteps | None = None
         self._arrivals: list[Arrivals] = []
 
     @property
@@ -82,14 +96,24 @@ class RolloutBuffer:
     def clear(self) -> None:
         """Hold no step; the memory is kept."""
         self._filled, self._all_known, self._after, self._arrivals = 0, True, [], []
+        if self._recalled is not None:
+            self._recalled.clear()
 
-    def add(self, batch: Transitions, truncated: Tensor, log_probs: Tensor | None) -> None:
+    def add(
+        self,
+        batch: Transitions,
+        truncated: Tensor,
+        log_probs: Tensor | None,
+        memories: tuple[Tensor, Tensor] | None = None,
+    ) -> None:
         """Take one control step.
 
         Args:
             batch: The E transitions.
             truncated: (E,) bool.
             log_probs: (R, A, E) of all actions, under the policy that acted; None if not known.
+            memories: (R, E, M) what robots remembered before the step, and after it; None: they
+                have no memory.
         """
         if len(batch.obs) != self._envs:
             self._reserve(len(batch.obs))
@@ -110,6 +134,10 @@ class RolloutBuffer:
         self._filled += 1
         cut = batch.next_obs if self.full else batch.next_obs[ended.to(batch.next_obs.device)]
         self._after.append(cut.to(self._device, self._dtype))
+        if self._recalled is not None and memories is not None:
+            self._recalled.add(
+                step, memories, batch, torch.ones_like(ended) if self.full else ended
+            )
 
     def steps(self) -> Steps:
         """The steps of a full buffer; views, valid until the next `add`."""
@@ -125,6 +153,8 @@ class RolloutBuffer:
             cut=cut,
             after=torch.cat(self._after).transpose(0, 1),
             arrivals=self._all_arrivals() if len(self._arrivals) == self._filled else None,
+            recall=None if self._recalled is None else self._recalled.before(),
+            after_recall=None if self._recalled is None else self._recalled.after(),
         )
 
     def _all_arrivals(self) -> Arrivals:
@@ -145,6 +175,8 @@ class RolloutBuffer:
         }
         if self._arrivals:
             state |= {f"arrivals.{k}": v for k, v in self._all_arrivals()._asdict().items()}
+        if self._recalled is not None:
+            state |= under("recalled", self._recalled.resume_state(held))
         return state | ({"log_probs": self._log_probs[:, :, :held]} if self._all_known else {})
 
     def load_resume_state(self, state: State) -> None:
@@ -179,6 +211,8 @@ class RolloutBuffer:
             cut += int((flags["ended"][-1] == 0).sum())
         after = take(state, "after", self._dtype, cut, robots, width)
         self._after = [after.to(self._device)]
+        if self._recalled is not None:
+            self._recalled.load_resume_state(inside("recalled", state), held, cut)
         if "arrivals.states" in state:
             self._arrivals = self._taken_arrivals(state, held, envs)
 
@@ -204,11 +238,15 @@ class RolloutBuffer:
         self._reward = like.new_empty(steps, robots, envs, dtype=torch.float32)
         self._terminated = like.new_empty(steps, envs, dtype=torch.bool)
         self._ended = like.new_empty(steps, envs, dtype=torch.bool)
+        if self._memory_width:
+            self._recalled = RecalledSteps((robots, steps, envs, self._memory_width), like)
         self.clear()
 
 
 class Rollout(NamedTuple):
     """Rows of a rollout, robots first.
+
+    With a memory, rows are S sequences of L steps: all first steps, then all second ones.
 
     Attributes:
         obs: (R, B, D), in memory (B, R, D).
@@ -216,6 +254,7 @@ class Rollout(NamedTuple):
         log_prob: (R, B) of the actions, under the policy that acted.
         advantage: (R, B).
         target: (R, B) for the critic's values.
+        recall: What robots remembered before the S sequences; None without a memory.
     """
 
     obs: Tensor
@@ -223,21 +262,44 @@ class Rollout(NamedTuple):
     log_prob: Tensor
     advantage: Tensor
     target: Tensor
+    recall: Recall | None = None
 
-    def take(self, rows: Tensor) -> Rollout:
-        """Some rows, by their indices (n,) int64; observations keep their order in memory."""
-        obs, *others = self
-        taken = obs.transpose(0, 1).index_select(0, rows).transpose(0, 1)
-        return Rollout(taken, *(tensor.index_select(1, rows) for tensor in others))
+    @property
+    def units(self) -> int:
+        """What `take` chooses from: sequences, or rows without a memory."""
+        return self.obs.shape[1] if self.recall is None else self.recall.remembered.shape[1]
+
+    def take(self, units: Tensor) -> Rollout:
+        """Some rows, or sequences, by their indices (n,) int64.
+
+        Observations keep their order in memory.
+        """
+        rows, recall = units, self.recall
+        if recall is not None:
+            rows, recall = recall.rows_of(units), recall.take(units)
+        taken = self.obs.transpose(0, 1).index_select(0, rows).transpose(0, 1)
+        actions, *others = (one.index_select(1, rows) for one in self[1:5])
+        log_prob, advantage, target = others
+        return Rollout(taken, actions, log_prob, advantage, target, recall)
+
+    def tensors(self) -> tuple[Tensor | None, ...]:
+        """All fields, those of `recall` one by one, which may be missing."""
+        return *self[:5], *(self.recall or (None, None, None))
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """All fields that there are, by name; see `Resumable`."""
+        state = dict(zip(self._fields, self[:5], strict=False))
+        return state if self.recall is None else state | self.recall.resume_state()
 
     @classmethod
-    def taken_from(cls, state: State, team: Team, like: Tensor) -> Rollout:
-        """The rollout whose fields are in a state by name.
+    def taken_from(cls, state: State, team: Team, like: Tensor, memory_width: int = 0) -> Rollout:
+        """The rollout whose fields are in a state by name, as `resume_state` gives them.
 
         Args:
             state: By name.
             team: Sizes of the team.
             like: Has the dtype and the device of all but the actions.
+            memory_width: M, numbers that a robot remembers.
 
         Raises:
             ValueError: As in `take`.
@@ -245,11 +307,29 @@ class Rollout(NamedTuple):
         robots, width = team[:2]
         obs = take(state, "obs", like.dtype, robots, None, width)
         shape = (robots, obs.shape[1])
-        found: dict[str, Any] = {"obs": obs.transpose(0, 1).contiguous().transpose(0, 1)}
-        found["actions"] = _take_actions(state, team, shape[1])
-        for name in ("log_prob", "advantage", "target"):
-            found[name] = take(state, name, like.dtype, *shape)
-        return cls(**{name: tensor.to(like.device) for name, tensor in found.items()})
+        own = [take(state, name, like.dtype, *shape) for name in cls._fields[2:5]]
+        log_prob, advantage, target = (one.to(like.device) for one in own)
+        return cls(
+            obs.transpose(0, 1).contiguous().transpose(0, 1).to(like.device),
+            _take_actions(state, team, shape[1]).to(like.device),
+            log_prob,
+            advantage,
+            target,
+            Recall.taken_from(state, shape, memory_width, like) if memory_width else None,
+        )
+
+
+def in_sequences(rollout: Rollout, steps: Steps, length: int) -> Rollout:
+    """The rows of T control steps of E worlds as T / L * E sequences of L steps.
+
+    Args:
+        rollout: Its rows go through the worlds of a step, step after step.
+        steps: The same steps, with what robots remembered.
+        length: L, which divides T.
+    """
+    assert steps.recall is not None  # there are memories
+    order, recall = sequences_of(steps.recall, steps.ended, length)
+    return rollout.take(order)._replace(recall=recall)
 
 
 def _take_actions(state: State, team: Team, *shape: int) -> Tensor:

@@ -99,6 +99,9 @@ class Transitions(NamedTuple):
         reward_parts: (B, R, P) float32, whose weighted sum the reward is; None if the run weighs
             no rewards. A learner that remembers rewards weighs them anew.
         afterstates: Of the worlds in which victims appeared; None if the learner asks for none.
+        elements: (B, R) int64, elements that turned the worlds into the frames of `obs`; None: they
+            are not turned. What robots remember turns with them.
+        next_elements: (B, R) int64, likewise of `next_obs`.
     """
 
     obs: Tensor
@@ -108,6 +111,8 @@ class Transitions(NamedTuple):
     terminated: Tensor
     reward_parts: Tensor | None = None
     afterstates: Afterstates | None = None
+    elements: Tensor | None = None
+    next_elements: Tensor | None = None
 
 
 class Learner(Protocol):
@@ -222,6 +227,44 @@ class SkippingLearner(Protocol):
     """
 
     skips_divergence: bool
+
+
+@runtime_checkable
+class RememberingLearner(Protocol):
+    """A learner whose robots may remember what they saw earlier in their episodes.
+
+    `act` is one step of the worlds: what robots see there, they remember. `Learner.observe` tells
+    in which worlds episodes ended; whoever calls `act` alone says so by `forget`.
+    """
+
+    def act(self, obs: Tensor, greedy: bool = False, elements: Tensor | None = None) -> Tensor:
+        """As `Learner.act`; ``elements`` as in `Transitions`."""
+
+    def forget(self) -> None:
+        """Begin new episodes in all worlds, of whatever number."""
+
+    def remembered(self) -> Tensor | None:
+        """What robots remembered before they saw what `act` was called with last.
+
+        Returns:
+            (E, R, M) of the networks' type; None for networks without a memory.
+        """
+
+    def attention(
+        self,
+        obs: Tensor,
+        actions: Tensor,
+        remembered: Tensor | None = None,
+        elements: Tensor | None = None,
+    ) -> Tensor | None:
+        """As `Learner.attention`.
+
+        Args:
+            obs: (B, R, D) float32.
+            actions: (B, R) int64.
+            remembered: (B, R, M) what robots remembered before; None: what `remembered` gives.
+            elements: As in `Transitions`.
+        """
 
 
 @runtime_checkable

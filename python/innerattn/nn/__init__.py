@@ -17,6 +17,7 @@ from innerattn.nn.critic import Critic, CriticOutput, VectorCritic
 from innerattn.nn.encoder import EntityColumns, EntityEncoder
 from innerattn.nn.joint_critic import CentralCritic, JointCritic
 from innerattn.nn.linear import PerRobotLinear, swap_robots
+from innerattn.nn.memory import Memory, Remembering, RememberingActor, RememberingCritic
 from innerattn.nn.partner import OracleAttention, PartnerColumns
 from innerattn.nn.sharing import is_shared_by_kind, robots_of_each_kind, share_by_kind
 from innerattn.nn.symmetry import NUM_ELEMENTS, SquareSymmetry, VectorColumns
@@ -35,9 +36,13 @@ __all__ = [
     "FrozenAttention",
     "InnerAttention",
     "JointCritic",
+    "Memory",
     "OracleAttention",
     "PartnerColumns",
     "PerRobotLinear",
+    "Remembering",
+    "RememberingActor",
+    "RememberingCritic",
     "SquareSymmetry",
     "SquashedActions",
     "TeammateAttention",

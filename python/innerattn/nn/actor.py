@@ -25,6 +25,7 @@ class Actor(nn.Module):
         hidden_width: int,
         generator: torch.Generator,
         entities: EntityColumns | None = None,
+        extra_width: int = 0,
     ) -> None:
         """Draw the parameters.
 
@@ -35,10 +36,13 @@ class Actor(nn.Module):
             hidden_width: Width of both hidden layers.
             generator: Source of the initial parameters, on the CPU.
             entities: Columns of the entities to encode separately; None: encode the whole row.
+            extra_width: Further columns behind the observation, which belong to the robot itself.
         """
         super().__init__()
         self.num_robots = num_robots
-        self.first = observation_encoder(num_robots, obs_width, hidden_width, generator, entities)
+        self.first = observation_encoder(
+            num_robots, obs_width, hidden_width, generator, entities, extra_width
+        )
         self.second = PerRobotLinear(num_robots, hidden_width, hidden_width, generator)
         self.output = PerRobotLinear(num_robots, hidden_width, num_actions, generator)
 

@@ -43,6 +43,7 @@ class Critic(nn.Module):
         generator: torch.Generator,
         outputs: int | None = None,
         entities: EntityColumns | None = None,
+        extra_width: int = 0,
     ) -> None:
         """Draw the parameters.
 
@@ -54,13 +55,16 @@ class Critic(nn.Module):
             generator: Source of the initial parameters, on the CPU.
             outputs: Values for each robot; None: one for each own action.
             entities: Columns of the entities to encode separately; None: encode the whole row.
+            extra_width: Further columns behind the observation, which belong to the robot itself.
         """
         super().__init__()
         width = attention.width
         self.num_actions = num_actions
-        self.state_encoder = observation_encoder(num_robots, obs_width, width, generator, entities)
+        self.state_encoder = observation_encoder(
+            num_robots, obs_width, width, generator, entities, extra_width
+        )
         self.action_encoder = observation_encoder(
-            num_robots, obs_width, width, generator, entities, extra_width=num_actions
+            num_robots, obs_width, width, generator, entities, extra_width + num_actions
         )
         self.attention = attention
         self.hidden = PerRobotLinear(num_robots, 2 * width, width, generator)

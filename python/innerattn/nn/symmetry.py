@@ -130,6 +130,29 @@ class SquareSymmetry:
         return values.sign().double() @ self._importance
 
 
+def inverse(element: Tensor) -> Tensor:
+    """The elements that turn back what ``element`` turns: mirrors change places with a swap."""
+    exchanged = (element & 4) + 2 * (element & 1) + ((element >> 1) & 1)
+    return torch.where(element >= 4, exchanged, element)
+
+
+def between(first: Tensor, second: Tensor) -> Tensor:
+    """The elements that turn what ``first`` has turned into what ``second`` turns.
+
+    Turning by ``first`` and then by the result is turning by ``second``.
+    """
+    mirrors = (first ^ second) & 3  # of the world; as ``first`` has it, a swap exchanges them
+    exchanged = ((mirrors & 1) << 1) + (mirrors >> 1)
+    return torch.where(first >= 4, exchanged, mirrors) + ((first ^ second) & 4)
+
+
+def turned_signs(element: Tensor) -> tuple[Tensor, Tensor]:
+    """Signs, 1 or -1, of the first and the second part of a vector that elements (...) turn."""
+    x, y = 1 - 2 * (element & 1), 1 - (element & 2)
+    swap = element >= 4
+    return torch.where(swap, y, x), torch.where(swap, x, y)
+
+
 def _element(mirror_x: Tensor, mirror_y: Tensor, swap: Tensor) -> Tensor:
     return mirror_x.long() + 2 * mirror_y.long() + 4 * swap.long()
 

@@ -1,7 +1,7 @@
 """Policies that need no learner: what a policy sees and gives, scripts, and exported teams."""
 
 from innerattn.policies.exported import Decision, Exported
-from innerattn.policies.policy import Policy, PolicyInput, WorldState
+from innerattn.policies.policy import Policy, PolicyInput, RememberingPolicy, WorldState
 from innerattn.policies.scripted.dispatch import (
     SCRIPTED,
     SCRIPTS,
@@ -17,6 +17,7 @@ __all__ = [
     "Exported",
     "Policy",
     "PolicyInput",
+    "RememberingPolicy",
     "WorldState",
     "best_script",
     "scripted_policy",

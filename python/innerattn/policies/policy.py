@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,3 +88,11 @@ class Policy(Protocol):
 
     def reset(self, seed: int) -> None:
         """Forget what was seen; all that is drawn from now on follows from ``seed`` alone."""
+
+
+@runtime_checkable
+class RememberingPolicy(Protocol):
+    """A policy that remembers what it saw in an episode; `Policy.act` is one step of the worlds."""
+
+    def forget(self) -> None:
+        """Begin new episodes in all worlds, of whatever number; draws go on."""

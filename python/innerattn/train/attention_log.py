@@ -44,26 +44,28 @@ class AttentionLog:
         self._robot_names, self._actions = tuple(robot_names), actions
         self._device = device
         self._stride = ceil(episode_steps / _MOST_STEPS)
-        self._seen: deque[tuple[Tensor, Tensor]] = deque(maxlen=ceil(episode_steps / self._stride))
+        self._seen: deque[dict[str, Tensor]] = deque(maxlen=ceil(episode_steps / self._stride))
         self._steps = 0
 
-    def add(self, obs: Tensor, actions: Tensor) -> None:
+    def add(self, obs: Tensor, actions: Tensor, remembered: Tensor | None = None) -> None:
         """Take one control step of E worlds, of which the first are kept.
 
         Args:
             obs: (E, R, D) float32, before the step.
             actions: (E, R) int64, or (E, R, W) float32.
+            remembered: (E, R, M) float32, what robots remembered before; None without a memory.
         """
         if self._steps % self._stride == 0:
-            self._seen.append((obs[:_MOST_WORLDS].clone(), actions[:_MOST_WORLDS].clone()))
+            seen = {"obs": obs, "actions": actions}
+            seen |= {} if remembered is None else {"remembered": remembered}
+            self._seen.append({key: value[:_MOST_WORLDS].clone() for key, value in seen.items()})
         self._steps += 1
 
     def resume_state(self) -> dict[str, Tensor]:
         """The steps kept; see `Resumable`."""
         state = {"steps": whole(self._steps)}
         if self._seen:
-            obs, actions = (torch.stack(parts) for parts in zip(*self._seen, strict=True))
-            state |= {"obs": obs, "actions": actions}
+            state |= {key: torch.stack([one[key] for one in self._seen]) for key in self._seen[0]}
         return state
 
     def load_resume_state(self, state: State) -> None:
@@ -76,8 +78,11 @@ class AttentionLog:
             shape = (*obs.shape[:3], *self._actions.shape)
             actions = take(state, "actions", self._actions.dtype, *shape)
             self._actions.refuse_unknown(actions)
-            steps = zip(obs.to(self._device), actions.to(self._device), strict=True)
-            self._seen.extend(steps)
+            found = {"obs": obs, "actions": actions}
+            if "remembered" in state:
+                found["remembered"] = take(state, "remembered", torch.float32, *obs.shape[:3], None)
+            for step in range(len(obs)):
+                self._seen.append({key: one[step].to(self._device) for key, one in found.items()})
 
     def entropy(self, learner: Learner) -> dict[str, list[float]]:
         """Mean entropy by robot and head [nats] over the steps kept, with today's weights.
@@ -85,8 +90,8 @@ class AttentionLog:
         Returns:
             Empty where the critic has no attention.
         """
-        obs, actions = (torch.cat(parts) for parts in zip(*self._seen, strict=True))
-        weights = learner.attention(obs, actions)
+        seen = (torch.cat([one[key] for one in self._seen]) for key in self._seen[0])
+        weights = learner.attention(*seen)
         if weights is None:
             return {}
         rows = attention_entropy(weights.cpu().numpy()).tolist()

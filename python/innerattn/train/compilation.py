@@ -20,10 +20,12 @@ updates save about 15 to 30 microseconds a row (`benches/compare_learner.py`).""
 def compiles(config: RunConfig) -> bool:
     """Whether to compile the updates of this run.
 
+    Those of networks with a memory never are: the compiler takes two minutes for their sequences,
+    and compiled updates save a quarter of the time.
     If they should be compiled and there is no working compiler, a warning says so.
     """
     choice = config.train.compile
-    if choice == "off":
+    if choice == "off" or config.network.memory_width:
         return False
     worth = (
         config.train.device == "cpu"

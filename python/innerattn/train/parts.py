@@ -15,7 +15,12 @@ from innerattn.learn.framed import unframed
 from innerattn.learn.interruptions import Interruptions
 from innerattn.learn.resume import Resumable, State, inside, take, under
 from innerattn.learn.ring import Ring
-from innerattn.learn.types import Learner, ResumableLearner, SkippingLearner
+from innerattn.learn.types import (
+    Learner,
+    RememberingLearner,
+    ResumableLearner,
+    SkippingLearner,
+)
 from innerattn.train.attention_log import AttentionLog
 from innerattn.train.build import build_learner, team_of
 from innerattn.train.checkpoint_info import Stage
@@ -118,7 +123,10 @@ class Parts(Training):
         self.schedule.set_progress(share)
         transitions, truncated = self.collector.step()
         self.learner.observe(transitions, truncated)
-        self.attention.add(transitions.obs, transitions.actions)
+        remembered = None
+        if isinstance(self.learner, RememberingLearner):
+            remembered = self.learner.remembered()
+        self.attention.add(transitions.obs, transitions.actions, remembered)
         return {}
 
     def learn(self, share: float) -> Mapping[str, float]:

@@ -256,3 +256,10 @@ def test_a_team_whose_velocity_is_set_is_trained_and_not_exported(tmp_path: Path
     with pytest.raises(ConfigError, match=r"robots\[2\].drive = 'velocity': must be 'force'; exp"):
         export_run(run, tmp_path / "export")
     assert not (tmp_path / "export").exists()
+
+
+def test_a_team_that_remembers_is_trained_and_not_exported(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", run_config("ppo-inner", **{"network.memory_width": 8}))
+    with pytest.raises(ExportError, match=r"network.memory_width = 8: exported policies have no m"):
+        export_run(run, tmp_path / "export")
+    assert not (tmp_path / "export").exists()

@@ -138,7 +138,7 @@ def bounds_of_run(
 
     Raises:
         RunError: there is no readable run at ``run``, its team is one robot, its actions are
-            continuous, or its critic is of an extension.
+            continuous, or its critic has a memory or is of an extension.
         ConfigError: its configuration is not valid.
     """
     config, learner = load_policy(run)
@@ -153,11 +153,12 @@ def bounds_of_run(
     if (
         config.network.attention not in _CHANGES
         or not isinstance(inner, ActorCritic)
+        or not isinstance(inner.actor, Actor)
         or not isinstance(inner.critic, Critic | JointCritic | CentralCritic)
     ):
         raise RunError(
             f"{run}: train.method = {config.train.method!r}: bounds are known only for built-in "
-            "critics with inner, uniform or no attention"
+            "critics with inner, uniform or no attention, and no memory"
         )
     seed = config.evaluate.seed if seed is None else seed
     with torch_threads(thread_count(config)):

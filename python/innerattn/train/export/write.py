@@ -101,6 +101,11 @@ def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: 
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         names = env.observation_names()
     refuse_stores_velocities_and_sights(config.scenario, "exported policies")
+    if config.network.memory_width:
+        raise ExportError(
+            f"{run}: network.memory_width = {config.network.memory_width}: exported policies have "
+            "no memory"
+        )
     entities = entity_columns(names) if config.network.encoder == "entities" else None
     actor = inner_actor(learner, run)
     team = team_actors(config, actor, entities)

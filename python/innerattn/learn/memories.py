@@ -1,0 +1,70 @@
+"""What the robots of a batch of worlds remember while they act, by actors and by critics."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from innerattn.learn.resume import State, take
+from innerattn.nn import RememberingActor, RememberingCritic
+
+
+class Memories:
+    """The memories of E worlds, from one control step to the next.
+
+    A memory has 2 W numbers: those of the actor, then those of the critic. All are 0 where an
+    episode begins. Vectors in it lie as in the world.
+
+    Attributes:
+        before: (R, E, 2 W) before the newest observation.
+        now: (R, E, 2 W) after it.
+    """
+
+    def __init__(self, actor: RememberingActor, critic: RememberingCritic, like: Tensor) -> None:
+        """Remember nothing yet, of no world; ``like`` has the dtype and the device."""
+        self._actor, self._critic = actor, critic
+        self._width = actor.memory.width + critic.memory.width
+        self.before = like.new_zeros(actor.num_robots, 0, self._width)
+        self.now = self.before
+
+    def act(self, obs: Tensor, elements: Tensor | None = None) -> Tensor:
+        """Outputs of the policies for observations (R, E, D), which are remembered from now on.
+
+        Frames are turned by ``elements`` (R, E), if there are any.
+        """
+        if obs.shape[1] != self.now.shape[1]:
+            self.now = self.now.new_zeros(len(obs), obs.shape[1], self._width)
+        self.before = self.now
+        of_actor, of_critic = parts_of(self.before)
+        found = [
+            net.remember(obs, past, elements)
+            for net, past in ((self._actor, of_actor), (self._critic, of_critic))
+        ]
+        self.now = torch.cat(found, dim=2)
+        outputs: Tensor = self._actor(obs, of_actor, None, elements)
+        return outputs
+
+    def forget(self, ended: Tensor | None = None) -> None:
+        """Forget everything where episodes ended, (E,) bool; None: in all worlds."""
+        if ended is None:
+            self.now = torch.zeros_like(self.now)
+        else:
+            self.now = self.now.masked_fill(ended.to(self.now.device).unsqueeze(1), 0.0)
+
+    def resume_state(self) -> dict[str, Tensor]:
+        """What is remembered; see `Resumable`."""
+        return {"now": self.now}
+
+    def load_resume_state(self, state: State) -> None:
+        """Go on from a state; see `Resumable`."""
+        robots = len(self.now)
+        found = take(state, "now", self.now.dtype, robots, None, self._width)
+        if bool((found.abs() > 1.0).any()):
+            raise ValueError("'now': must be in -1..=1")
+        self.now = found.to(self.now.device, copy=True)
+
+
+def parts_of(remembered: Tensor) -> tuple[Tensor, Tensor]:
+    """The memories of actors and of critics in (..., 2 W)."""
+    of_actor, of_critic = remembered.chunk(2, dim=-1)
+    return of_actor, of_critic
