@@ -49,6 +49,12 @@ CASES: dict[str, dict[str, Any]] = {
         "network.symmetry": "augmented",
         "train.stagger_starts": True,
     },
+    "mappo, memory": {
+        "train.method": "mappo",
+        "network.memory_width": 4,
+        "network.symmetry": "canonical",
+        "ppo.sequence_steps": 7,
+    },
     "ppo-inner, warm start, afterstates": {
         "train.method": "ppo-inner",
         "ppo.bootstrap": "afterstate",

@@ -12,6 +12,7 @@ from innerattn.learn import PPO, TD, Team, Transitions
 from innerattn.learn.advantage import ReturnScale
 from innerattn.learn.afterstate import AfterstateCritic
 from innerattn.learn.divergence import DivergenceError
+from innerattn.learn.recall import Recall
 from innerattn.learn.rollout import Rollout, standardised
 
 pytestmark = pytest.mark.timeout(120)
@@ -97,6 +98,30 @@ def test_ppo(together: Together, network: dict, count: int) -> None:
             learner.update(Rollout._make(tensor[:, part] for tensor in rows(seed)))
             for seed in range(3)
         ]
+        return learner.state(), torch.stack(found)
+
+    compare(together(count, work), alone.state(), torch.stack(metrics))
+
+
+def sequences(seed: int, width: int) -> Rollout:
+    """The same rows as eight sequences of three steps."""
+    source = torch.Generator().manual_seed(seed + 100)
+    count = ROWS // 3
+    remembered = torch.rand(ROBOTS, count, 2 * width, generator=source, dtype=torch.float64)
+    begins = torch.rand(3, count, generator=source) < 0.3
+    turns = torch.randint(8, (ROBOTS, ROWS), generator=source)
+    return rows(seed)._replace(recall=Recall(remembered, begins, turns))
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_ppo_with_a_memory(together: Together, count: int) -> None:
+    alone = ppo(memory_width=4, parameter_sharing="kind")
+    metrics = [alone.update(sequences(seed, 4)) for seed in range(3)]
+
+    def work(rank: int) -> tuple[dict, Tensor]:
+        learner = ppo(memory_width=4, parameter_sharing="kind")
+        own = torch.arange(ROWS // 3).tensor_split(count)[rank]
+        found = [learner.update(sequences(seed, 4).take(own)) for seed in range(3)]
         return learner.state(), torch.stack(found)
 
     compare(together(count, work), alone.state(), torch.stack(metrics))
