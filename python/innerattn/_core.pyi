@@ -245,6 +245,9 @@ class Batch:
     def charge(self) -> NDArray[np.float32]:
         """Charges of the robots as shares of their battery's capacity, (E, R)."""
 
+    def can_act(self) -> NDArray[np.bool_]:
+        """Whether commands move the robots now, (E, R)."""
+
     def load(self) -> NDArray[np.float32]:
         """Loads of the robots as shares of their full load, (E, R)."""
 

@@ -235,7 +235,8 @@ impl World {
     }
 
     /// Robots that neither drive nor help now, as bits: unavailable ones, and those whose battery is empty.
-    fn away(&self, rules: &Rules) -> u64 {
+    #[must_use]
+    pub fn away(&self, rules: &Rules) -> u64 {
         let empty = rules.energy.as_ref().map_or(0, |energy| energy.empty(&self.charges));
         self.faults.unavailable() | empty
     }

@@ -455,6 +455,12 @@ class Scenario(Model, Shown):
         return self.unavailable_robots == "leave"
 
     @property
+    def robots_may_stop(self) -> bool:
+        """Whether there are times at which a robot cannot act: unavailable, or without charge."""
+        faulty = any(fault.kind == "unavailable" for fault in self.faults)
+        return faulty or self.robots_leave or self.has_batteries
+
+    @property
     def has_arrivals(self) -> bool:
         """Whether victims arrive whatever becomes of others, so that some may find no slot."""
         return self.situation in ("poisson", "listed")

@@ -314,6 +314,22 @@ class BatchEnv(Shown):
             return np.ones((self.num_envs, self.num_robots), np.bool_)
         return np.asarray(self.fault_state()["unavailable"] < 1.0)
 
+    def can_act(self) -> NDArray[np.bool_]:
+        """Whether what each robot is told in the next step has an effect, (E, R) bool.
+
+        It has none on robots that are unavailable, and on those whose battery is empty.
+        """
+        return self._core.can_act()
+
+    def action_mask(self) -> NDArray[np.bool_]:
+        """Which discrete actions have an effect in the next step, (E, R, A) bool.
+
+        A robot that cannot act can only stay, which is action 0. See `can_act`.
+        """
+        mask = np.repeat(self.can_act()[..., None], NUM_DISCRETE_ACTIONS, axis=2)
+        mask[..., 0] = True
+        return mask
+
     def set_present(self, present: ArrayLike, mask: ArrayLike | None = None) -> None:
         """Let robots leave the arena and come back, from now to the end of the present episodes.
 

@@ -70,7 +70,9 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
     floats. An info holds ``reward_components`` (name to float; they add up to the reward) and
     ``rescues`` (number of this step's rescues in which the robot helped); where the scenario has
     deadlines also ``lost`` (number of victims that were lost in this step); and where victims
-    arrive by themselves ``turned_away`` (number of those that found no slot in this step).
+    arrive by themselves ``turned_away`` (number of those that found no slot in this step). Where a
+    robot may be unable to act, its info has an ``action_mask``, also after a reset: (5,) int8, 1
+    for the discrete actions that have an effect in the next step.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -127,7 +129,8 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
         self._started, self._over = True, False
         self.agents = self._present()
         self._screen.follow(self._env)
-        return self._by_agent(obs[0], self.agents), {agent: {} for agent in self.agents}
+        infos: dict[str, Info] = {agent: {} for agent in self.agents}
+        return self._by_agent(obs[0], self.agents), self._with_masks(infos)
 
     def step(
         self, actions: dict[str, Action]
@@ -162,7 +165,7 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
             self._of(step.reward[0].tolist(), seen),
             dict.fromkeys(seen, terminated),
             {one: truncated or one not in there for one in seen},
-            self._infos(step.rescues, seen),
+            self._with_masks(self._infos(step.rescues, seen)),
         )
 
     def checked_action(self, agent: str, action: Action) -> NDArray[Any]:
@@ -223,6 +226,14 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
 
     def _by_agent(self, rows: NDArray[np.float32], agents: Sequence[str]) -> dict[str, Obs]:
         return self._of([row.copy() for row in rows], agents)
+
+    def _with_masks(self, infos: dict[str, Info]) -> dict[str, Info]:
+        """Infos by agent, with action masks where there are any."""
+        if self.scenario.robots_may_stop and self.scenario.actions == "discrete":
+            masks = self._of(list(self._env.action_mask()[0].astype(np.int8)), list(infos))
+            for agent, info in infos.items():
+                info["action_mask"] = masks[agent]
+        return infos
 
     def _infos(self, rescues: NDArray[np.void], agents: Sequence[str]) -> dict[str, Info]:
         names = self._env.reward_component_names

@@ -33,7 +33,9 @@ class RescueEnv(gymnasium.Env[Any, Any]):
     The reward is the sum of all robots' rewards. An info holds ``robot_rewards``, (R,) float32, and
     ``rescues``, the number of this step's rescues; where the scenario has deadlines also ``lost``,
     the number of victims that were lost in it; and where victims arrive by themselves
-    ``turned_away``, the number of those that found no slot in it.
+    ``turned_away``, the number of those that found no slot in it. Where a robot may be unable to
+    act, infos have an ``action_mask``, also after a reset: (R, 5) int8, 1 for the discrete actions
+    that have an effect in the next step.
 
     Args:
         scenario: the world, or the name of a preset.
@@ -96,7 +98,7 @@ class RescueEnv(gymnasium.Env[Any, Any]):
         obs = self._env.reset(seed)
         self._going_on = True
         self._screen.follow(self._env)
-        return self._form.observed(obs[0]), {}
+        return self._form.observed(obs[0]), self._masks()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Let the team act for one control step.
@@ -118,7 +120,20 @@ class RescueEnv(gymnasium.Env[Any, Any]):
         if self._env.scenario.has_arrivals:
             info["turned_away"] = int(self._env.turned_away()[0])
         reward = float(team_rewards(step.reward)[0])
+        info |= self._masks()
         return self._form.observed(step.obs[0]), reward, terminated, truncated, info
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Which discrete actions have an effect in the next step, (R * 5,) bool, robot by robot.
+
+        It is what sb3-contrib's MaskablePPO asks for.
+        """
+        return self._env.action_mask().reshape(-1)
+
+    def _masks(self) -> dict[str, Any]:
+        if self.scenario.robots_may_stop and self.scenario.actions == "discrete":
+            return {"action_mask": self._env.action_mask()[0].astype(np.int8)}
+        return {}
 
     def state(self) -> NDArray[np.float32]:
         """The whole world, (S,) float32; `BatchEnv.state` has the columns."""

@@ -27,6 +27,8 @@ class RescueTorchRLEnv(EnvBase):  # type: ignore[misc]
     - ``(kind, "observation")``: (E, n, D) float32, columns `BatchEnv.observation_names`
     - ``(kind, "action")``: (E, n) int64, or (E, n, 2) float32 where actions are continuous
     - ``(kind, "reward")``: (E, n, 1) float32
+    - ``(kind, "action_mask")``: (E, n, 5) bool, True for the discrete actions that have an effect
+      in the next step; only where a robot may be unable to act
 
     At the root are ``state``, (E, S) float32 with the columns of `BatchEnv.state`, and ``done``,
     ``terminated`` and ``truncated``, (E, 1) bool. Ended worlds wait for a reset, which TorchRL's
@@ -83,6 +85,7 @@ class RescueTorchRLEnv(EnvBase):  # type: ignore[misc]
             self._robots.setdefault(robot.kind, []).append(index)
         names = worlds.robot_names
         self.group_map = {kind: [names[i] for i in own] for kind, own in self._robots.items()}
+        self._masked = scenario.robots_may_stop and scenario.actions == "discrete"
         self._make_specs()
 
     def _make_specs(self) -> None:
@@ -92,6 +95,9 @@ class RescueTorchRLEnv(EnvBase):  # type: ignore[misc]
             shape = torch.Size([*self.batch_size, len(own)])
             bounds = (bound.expand(*shape, -1).clone() for bound in (low, high))
             observations[kind] = Composite(observation=Bounded(*bounds), shape=shape)
+            if self._masked:
+                mask = Categorical(2, shape=(*shape, NUM_DISCRETE_ACTIONS), dtype=torch.bool)
+                observations[kind]["action_mask"] = mask
             actions[kind] = Composite(action=self._action_spec(shape), shape=shape)
             rewards[kind] = Composite(reward=Unbounded(shape=(*shape, 1)), shape=shape)
         bounds = (torch.from_numpy(bound) for bound in state_bounds(self.scenario))
@@ -144,8 +150,11 @@ class RescueTorchRLEnv(EnvBase):  # type: ignore[misc]
             },
             batch_size=self.batch_size,
         )
+        masks = torch.from_numpy(self._worlds.action_mask()) if self._masked else None
         for kind, own in self._robots.items():
             part = {"observation": torch.from_numpy(obs[:, own])}  # indexing by a list copies
+            if masks is not None:
+                part["action_mask"] = masks[:, own]
             seen.set(kind, TensorDict(part, batch_size=(self.num_envs, len(own))))
         return seen.to(self.device) if self.device is not None else seen
 

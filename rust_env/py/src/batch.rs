@@ -180,12 +180,17 @@ impl Batch {
 
     fn charge<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let energy = self.worlds.rules().energy.as_ref();
-        self.shares(py, |world, robot| energy.map_or(1.0, |one| one.share(robot, &world.charges)))
+        self.by_robot(py, |world, robot| energy.map_or(1.0, |one| one.share(robot, &world.charges)))
     }
 
     fn load<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let supplies = self.worlds.rules().supplies.as_ref();
-        self.shares(py, |world, robot| supplies.map_or(1.0, |one| one.share(robot, &world.loads)))
+        self.by_robot(py, |world, robot| supplies.map_or(1.0, |one| one.share(robot, &world.loads)))
+    }
+
+    fn can_act<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
+        let rules = self.worlds.rules();
+        self.by_robot(py, |world, robot| world.away(rules) >> robot & 1 == 0)
     }
 
     fn last_seen<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<i64>>> {
@@ -339,11 +344,11 @@ impl Batch {
     }
 
     /// A number of each robot, (E, R).
-    fn shares<'py>(
+    fn by_robot<'py, T: numpy::Element>(
         &self,
         py: Python<'py>,
-        of: impl Fn(&World, usize) -> f32,
-    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        of: impl Fn(&World, usize) -> T,
+    ) -> PyResult<Bound<'py, PyArray2<T>>> {
         let shape = [self.worlds.num_envs(), self.worlds.rules().team.len()];
         let of = |world| (0..shape[1]).map(|robot| of(world, robot)).collect::<Vec<_>>();
         gather(shape.iter().product(), self.worlds.worlds().flat_map(of))?.into_pyarray(py).reshape(shape)
