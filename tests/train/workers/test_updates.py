@@ -94,10 +94,8 @@ def test_ppo(together: Together, network: dict, count: int) -> None:
 
     def work(rank: int) -> tuple[dict, Tensor]:
         learner, part = ppo(**network), parts_of(rank, count)
-        found = [
-            learner.update(Rollout._make(tensor[:, part] for tensor in rows(seed)))
-            for seed in range(3)
-        ]
+        own = torch.arange(ROWS)[part]
+        found = [learner.update(rows(seed).take(own)) for seed in range(3)]
         return learner.state(), torch.stack(found)
 
     compare(together(count, work), alone.state(), torch.stack(metrics))
@@ -208,7 +206,7 @@ def test_afterstates_of_workers_that_have_more_or_fewer(
 def test_all_workers_find_the_number_that_one_of_them_has(together: Together, broken: int) -> None:
     def work(rank: int) -> tuple[str, str | None, int | None, bool]:
         learner = ppo()
-        some = Rollout._make(tensor[:, parts_of(rank, 2)].clone() for tensor in rows())
+        some = rows().take(torch.arange(ROWS)[parts_of(rank, 2)])
         if rank == broken:
             some.target[1, 2] = torch.inf
         before = learner.state()
