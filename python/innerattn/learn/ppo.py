@@ -209,9 +209,8 @@ class PPO(ClippedUpdate):
         step, env = steps.cut.nonzero(as_tuple=True)
         outputs = self.actor(steps.after, *recalls(steps.after_recall)[0])
         next_actions = self._actions.draw(outputs, self._noise)
-        next_value[step, :, env] = self._evaluate(steps.after, next_actions, steps.after_recall)[
-            1
-        ].t()
+        _, later = self._evaluate(steps.after, next_actions, steps.after_recall)
+        next_value[step, :, env] = later.t()
         if self._afterstates is not None and steps.arrivals is not None:
             next_value = self._afterstates.replaced(steps.arrivals, next_value, self._rate)
         advantage = generalised_advantage(
