@@ -159,8 +159,9 @@ class Study(LongCommand):
         from innerattn.studies.results import read_results
         from innerattn.studies.search.state import Watched
 
-        study = Watched(study or self._opened()).now().study
-        found, files = write_study(study, results := read_results(study))
+        now = Watched(study or self._opened()).now()
+        study = now.study
+        found, files = write_study(study, results := read_results(study), now)
         code = say_report(self, found, files)
         if self.publish is not None:
             publish_report(self, study, files[0], results.runs, self.publish)

@@ -30,7 +30,7 @@ from innerattn.studies.curves import LearningCurve, learning_curves
 from innerattn.studies.folder import StudyFolder
 from innerattn.studies.results import Mean, Result, Results, chosen, compare, means
 from innerattn.studies.search.optuna import write_journal
-from innerattn.studies.search.state import Watched
+from innerattn.studies.search.state import Now, Watched
 from innerattn.studies.space import Length, Value
 
 if TYPE_CHECKING:
@@ -41,7 +41,9 @@ _MOST_ROWS = 40
 """Rows of a figure of scores at most; a larger study has its tables."""
 
 
-def write_study(study: StudyFolder, results: Results) -> tuple[Found, list[Path]]:
+def write_study(
+    study: StudyFolder, results: Results, now: Now | None = None
+) -> tuple[Found, list[Path]]:
     """Write the report of a study into its folder; the same runs give the same bytes.
 
     Only the journal of Optuna holds times, and differs.
@@ -51,6 +53,7 @@ def write_study(study: StudyFolder, results: Results) -> tuple[Found, list[Path]
     Args:
         study: in its folder.
         results: its finished runs.
+        now: how far it is; None: looked up, if it has a search.
 
     Returns:
         What the report says, and its files.
@@ -59,7 +62,7 @@ def write_study(study: StudyFolder, results: Results) -> tuple[Found, list[Path]
         RunError: metrics of a run cannot be read.
         OSError: a file cannot be written; each is written whole or not at all.
     """
-    found = find(study, results)
+    found = find(study, results, now)
     budgets = {str(run.place["budget"]) for run in study.planned}
     folder = ReportFolder(study.path, "quick" if found.note else min(budgets))
     figures = _draw(folder, found) if find_spec("matplotlib") else {}
@@ -90,8 +93,8 @@ def _write_journal(found: SearchFound) -> list[str]:
     return [path.name]
 
 
-def find(study: StudyFolder, results: Results) -> Found:
-    """What the report of a study says.
+def find(study: StudyFolder, results: Results, now: Now | None = None) -> Found:
+    """What the report of a study says; arguments as of `write_study`.
 
     Raises:
         RunError: metrics of a run cannot be read.
@@ -101,7 +104,7 @@ def find(study: StudyFolder, results: Results) -> Found:
     notes = [note for budget in sorted(budgets) if (note := smoke_note(budget))]
     found = Found(study, study.states(), results, note=notes[0] if notes else None)
     if study.study.search is not None:
-        search = search_found(Watched(study).now(), finished)
+        search = search_found(now or Watched(study).now(), finished)
         return replace(found, search=search, compared=search.confirmed)
     return replace(
         found,
