@@ -242,6 +242,12 @@ class Batch:
     def observe(self) -> NDArray[np.float32]:
         """Present observations, (E, R, D)."""
 
+    def headings(self) -> NDArray[np.float32]:
+        """Angles from the x axis, counterclockwise, (E, R) [rad]; 0 of robots without a heading."""
+
+    def turn_rates(self) -> NDArray[np.float32]:
+        """Turn rates in the last step, counterclockwise, (E, R) [rad/s]; 0 without a heading."""
+
     def charge(self) -> NDArray[np.float32]:
         """Charges of the robots as shares of their battery's capacity, (E, R)."""
 
@@ -274,6 +280,15 @@ class Batch:
 
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
         """Put the robots at positions (E, R, 2), m, with velocities (E, R, 2), m/s."""
+
+    def set_headings(self, headings: ArrayLike) -> None:
+        """Let robots on wheels point along angles (E, R) [rad] from -pi to pi, without turning.
+
+        Raises:
+            TypeError: not an array of numbers.
+            ValueError: no robot has a heading, wrong shape, or an angle out of range (env and robot
+                are named).
+        """
 
     def set_victims(self, present: ArrayLike, tasks: ArrayLike, places: ArrayLike) -> None:
         """Move victims, and let new ones appear in empty slots.

@@ -5,6 +5,7 @@ mod buffers;
 mod shard;
 mod victims;
 
+use std::f32::consts::PI;
 use std::iter::zip;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -19,6 +20,7 @@ use crate::rules::Rules;
 use crate::scenario::Actions;
 use crate::snapshot;
 use crate::tasks::{Loss, Rescue};
+use crate::wheels::Heading;
 use crate::world::World;
 
 pub use buffers::StepBuffers;
@@ -329,6 +331,40 @@ impl Batch {
         for (world, (places, speeds)) in zip(worlds, rows) {
             world.positions = places.chunks_exact(2).map(vector).collect();
             world.velocities = speeds.chunks_exact(2).map(vector).collect();
+            world.headings.iter_mut().for_each(|heading| heading.turn_rate = 0.0);
+            world.perceive(&self.rules);
+        }
+        Ok(())
+    }
+
+    /// Lets robots on wheels point along `angles` (E × R), rad, without turning; other robots have no heading.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where no robot has wheels, for too many or too few numbers, and for angles beyond ±π
+    /// or not numbers; nothing has changed then.
+    pub fn set_headings(&mut self, angles: &[f32]) -> Result<()> {
+        let robots = self.rules.team.len();
+        let wanted = self.options.num_envs * robots;
+        let refuse = |value: String, rule: String| Err(Error::Argument { name: "headings", value, rule });
+        let Some(wheels) = &self.rules.wheels else {
+            return refuse(
+                format!("{} values", angles.len()),
+                "no robot of this scenario has a heading".into(),
+            );
+        };
+        if angles.len() != wanted {
+            return refuse(format!("{} values", angles.len()), format!("must be {wanted} numbers"));
+        }
+        if let Some(index) = angles.iter().position(|angle| !(-PI..=PI).contains(angle)) {
+            let (env, robot) = (index / robots, index % robots);
+            let value = format!("{} (env {env}, robot {robot})", angles[index]);
+            return refuse(value, format!("must be in -{PI}..={PI} rad"));
+        }
+        let worlds = self.shards.iter_mut().flat_map(|shard| &mut shard.worlds);
+        for (world, angles) in zip(worlds, angles.chunks_exact(robots)) {
+            for robot in wheels.robots() {
+                world.headings[robot] = Heading { angle: angles[robot], turn_rate: 0.0 };
+            }
             world.perceive(&self.rules);
         }
         Ok(())

@@ -148,12 +148,7 @@ impl FaultState {
     #[must_use]
     pub fn drive(&self, robot: usize, command: Vec2) -> (Vec2, f32) {
         let Some(levels) = self.levels.get(robot) else { return (command, 1.0) };
-        let mut drive = Drive::default();
-        for (spec, level) in SPECS.iter().zip(levels) {
-            if let Effect::Drive(change) = spec.effect {
-                change(&mut drive, *level);
-            }
-        }
+        let drive = drive_at(levels);
         if self.is_struck(Kind::Unavailable, robot) {
             return (Vec2::zeros(), drive.speed);
         }
@@ -164,6 +159,12 @@ impl FaultState {
             Vec2::new(cos * command.x - sin * command.y, sin * command.x + cos * command.y)
         };
         (turned * drive.force, drive.speed)
+    }
+
+    /// What is left of a robot's drive, whether it is available or not.
+    #[must_use]
+    pub fn drive_left(&self, robot: usize) -> Drive {
+        self.levels.get(robot).map_or_else(Drive::default, drive_at)
     }
 
     /// What is wrong with the senses of `robot`.
@@ -325,6 +326,17 @@ impl FaultState {
             }
         }
     }
+}
+
+/// What levels leave of a drive.
+fn drive_at(levels: &Levels) -> Drive {
+    let mut drive = Drive::default();
+    for (spec, level) in SPECS.iter().zip(levels) {
+        if let Effect::Drive(change) = spec.effect {
+            change(&mut drive, *level);
+        }
+    }
+    drive
 }
 
 /// The shares of steps that a robot's faults strike, by kind that strikes.

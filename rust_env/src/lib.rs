@@ -16,6 +16,8 @@ pub mod rng;
 
 pub mod robot;
 
+pub mod wheels;
+
 pub mod energy;
 pub mod place;
 pub mod tasks;

@@ -11,6 +11,7 @@ use crate::tasks::deadline::Deadlines;
 use crate::tasks::order::Order;
 use crate::tasks::service::Service;
 use crate::tasks::{Needs, Victim};
+use crate::wheels::{Heading, Wheels};
 use stores::Stores;
 
 /// The true state of a world, as far as robots can see it.
@@ -24,6 +25,8 @@ pub struct Scene<'a> {
     pub positions: &'a [Vec2],
     /// Velocities of the robots, m/s.
     pub velocities: &'a [Vec2],
+    /// Where robots on wheels point; none where no robot has any.
+    pub headings: &'a [Heading],
     /// Charges of the robots, J; none where no robot has a battery.
     pub charges: &'a [f64],
     /// Loads of the robots; none where no robot has one.
@@ -69,6 +72,7 @@ pub struct Layout {
     deadlines: Option<Deadlines>,
     order: Option<Order>,
     stores: Option<Stores>,
+    wheels: Option<Wheels>,
     sight: Option<Sight>,
     widths: Widths,
     /// The columns that never change, of all robots (R × D); zeros elsewhere.
@@ -80,7 +84,7 @@ pub struct Layout {
 struct Widths {
     /// Of one robot.
     robot: usize,
-    /// Of the ways to the nearest station and depot, behind a robot's own block.
+    /// Of the ways to the nearest station and depot and of the turn rate, behind a robot's own block.
     ways: usize,
     /// Of one teammate: those of a robot, whether it is seen, and for how long it was not.
     mate: usize,
@@ -88,6 +92,8 @@ struct Widths {
     victims_from: usize,
     /// Of one victim.
     victim: usize,
+    /// Of a heading, at the end of a robot's block, and of a bearing, at that of a victim's: two, or none.
+    heading: usize,
     /// Of a whole row.
     row: usize,
 }
@@ -109,6 +115,7 @@ impl Layout {
             deadlines: Deadlines::new(scenario),
             order: Order::new(scenario),
             stores: Stores::new(scenario),
+            wheels: Wheels::new(scenario),
             sight,
             widths: Widths::default(),
             abilities,
@@ -156,19 +163,21 @@ impl Layout {
 
     fn count_columns(&self) -> Widths {
         let stores = self.stores.as_ref();
-        let robot = self.stores_from() + stores.map_or(0, Stores::robot_width);
+        let heading = 2 * usize::from(self.wheels.is_some());
+        let robot = self.stores_from() + stores.map_or(0, Stores::robot_width) + heading;
         let limited = usize::from(self.sight.is_some());
         let victim = 3
             + self.abilities.len()
             + usize::from(self.services.is_some())
             + usize::from(self.deadlines.is_some())
             + usize::from(self.order.is_some())
-            + limited;
-        let ways = stores.map_or(0, Stores::ways_width);
+            + limited
+            + heading;
+        let ways = stores.map_or(0, Stores::ways_width) + usize::from(self.wheels.is_some());
         let mate = robot + 2 * limited;
         let victims_from = robot + ways + (self.robots - 1) * mate;
         let row = victims_from + self.victims * victim;
-        Widths { robot, ways, mate, victims_from, victim, row }
+        Widths { robot, ways, mate, victims_from, victim, heading, row }
     }
 
     /// The blocks of the robot itself and of its teammates.
@@ -185,8 +194,9 @@ impl Layout {
         self.widths.row
     }
 
-    /// The name of every column; units are m and m/s, flags are 0 or 1, abilities are 0 or 1 or
-    /// amounts, needs are counts or amounts, `charge`, `load`, `served`, `time_left` and `since_seen` are shares.
+    /// The name of every column; units are m, m/s and rad/s, flags are 0 or 1, abilities are 0 or 1 or
+    /// amounts, needs are counts or amounts, `charge`, `load`, `served`, `time_left` and `since_seen` are shares,
+    /// and `heading` is a vector of length 1.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let mut names = Vec::with_capacity(self.width());
@@ -209,8 +219,11 @@ impl Layout {
             }
             let stores = self.stores.as_ref();
             names.extend(stores.into_iter().flat_map(Stores::names).map(|name| format!("{who}.{name}")));
+            let heading = ["x", "y"].into_iter().filter(|_| self.wheels.is_some());
+            names.extend(heading.map(|axis| format!("{who}.heading.{axis}")));
             if robot == 0 {
                 names.extend(stores.into_iter().flat_map(Stores::names_of_ways));
+                names.extend(self.wheels.iter().map(|_| format!("{who}.turn_rate")));
             } else if self.sight.is_some() {
                 names.extend(["seen", "since_seen"].map(|name| format!("{who}.{name}")));
             }
@@ -223,6 +236,8 @@ impl Layout {
             names.extend(self.deadlines.iter().map(|_| format!("victim_{victim}.time_left")));
             names.extend(self.order.iter().map(|_| format!("victim_{victim}.blocked")));
             names.extend(self.sight.iter().map(|_| format!("victim_{victim}.since_seen")));
+            let bearing = ["ahead", "left"].into_iter().filter(|_| self.wheels.is_some());
+            names.extend(bearing.map(|side| format!("victim_{victim}.{side}")));
         }
         names
     }
@@ -278,7 +293,7 @@ impl Layout {
     /// charge, load.
     pub fn darken(&self, row: &mut [f32]) {
         row[..4].fill(0.0);
-        row[self.widths.robot..].fill(0.0);
+        row[self.widths.robot - self.widths.heading..].fill(0.0);
     }
 
     /// Writes what changes in a row, of a robot that takes itself to be elsewhere by these errors.
@@ -312,6 +327,28 @@ impl Layout {
             None => self.write_victims(scene, &scene.team[own], position, victims),
             Some(sight) => self.write_seen(sight, scene, own, position, victims),
         }
+        if let Some(wheels) = &self.wheels {
+            self.write_headings(wheels, scene, own, row);
+        }
+    }
+
+    /// Writes where robots point, how fast the robot itself turns, and how far ahead of it and to its left each
+    /// victim is that it sees.
+    #[inline(never)]
+    fn write_headings(&self, wheels: &Wheels, scene: Scene, own: usize, row: &mut [f32]) {
+        let others = (0..self.robots).filter(|other| *other != own);
+        let from = self.widths.robot - self.widths.heading;
+        for (block, robot) in self.blocks(row).zip(std::iter::once(own).chain(others)) {
+            let ahead = wheels.ahead(robot, scene.headings);
+            block[from..from + 2].copy_from_slice(&[ahead.x, ahead.y]);
+        }
+        let ahead = Vec2::new(row[from], row[from + 1]);
+        row[self.widths.robot + self.widths.ways - 1] = scene.headings[own].turn_rate;
+        let (width, place) = (self.widths.victim, 1 + self.abilities.len());
+        for victim in row[self.widths.victims_from..].chunks_exact_mut(width) {
+            let way = Vec2::new(victim[place], victim[place + 1]);
+            (victim[width - 2], victim[width - 1]) = (ahead.dot(&way), ahead.perp(&way));
+        }
     }
 
     /// Writes the victims that the robot sees, and for how long it has not seen each.
@@ -335,7 +372,8 @@ impl Layout {
             since[..last.len()].sort_unstable_by(f32::total_cmp);
         }
         let width = self.widths.victim;
-        rows.chunks_exact_mut(width).zip(since).for_each(|(row, since)| row[width - 1] = since);
+        let at = width - 1 - self.widths.heading;
+        rows.chunks_exact_mut(width).zip(since).for_each(|(row, since)| row[at] = since);
     }
 
     #[allow(clippy::inline_always)] // twice, and one of the two is the hottest path of all
@@ -375,7 +413,7 @@ impl Layout {
                     deadlines.share_left(victim, step);
             }
             if let Some(order) = &self.order {
-                row[self.widths.victim - 1 - usize::from(self.sight.is_some())] =
+                row[self.widths.victim - 1 - usize::from(self.sight.is_some()) - self.widths.heading] =
                     f32::from(u8::from(order.is_blocked(victim, victims)));
             }
         }
@@ -416,6 +454,7 @@ mod tests {
             tasks: &tasks,
             positions: &at,
             velocities: &moving,
+            headings: &[],
             charges: &[],
             loads: &[],
             victims: &victims,

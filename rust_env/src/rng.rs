@@ -23,6 +23,8 @@ pub enum Purpose {
     Arrivals = 6,
     /// Where robots come back.
     Returns = 7,
+    /// Where robots on wheels point when an episode starts.
+    Headings = 8,
 }
 
 /// A stream of random numbers whose state is its key and the count of words drawn.

@@ -20,7 +20,7 @@ pub struct Body {
     /// Speed cap, m/s.
     pub max_speed: f32,
     /// Speed gained by full drive in one control period, m/s: F/m · dt, or the speed cap where actions set
-    /// the velocity.
+    /// the velocity; 0 of a robot on [`crate::wheels::Wheels`].
     pub gain: f32,
     /// Share of the velocity that a control period begins with: none where actions set it.
     pub kept: f32,
@@ -47,10 +47,11 @@ pub(crate) fn bodies(scenario: &Scenario) -> Vec<Body> {
             gain: match robot.drive {
                 DriveMode::Force => (robot.drive_force_n / robot.mass_kg * scenario.dt_s) as f32,
                 DriveMode::Velocity => robot.max_speed_mps as f32,
+                DriveMode::Unicycle | DriveMode::Differential => 0.0,
             },
             kept: match robot.drive {
                 DriveMode::Force => 1.0 - scenario.damping as f32,
-                DriveMode::Velocity => 0.0,
+                DriveMode::Velocity | DriveMode::Unicycle | DriveMode::Differential => 0.0,
             },
             layer: layer(&robot.layer),
             abilities: robot.abilities.names().map(bit).fold(0, |mask, bit| mask | bit),

@@ -19,6 +19,7 @@ use crate::tasks::arrivals::Arrivals;
 use crate::tasks::deadline::Deadlines;
 use crate::tasks::order::Order;
 use crate::tasks::service::Service;
+use crate::wheels::Wheels;
 
 /// One of the scenario's faults, as numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,6 +59,8 @@ pub struct Rules {
     pub energy: Option<Energy>,
     /// Loads and depots, if any.
     pub supplies: Option<Supplies>,
+    /// Robots on wheels, if any.
+    pub wheels: Option<Wheels>,
     /// How far robots see, where something limits it.
     pub sight: Option<Sight>,
     /// The obstacles' forms.
@@ -113,6 +116,7 @@ impl Rules {
             order: Order::new(&scenario),
             energy: Energy::new(&scenario),
             supplies: Supplies::new(&scenario),
+            wheels: Wheels::new(&scenario),
             weights: Weights::new(&scenario),
             faults: processes(&scenario),
             sight,

@@ -12,6 +12,7 @@ mod sight;
 mod spot;
 mod task;
 mod validity;
+mod wheels;
 
 use serde::{Deserialize, Serialize};
 
@@ -82,9 +83,10 @@ pub enum Situation {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Actions {
-    /// 0 stay, 1 +x, 2 −x, 3 +y, 4 −y.
+    /// 0 stay, 1 +x, 2 −x, 3 +y, 4 −y; on wheels 0 stop, 1 forward, 2 backward, 3 turn left, 4 turn right.
     Discrete,
-    /// Two numbers in [−1, 1], the drive's direction and share; the vector's length is clipped to 1.
+    /// Two numbers in [−1, 1], the drive's direction and share; the vector's length is clipped to 1. On wheels
+    /// the shares of speed and turn rate, or of the speeds of the left and the right wheel.
     Continuous,
 }
 
@@ -97,6 +99,10 @@ pub enum DriveMode {
     Force,
     /// Its velocity, at once.
     Velocity,
+    /// The speed along its heading, and the turn rate.
+    Unicycle,
+    /// The speeds of its two wheels.
+    Differential,
 }
 
 /// Who is rewarded for a rescue.
@@ -181,12 +187,24 @@ pub struct Robot {
     /// Radius of its disc, m.
     #[serde(default = "default_radius_m")]
     pub radius_m: f64,
-    /// Force of its drive, N; of no use where it sets the velocity.
+    /// Force of its drive, N; of use where actions set a force.
     #[serde(default = "default_drive_force_n")]
     pub drive_force_n: f64,
     /// What actions set.
     #[serde(default)]
     pub drive: DriveMode,
+    /// Highest turn rate of a robot on wheels, rad/s.
+    #[serde(default = "wheels::default_max_turn_rad_s")]
+    pub max_turn_rad_s: f64,
+    /// Acceleration of a robot on wheels along its heading, or of each of its two wheels, m/s².
+    #[serde(default = "wheels::default_acceleration_m_s2")]
+    pub acceleration_m_s2: f64,
+    /// Acceleration of the turn rate of a unicycle, rad/s².
+    #[serde(default = "wheels::default_turn_acceleration_rad_s2")]
+    pub turn_acceleration_rad_s2: f64,
+    /// Distance of the two wheels of a differential drive, m; twice the radius if absent.
+    #[serde(default)]
+    pub wheel_base_m: Option<f64>,
     /// Robots of different layers do not touch each other.
     #[serde(default = "layers::default_layer")]
     pub layer: String,
@@ -322,6 +340,10 @@ impl Default for Scenario {
             radius_m: default_radius_m(),
             drive_force_n: default_drive_force_n(),
             drive: DriveMode::Force,
+            max_turn_rad_s: wheels::default_max_turn_rad_s(),
+            acceleration_m_s2: wheels::default_acceleration_m_s2(),
+            turn_acceleration_rad_s2: wheels::default_turn_acceleration_rad_s2(),
+            wheel_base_m: None,
             layer: layers::default_layer(),
             start_m: None,
             battery: None,

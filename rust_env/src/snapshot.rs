@@ -70,11 +70,12 @@ pub fn most_bytes(rules: &Rules, num_envs: usize) -> usize {
     let counts = 16 * 10;
     let places = 8 * (2 * robots + rules.solids.len()) + (1 + 3 * 5 + 8 + 5) * slots;
     let faults = 2 * 5 * rules.faults.len() + NUM_KINDS * (10 + 4 * robots) + robots * (11 + 4 * width);
+    let headings = if rules.wheels.is_some() { 10 + 8 * robots } else { 0 };
     let charges = if rules.energy.is_some() { 10 + 8 * robots } else { 0 };
     let loads = if rules.supplies.is_some() { 10 + 5 * robots } else { 0 };
     let sightings = rules.sight.as_ref().map_or(0, |sight| 10 + 5 * sight.numbers());
     let head = MAGIC.len() + 2 * 10 + rules.scenario.to_json().len() + CHECKSUM_BYTES;
-    head + num_envs * (counts + places + faults + charges + loads + sightings)
+    head + num_envs * (counts + places + faults + headings + charges + loads + sightings)
 }
 
 /// The image of `worlds`, which were made by `rules`.
@@ -90,6 +91,9 @@ pub fn save<'a>(rules: &Rules, num_envs: usize, worlds: impl Iterator<Item = &'a
         bytes = postcard::to_extend(world, bytes).expect("plain data serialises");
         if has_tail {
             bytes = postcard::to_extend(&Tail::of(world), bytes).expect("plain data serialises");
+        }
+        if rules.wheels.is_some() {
+            bytes = postcard::to_extend(&world.headings, bytes).expect("plain data serialises");
         }
         if rules.energy.is_some() {
             bytes = postcard::to_extend(&world.charges, bytes).expect("plain data serialises");
@@ -153,6 +157,9 @@ pub fn load(rules: &Rules, num_envs: usize, bytes: &[u8]) -> Result<Vec<World>> 
             }
             later = rest;
         }
+        if rules.wheels.is_some() {
+            (world.headings, later) = postcard::take_from_bytes(later).map_err(|_| unread())?;
+        }
         if rules.energy.is_some() {
             (world.charges, later) = postcard::take_from_bytes(later).map_err(|_| unread())?;
         }
@@ -209,6 +216,7 @@ fn misfit(rules: &Rules, world: &World) -> Option<&'static str> {
         ("victim_words", world.victim_words <= turns * rules.spawn.most_words()),
         ("positions", world.positions.len() == robots && within(&world.positions, arena)),
         ("velocities", world.velocities.len() == robots && within(&world.velocities, MAX_SET_SPEED_MPS)),
+        ("headings", rules.wheels.as_ref().is_none_or(|wheels| wheels.may_be(&world.headings))),
         ("obstacles", rules.spawn.may_be_obstacles(&world.obstacles)),
         ("victims", rules.spawn.may_be_victims(&world.victims, world.step, world.appeared)),
         ("services", world.victims.iter().flatten().all(served)),

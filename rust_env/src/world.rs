@@ -19,6 +19,7 @@ use crate::rules::Rules;
 use crate::scenario::{MAX_ROBOTS, Shaping, Unavailable};
 use crate::sight::{Sight, View};
 use crate::tasks::{Events, Victim};
+use crate::wheels::{Heading, Wheels};
 
 /// Whether and how an episode ended with a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,6 +66,9 @@ pub struct World {
     pub positions: Vec<Vec2>,
     /// Velocities of the robots, m/s.
     pub velocities: Vec<Vec2>,
+    /// Where robots on wheels point; none where no robot has any. Images have them apart.
+    #[serde(skip)]
+    pub headings: Vec<Heading>,
     /// Charges of the robots, J; none where no robot has a battery. Images have them apart.
     #[serde(skip)]
     pub charges: Vec<f64>,
@@ -100,6 +104,7 @@ impl World {
             victim_words: 0,
             positions: vec![Vec2::zeros(); rules.team.len()],
             velocities: vec![Vec2::zeros(); rules.team.len()],
+            headings: vec![],
             charges: vec![],
             loads: vec![],
             sightings: vec![],
@@ -118,13 +123,14 @@ impl World {
         let places = (2 * robots + rules.solids.len()) * size_of::<Vec2>();
         let victims = rules.scenario.num_victims() * size_of::<Option<Victim>>();
         let struck = if faults == 0 { 0 } else { FaultState::most_bytes(robots, rules.layout.width()) };
+        let headings = if rules.wheels.is_some() { robots * size_of::<Heading>() } else { 0 };
         let charges = if rules.energy.is_some() { robots * size_of::<f64>() } else { 0 };
         let loads = if rules.supplies.is_some() { robots * size_of::<u32>() } else { 0 };
         let sightings = rules.sight.as_ref().map_or(0, |sight| sight.numbers() * size_of::<u32>());
         // Allocators round up, and keep a little beside each list.
         size_of::<Self>()
-            + (places + victims + struck + charges + loads + sightings + 8 * faults) * 9 / 8
-            + 8 * 16
+            + (places + victims + struck + headings + charges + loads + sightings + 8 * faults) * 9 / 8
+            + 9 * 16
     }
 
     /// Starts `episode`: places everything anew from that episode's streams.
@@ -146,6 +152,10 @@ impl World {
         }
         if let Some(sight) = &rules.sight {
             sight.forget(&mut self.sightings);
+        }
+        if let Some(wheels) = &rules.wheels {
+            let mut stream = Stream::new(self.seed, self.stream, episode, Purpose::Headings);
+            wheels.point(&mut stream, &mut self.headings);
         }
         let mut stream = Stream::new(self.seed, self.stream, episode, Purpose::Start);
         rules.spawn.place_start(&mut stream, &mut self.obstacles, &mut self.positions);
@@ -171,6 +181,7 @@ impl World {
         let shaping = rules.weights.shaping;
         let (away, unable, absent) = (self.away(rules), self.unable(rules), self.absent(rules));
         let distance_before = if shaping == Shaping::None { 0.0 } else { self.distance(rules, unable) };
+        let rolling = rules.wheels.as_ref().map(|wheels| (wheels, copied(&self.velocities)));
         let mut effort = [0.0; MAX_ROBOTS];
         for (robot, body) in rules.team.iter().enumerate() {
             let is_away = away >> robot & 1 == 1;
@@ -180,11 +191,10 @@ impl World {
             let (drive, cap) = self.faults.drive(robot, drive);
             self.velocities[robot] = body.driven(self.velocities[robot], drive, cap);
         }
-        let before = rules.energy.as_ref().map(|_| {
-            let mut places = [Vec2::zeros(); MAX_ROBOTS];
-            places[..self.positions.len()].copy_from_slice(&self.positions);
-            places
-        });
+        if let Some((wheels, velocities)) = &rolling {
+            self.roll(wheels, velocities, commands, env * rules.team.len(), away, &mut effort);
+        }
+        let before = rules.energy.as_ref().map(|_| copied(&self.positions));
         let touched = rules.physics.advance(
             workspace,
             &mut self.positions,
@@ -232,6 +242,28 @@ impl World {
         };
         reward::write(&rules.weights, &happened, components, reward);
         ending
+    }
+
+    /// Gives robots on wheels the velocities and headings of this step, from their `velocities` before it. Their
+    /// actions begin at number `first` of the commands.
+    #[inline(never)]
+    fn roll(
+        &mut self,
+        wheels: &Wheels,
+        velocities: &[Vec2],
+        commands: Commands,
+        first: usize,
+        away: u64,
+        effort: &mut [f32],
+    ) {
+        for robot in wheels.robots() {
+            let is_away = away >> robot & 1 == 1;
+            let shares = if is_away { Vec2::zeros() } else { wheels.shares(robot, commands, first + robot) };
+            effort[robot] = shares.norm_squared();
+            let left = self.faults.drive_left(robot);
+            (self.velocities[robot], self.headings[robot]) =
+                wheels.driven(robot, self.headings[robot], velocities[robot], shares, left);
+        }
     }
 
     /// Robots that neither drive nor help now, as bits: unavailable ones, and those whose battery is empty.
@@ -292,6 +324,9 @@ impl World {
         let robots = self.positions.len();
         for robot in (0..robots).filter(|robot| (before | absent) >> robot & 1 == 1) {
             self.velocities[robot] = Vec2::zeros();
+            if let Some(heading) = self.headings.get_mut(robot) {
+                heading.turn_rate = 0.0;
+            }
         }
         let mut elsewhere = before | absent;
         for robot in (0..robots).filter(|robot| (before & !absent) >> robot & 1 == 1) {
@@ -363,6 +398,7 @@ impl World {
             tasks: &rules.tasks,
             positions: &self.positions,
             velocities: &self.velocities,
+            headings: &self.headings,
             charges: &self.charges,
             loads: &self.loads,
             victims: &self.victims,
@@ -376,4 +412,11 @@ impl World {
     pub fn now(&self) -> Moment {
         Moment { seed: self.seed, stream: self.stream, episode: self.episode, step: self.step }
     }
+}
+
+/// The vectors of all robots, as they are now.
+fn copied(vectors: &[Vec2]) -> [Vec2; MAX_ROBOTS] {
+    let mut copy = [Vec2::zeros(); MAX_ROBOTS];
+    copy[..vectors.len()].copy_from_slice(vectors);
+    copy
 }

@@ -13,6 +13,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+import rolling
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
@@ -26,8 +27,9 @@ DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], dtype=np.float
 @dataclass
 class State:
     """E worlds: places and velocities (E, R, 2), obstacles (E, O, 2), victims (E, V) and faults
-    (E, R) structured, steps done (E,), charges and loads as shares (E, R), and the steps at which
-    robots last saw each robot and each slot's victim (E, R, R + V)."""
+    (E, R) structured, steps done (E,), charges and loads as shares (E, R), the steps at which
+    robots last saw each robot and each slot's victim (E, R, R + V), and headings and turn rates
+    (E, R)."""
 
     positions: Array
     velocities: Array
@@ -38,6 +40,8 @@ class State:
     charge: Array
     load: Array
     last_seen: NDArray[np.int64]
+    headings: Array
+    turn_rates: Array
 
     @property
     def available(self) -> Bools:
@@ -68,6 +72,8 @@ class Stepper:
         self.radii = np.array([robot.radius_m for robot in robots])
         self.max_speed = np.array([robot.max_speed_mps for robot in robots])
         self.sets_velocity = np.array([robot.drive == "velocity" for robot in robots])
+        drives = [robot.drive for robot in robots]
+        self.rolls = np.array([drive in ("unicycle", "differential") for drive in drives])
         self.layers = np.array([robot.layer for robot in robots])
         self.acceleration = np.array([robot.drive_force_n / robot.mass_kg for robot in robots])
         self.abilities = sorted({ability for robot in robots for ability in robot.abilities})
@@ -158,15 +164,19 @@ class Stepper:
         return np.where(self.full > 0, loads / np.maximum(self.full, 1), 1.0), unsure.any(-1)
 
     def drive(self, actions: NDArray[Any]) -> Array:
-        """Directions whose length is the share of full force, (E, R, 2)."""
+        """Directions whose length is the share of full force, (E, R, 2), or of robots on wheels
+        the shares ahead and to the left."""
         if self.scenario.actions == "discrete":
             return np.asarray(DIRECTIONS[actions])
         length = np.linalg.norm(actions.astype(np.float64), axis=-1, keepdims=True)
-        return np.asarray(actions / np.maximum(length, 1.0))
+        clipped = actions / np.maximum(length, 1.0)
+        return np.where(self.rolls[:, None], rolling.asked(self, actions.astype(float)), clipped)
 
     def fly(self, state: State, drive: Array) -> tuple[Array, Array]:
         """Places and velocities after a period in which nothing touches."""
         dt, faults = self.scenario.dt_s, state.faults
+        able = state.able[..., None]
+        rolled, self.turned, self.rates = rolling.roll(self, state, drive * able)
         sin, cos = (f(faults["heading_bias"].astype(np.float64)) for f in (np.sin, np.cos))
         x, y = drive[..., 0], drive[..., 1]
         drive = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
@@ -180,6 +190,7 @@ class Stepper:
         too_fast = speed > most
         factor = np.where(too_fast, most / np.where(too_fast, speed, 1.0), 1.0)
         velocities = velocities * factor[..., None]
+        velocities = np.where(self.rolls[:, None], rolled, velocities)
         positions = state.positions + velocities * dt
         if self.scenario.engine == "none":
             wall = self.scenario.arena_half_width_m - self.radii[:, None]
@@ -353,15 +364,23 @@ class Stepper:
         deaf = (state.faults["lost_communication"] == 1)[..., None]
         motion = np.concatenate([state.positions, state.velocities], axis=-1)
         blocks = [np.where(dark, 0.0, motion), known]
+        ahead = np.zeros((envs, robots, 0))
+        if self.rolls.any():
+            ahead = np.stack([np.cos(state.headings), np.sin(state.headings)], -1)
+            ahead = ahead * self.rolls[:, None] * there
+            blocks.append(np.where(dark, 0.0, ahead))
         for spots in (self.scenario.stations, self.scenario.depots):
             if spots:
                 ways = np.array([one.position_m for one in spots]) - state.positions[:, :, None]
                 nearest = np.linalg.norm(ways, axis=-1).argmin(-1)
                 way = np.take_along_axis(ways, nearest[..., None, None], 2)[:, :, 0]
                 blocks.append(np.where(dark, 0.0, way))
+        if self.rolls.any():
+            blocks.append(np.where(dark, 0.0, state.turn_rates[..., None]))
         if robots > 1:
             relative = (motion[:, self.others] - motion[:, :, None]) * there[:, self.others]
-            teammates = np.concatenate([relative, known[:, self.others]], axis=-1)
+            others = known[:, self.others], ahead[:, self.others]
+            teammates = np.concatenate([relative, *others], axis=-1)
             teammates = np.where(deaf[..., None], 0.0, teammates)
             if self.scenario.has_limited_sight:
                 seen, since = (
@@ -405,7 +424,13 @@ class Stepper:
             sort = [np.take_along_axis(values, order, axis=-1) for values in (rank, key)]
             tied = (np.diff(sort[0], axis=-1) == 0) & (np.diff(sort[1], axis=-1) < 1e-5)
             unsure = (tied & (sort[0][..., 1:] < 2)).any(-1)
-        blocks = np.concatenate([blocks, since], axis=-1)
+        bearing = np.zeros((*distance.shape, 0))
+        if self.rolls.any():
+            x, y = np.moveaxis(blocks[..., 1 + needs.shape[-1] :][..., :2], -1, 0)
+            cos, sin = (f(state.headings)[..., None] for f in (np.cos, np.sin))
+            bearing = np.stack([cos * x + sin * y, cos * y - sin * x], -1)
+            bearing = bearing * self.rolls[:, None, None]
+        blocks = np.concatenate([blocks, since, bearing], axis=-1)
         return blocks.reshape(envs, robots, -1), unsure
 
     def _times_seen(self, state: State) -> list[Array]:

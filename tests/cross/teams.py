@@ -214,6 +214,23 @@ def with_layers(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     return scenario.replace(robots=tuple(robots), obstacles=tuple(obstacles))
 
 
+def with_wheels(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, most of whose robots are on wheels of unlike limits."""
+    drives = ("force", "velocity", "unicycle", "unicycle", "differential", "differential")
+    most = 3.1 / scenario.dt_s
+    robots = [
+        robot.replace(
+            drive=drives[2 + rng.integers(4)] if index == 0 else drives[rng.integers(6)],
+            max_turn_rad_s=float(rng.choice((1.0, 4.0, most))),
+            acceleration_m_s2=float(rng.uniform(1.0, 20.0)),
+            turn_acceleration_rad_s2=float(rng.uniform(5.0, 200.0)),
+            wheel_base_m=None if rng.random() < 0.5 else robot.radius_m * rng.uniform(0.5, 2.0),
+        )
+        for index, robot in enumerate(scenario.robots)
+    ]
+    return scenario.replace(robots=tuple(robots))
+
+
 def with_sight(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     """The same, most of whose robots see only so far, and where obstacles may hide things."""
     half = scenario.arena_half_width_m

@@ -18,6 +18,7 @@ from teams import (
     with_order,
     with_sight,
     with_times,
+    with_wheels,
 )
 from touching import may_touch
 from who_appears import EXACT, check_arrivals, check_victims
@@ -48,6 +49,8 @@ def state_of(env: BatchEnv) -> State:
         env.charge().astype(np.float64),
         env.load().astype(np.float64),
         env.last_seen(),
+        env.headings().astype(np.float64),
+        env.turn_rates().astype(np.float64),
     )
 
 
@@ -68,6 +71,9 @@ def random_actions(rng: np.random.Generator, scenario: Scenario, state: State) -
         used_up = state.load == 0
         goal = np.where(used_up[..., None], depot.position_m - state.positions, goal)
         toward |= used_up
+    cos, sin = np.cos(state.headings), np.sin(state.headings)  # 1 and 0 without wheels
+    x, y = goal[..., 0], goal[..., 1]
+    goal = np.stack([cos * x + sin * y, cos * y - sin * x], -1)
     if scenario.actions == "continuous":
         wander = rng.uniform(-1, 1, (*shape, 2))
         return np.where(toward[..., None], np.clip(3 * goal, -1, 1), wander).astype(np.float32)
@@ -124,6 +130,10 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         free = ~may_touch(plain, before, velocities)
         assert_close(after.positions[free], positions[free], "positions")
         assert_close(after.velocities[free], velocities[free], "velocities", scale=3.0)
+        missed = (after.headings - plain.turned + np.pi) % (2 * np.pi) - np.pi
+        assert_close(missed[:, plain.rolls], np.zeros_like(missed[:, plain.rolls]), "headings", 3.0)
+        assert_close(after.turn_rates[:, plain.rolls], plain.rates[:, plain.rolls], "turn rates", 60.0)
+        seen["turned"] += int((abs(after.headings - before.headings) > 0.1).sum())
 
         charge, unsure_charge = plain.charged(before, after.positions)
         assert_close(after.charge[~unsure_charge], charge[~unsure_charge], "charges")
@@ -203,7 +213,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
         assert (after.faults[~ended] == before.faults[~ended]).all()
         rows, tied = plain.observations(after)
         times = scenario.has_services + scenario.has_deadlines + scenario.has_order
-        times += scenario.has_limited_sight
+        times += scenario.has_limited_sight + 2 * scenario.has_wheels
         block = rows.shape[-1] - before.victims.shape[1] * (3 + len(plain.abilities) + times)
         scale = scenario.arena_half_width_m
         assert_close(result.obs[..., :block], rows[..., :block], "observation", scale)
@@ -374,6 +384,23 @@ def test_worlds_that_end_when_all_is_done_are_as_the_plain_stepper_says(chunk: i
 
     total = compare_some(rng, changed)
     for what in ("rescues", "appeared", "lost", "done"):
+        assert total[what] > 50, (what, total)
+
+
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_with_wheels_are_as_the_plain_stepper_says(chunk: int) -> None:
+    rng = np.random.default_rng(1100 + chunk)
+
+    def changed(scenario: Scenario) -> Scenario:
+        scenario = with_wheels(scenario, rng).replace(
+            unavailable_robots=("stay", "leave")[rng.integers(2)]
+        )
+        if rng.random() < 0.3:
+            return with_sight(scenario, rng)
+        return with_batteries(scenario, rng) if rng.random() < 0.3 else scenario
+
+    total = compare_some(rng, changed)
+    for what in ("free", "touched", "rescues", "appeared", "turned"):
         assert total[what] > 50, (what, total)
 
 

@@ -47,10 +47,27 @@ class Robot(Model):
     drive_force_n: Annotated[float, Told(0.0, 1e5)] = Field(
         5.0, description="force of a full command, where actions set a force [N]"
     )
-    drive: Annotated[Literal["force", "velocity"], ADDED_LATER] = Field(
+    drive: Annotated[Literal["force", "velocity", "unicycle", "differential"], ADDED_LATER] = Field(
         "force",
         description="what actions set; force: it takes time until the robot is fast and until it "
-        "stands; velocity: a share of max_speed_mps, at once",
+        "stands; velocity: a share of max_speed_mps, at once; unicycle: the speed along its "
+        "heading and the turn rate; differential: the speeds of its two wheels",
+    )
+    max_turn_rad_s: Annotated[float, ADDED_LATER, Told(0.01, 1e4)] = Field(
+        4.0,
+        description="highest turn rate of a robot on wheels, at most half a circle in a control "
+        "period [rad/s]",
+    )
+    acceleration_m_s2: Annotated[float, ADDED_LATER, Told(0.01, 1e5)] = Field(
+        5.0, description="acceleration of a unicycle, and of each wheel of a differential [m/s^2]"
+    )
+    turn_acceleration_rad_s2: Annotated[float, ADDED_LATER, Told(0.01, 1e6)] = Field(
+        20.0, description="acceleration of the turn rate of a unicycle [rad/s^2]"
+    )
+    wheel_base_m: Annotated[float | None, ADDED_LATER] = Field(
+        None,
+        description="distance of the two wheels of a differential, 0.005 to 2 radius_m [m]; "
+        "None: 2 radius_m",
     )
     layer: Annotated[str, ADDED_LATER] = Field(
         "ground",
@@ -89,11 +106,25 @@ class Robot(Model):
         """Speed that a full command adds in a control period of ``dt_s``, up to its limit [m/s]."""
         if self.drive == "velocity":
             return self.max_speed_mps
+        if self.has_wheels:
+            return self.acceleration_m_s2 * dt_s
         return self.drive_force_n / self.mass_kg * dt_s
 
     def kept(self, damping: float) -> float:
         """Share of its velocity that a control period begins with."""
+        if self.has_wheels:
+            return 1.0
         return 0.0 if self.drive == "velocity" else 1.0 - damping
+
+    @property
+    def has_wheels(self) -> bool:
+        """Whether it drives along a heading."""
+        return self.drive in ("unicycle", "differential")
+
+    @property
+    def track_m(self) -> float:
+        """Distance of its two wheels [m]."""
+        return 2.0 * self.radius_m if self.wheel_base_m is None else self.wheel_base_m
 
 
 class Obstacle(Model):
@@ -289,8 +320,9 @@ class Scenario(Model, Shown):
     )
     actions: Literal["discrete", "continuous"] = Field(
         "discrete",
-        description="discrete: stay, +x, -x, +y, -y; continuous: a force in the plane, or a "
-        "velocity, as the robot's drive says",
+        description="discrete: stay, +x, -x, +y, -y, on wheels stop, forward, backward, turn left, "
+        "turn right; continuous: a force or a velocity in the plane, speed and turn rate, or the "
+        "speeds of the left and right wheel, as the robot's drive says",
     )
     rescue_credit: Literal["helpers", "team"] = Field(
         "helpers", description="who is rewarded for a rescue"
@@ -442,6 +474,11 @@ class Scenario(Model, Shown):
     def has_limited_sight(self) -> bool:
         """Whether there is something in an arena that some robot does not see."""
         return self.occlusion or any(robot.sight_m is not None for robot in self.robots)
+
+    @property
+    def has_wheels(self) -> bool:
+        """Whether some robot has a heading."""
+        return any(robot.has_wheels for robot in self.robots)
 
     @property
     def layers(self) -> tuple[str, ...]:

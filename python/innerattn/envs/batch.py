@@ -147,8 +147,9 @@ class BatchEnv(Shown):
         """Do one control step in every world.
 
         Args:
-            actions: (E, R) integers (0 stay, 1 +x, 2 -x, 3 +y, 4 -y), or (E, R, 2) floats in
-                [-1, 1] when the scenario's actions are continuous.
+            actions: (E, R) integers (0 stay, 1 +x, 2 -x, 3 +y, 4 -y; on wheels 0 stop, 1 forward,
+                2 backward, 3 turn left, 4 turn right), or (E, R, 2) floats in [-1, 1] when the
+                scenario's actions are continuous.
 
         The actions are copied before they are checked: no other thread can change them on the way.
 
@@ -163,7 +164,7 @@ class BatchEnv(Shown):
         return Step._make(self._core.step(actions))
 
     def observation_names(self) -> list[str]:
-        """Names of the D columns of an observation; units are m and m/s."""
+        """Names of the D columns of an observation; units are m, m/s and rad/s."""
         return self._core.observation_names()
 
     def observe(self) -> NDArray[np.float32]:
@@ -181,6 +182,20 @@ class BatchEnv(Shown):
     def velocities(self) -> NDArray[np.float32]:
         """Velocities of the robots, (E, R, 2) float32, m/s, world frame."""
         return self._core.velocities()
+
+    def headings(self) -> NDArray[np.float32]:
+        """Where robots on wheels point, (E, R) float32, rad, -pi to pi.
+
+        An angle from the x axis, counterclockwise; 0 for a robot without a heading.
+        """
+        return self._core.headings()
+
+    def turn_rates(self) -> NDArray[np.float32]:
+        """How fast robots turned in the last step, (E, R) float32, rad/s, counterclockwise.
+
+        It is 0 for a robot without a heading.
+        """
+        return self._core.turn_rates()
 
     def charge(self) -> NDArray[np.float32]:
         """Charges of the robots, (E, R) float32, shares of their battery's capacity.
@@ -253,7 +268,8 @@ class BatchEnv(Shown):
     def state(self) -> NDArray[np.float32]:
         """The whole of each world, (E, S) float32, world frame, for centralised critics.
 
-        Columns are `state_names`: for each robot x, y [m] and x, y velocity [m/s], and its charge
+        Columns are `state_names`: for each robot x, y [m] and x, y velocity [m/s], where some robot
+        has a heading its x, y (of length 1; zeros of others) and turn rate [rad/s], and its charge
         and load as shares where some robots have a battery and a load; for each victim
         slot one column per task (1 where such a victim is present), x, y [m], and where the
         scenario has them the share of its service that it has had, the time that it has left as a
@@ -269,6 +285,8 @@ class BatchEnv(Shown):
             self.scenario,
             self.charge(),
             self.load(),
+            self.headings(),
+            self.turn_rates(),
         )
 
     def state_names(self) -> list[str]:
@@ -362,6 +380,8 @@ class BatchEnv(Shown):
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
         """Put the robots somewhere else, for studies of motion; rules and victims are left alone.
 
+        Robots on wheels keep their headings, and turn no more.
+
         Args:
             positions: (E, R, 2) integers or floats, m, inside the arena.
             velocities: (E, R, 2) integers or floats, m/s, at most 10,000 on each axis.
@@ -372,6 +392,20 @@ class BatchEnv(Shown):
                 changed then.
         """
         self._core.set_motion(positions, velocities)
+
+    def set_headings(self, headings: ArrayLike) -> None:
+        """Let robots on wheels point elsewhere, without turning; places and velocities stay.
+
+        Args:
+            headings: (E, R) integers or floats, rad, -pi to pi. What is given for a robot without a
+                heading is not used.
+
+        Raises:
+            TypeError: wrong dtype, a masked array, or no array at all.
+            ValueError: no robot has a heading, wrong shape, or an angle out of range (env and robot
+                are named). Nothing has changed then.
+        """
+        self._core.set_headings(headings)
 
     def set_victims(self, victims: NDArray[np.void]) -> None:
         """Move victims, change their tasks, and let new ones appear in empty slots.

@@ -45,6 +45,8 @@ def state_bounds(scenario: Scenario) -> Bounds:
     columns: list[Range] = []
     for speed in _most_speeds(scenario):
         columns += [place, place, _both_ways(speed), _both_ways(speed)]
+        if scenario.has_wheels:
+            columns += [_both_ways(1.0), _both_ways(1.0), _both_ways(_most_turn(scenario))]
         columns += [_FLAG] * (scenario.has_batteries + scenario.has_loads)
     for _ in range(scenario.num_victims):
         columns += [_FLAG] * len(scenario.tasks) + [place, place]
@@ -68,9 +70,11 @@ def _observation_columns(scenario: Scenario, own: int, speeds: list[float]) -> I
         if scenario.observe_faults:
             yield from (bounds for kind, bounds in _FAULT_RANGES.items() if kind != "unavailable")
         yield from [_FLAG] * (scenario.has_batteries + scenario.has_loads)
+        yield from [_both_ways(1.0)] * (2 * scenario.has_wheels)  # heading
         if robot == own:
             spots = bool(scenario.stations) + bool(scenario.depots)
             yield from [_both_ways(2 * half + far)] * (2 * spots)
+            yield from [_both_ways(_most_turn(scenario))] * scenario.has_wheels
         elif scenario.has_limited_sight:
             yield from (_FLAG, _FLAG)  # whether it is seen, and the time since then
     for _ in range(scenario.num_victims):
@@ -79,6 +83,8 @@ def _observation_columns(scenario: Scenario, own: int, speeds: list[float]) -> I
             yield 0.0, _most(scenario.tasks, ability)
         yield from (_both_ways(2 * half + far), _both_ways(2 * half + far))
         yield from [_FLAG] * (_columns_by_choice(scenario) + scenario.has_limited_sight)
+        # From a heading a victim is as far ahead, or aside, as it is away.
+        yield from [_both_ways(sqrt(2.0) * (2 * half + far))] * (2 * scenario.has_wheels)
 
 
 def _most(ones: Sequence[Robot | Task], ability: str) -> float:
@@ -89,6 +95,11 @@ def _most(ones: Sequence[Robot | Task], ability: str) -> float:
 def _columns_by_choice(scenario: Scenario) -> int:
     """How many columns of a victim are there only where the scenario asks for them."""
     return scenario.has_services + scenario.has_deadlines + scenario.has_order
+
+
+def _most_turn(scenario: Scenario) -> float:
+    """Highest turn rate of any robot [rad/s]."""
+    return max(robot.max_turn_rad_s for robot in scenario.robots if robot.has_wheels)
 
 
 def _most_speeds(scenario: Scenario) -> list[float]:

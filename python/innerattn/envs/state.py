@@ -12,12 +12,13 @@ from innerattn.envs.aligned import aligned_empty
 
 
 def state_names(scenario: Scenario) -> list[str]:
-    """Names of the S columns of `world_states`; units are m and m/s, shares have none."""
+    """Names of the S columns of `world_states`; units are m, m/s and rad/s, shares have none."""
     robots = [
         f"{robot.name}.{quantity}"
         for robot in scenario.robots
         for quantity in (
             *("position.x", "position.y", "velocity.x", "velocity.y"),
+            *(("heading.x", "heading.y", "turn_rate") * scenario.has_wheels),
             *["charge"] * scenario.has_batteries,
             *["load"] * scenario.has_loads,
         )
@@ -45,6 +46,8 @@ def world_states(
     scenario: Scenario,
     charge: NDArray[np.float32],
     load: NDArray[np.float32],
+    headings: NDArray[np.float32],
+    turn_rates: NDArray[np.float32],
 ) -> NDArray[np.float32]:
     """The states of E worlds.
 
@@ -57,6 +60,8 @@ def world_states(
         scenario: the worlds' description.
         charge: (E, R) charges of the robots, shares.
         load: (E, R) loads of the robots, shares.
+        headings: (E, R) angles of the robots [rad].
+        turn_rates: (E, R) [rad/s].
 
     Returns:
         (E, S) float32, columns `state_names`.
@@ -73,8 +78,13 @@ def world_states(
     if scenario.has_order:
         times.append(victims["blocked"][..., None])
     stores = [charge[..., None]] * scenario.has_batteries + [load[..., None]] * scenario.has_loads
+    pointing = []
+    if scenario.has_wheels:
+        wheels = np.array([robot.has_wheels for robot in scenario.robots], np.float32)
+        ahead = np.stack([np.cos(headings), np.sin(headings)], -1) * wheels[:, None]
+        pointing = [ahead, turn_rates[..., None]]
     parts = [
-        np.concatenate([positions, velocities, *stores], axis=2),
+        np.concatenate([positions, velocities, *pointing, *stores], axis=2),
         np.concatenate([is_task & present[..., None], places, *times], axis=2),
         obstacles,
     ]

@@ -23,6 +23,8 @@ class WorldState(NamedTuple):
         charge: (E, R) float32 charges as shares; None where no robot has a battery.
         load: (E, R) float32 loads as shares; None where no robot has one.
         last_seen: (E, R, R + V) int64, see `BatchEnv.last_seen`; None where no sight is limited.
+        headings: (E, R, 2) float32, angles [rad] and turn rates [rad/s] of robots on wheels; None
+            where no robot has a heading.
     """
 
     positions: NDArray[np.float32]
@@ -33,6 +35,7 @@ class WorldState(NamedTuple):
     charge: NDArray[np.float32] | None = None
     load: NDArray[np.float32] | None = None
     last_seen: NDArray[np.int64] | None = None
+    headings: NDArray[np.float32] | None = None
 
     @classmethod
     def of(cls, env: BatchEnv) -> Self:
@@ -46,6 +49,7 @@ class WorldState(NamedTuple):
             env.charge() if env.scenario.has_batteries else None,
             env.load() if env.scenario.has_loads else None,
             env.last_seen() if env.scenario.has_limited_sight else None,
+            np.stack([env.headings(), env.turn_rates()], -1) if env.scenario.has_wheels else None,
         )
 
 

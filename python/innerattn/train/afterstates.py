@@ -30,4 +30,5 @@ def afterstates(
     moving = env.positions()[worlds], env.velocities()[worlds]
     others = env.obstacles()[worlds], env.step_counts()[worlds]
     stores = env.charge()[worlds], env.load()[worlds]
-    return worlds, world_states(*moving, victims, *others, env.scenario, *stores)
+    pointing = env.headings()[worlds], env.turn_rates()[worlds]
+    return worlds, world_states(*moving, victims, *others, env.scenario, *stores, *pointing)

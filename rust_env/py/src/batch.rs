@@ -178,6 +178,14 @@ impl Batch {
         self.vectors(py, robots, |world| &world.positions)
     }
 
+    fn headings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        self.shares(py, |world, robot| world.headings.get(robot).map_or(0.0, |heading| heading.angle))
+    }
+
+    fn turn_rates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        self.shares(py, |world, robot| world.headings.get(robot).map_or(0.0, |heading| heading.turn_rate))
+    }
+
     fn charge<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let energy = self.worlds.rules().energy.as_ref();
         self.by_robot(py, |world, robot| energy.map_or(1.0, |one| one.share(robot, &world.charges)))
@@ -266,6 +274,14 @@ impl Batch {
         Door::numbers("positions", &shape).read_f32(positions, &mut places)?;
         Door::numbers("velocities", &shape).read_f32(velocities, &mut speeds)?;
         self.worlds.set_motion(&places, &speeds).map_err(|error| raised(py, &error))
+    }
+
+    fn set_headings(&mut self, py: Python, headings: &Bound<PyAny>) -> PyResult<()> {
+        self.check_process()?;
+        let [envs, robots, _] = self.obs_shape();
+        let mut angles = vec![];
+        Door::numbers("headings", &[envs, robots]).read_f32(headings, &mut angles)?;
+        self.worlds.set_headings(&angles).map_err(|error| raised(py, &error))
     }
 
     fn set_victims(

@@ -18,6 +18,7 @@ impl Scenario {
         self.validate_numbers()?;
         self.validate_robots()?;
         self.validate_layers()?;
+        self.validate_wheels()?;
         self.validate_tasks()?;
         self.validate_order()?;
         self.validate_obstacles()?;

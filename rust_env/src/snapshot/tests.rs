@@ -213,6 +213,33 @@ fn loads_are_kept_and_checked() {
 }
 
 #[test]
+fn headings_are_kept_and_checked() {
+    use crate::scenario::DriveMode;
+    use crate::wheels::Heading;
+    let mut scenario = Scenario::default();
+    scenario.robots[1].drive = DriveMode::Unicycle;
+    let rules = rules(scenario);
+    let bytes = |headings: &[(f32, f32)]| {
+        let mut world = World::new(&rules, 5, 7);
+        let heading = |(angle, turn_rate): &(f32, f32)| Heading { angle: *angle, turn_rate: *turn_rate };
+        world.headings = headings.iter().map(heading).collect();
+        save(&rules, 1, [world].iter())
+    };
+    let (still, right) = ((0.0, 0.0), (-std::f32::consts::PI, 4.0));
+    let back = load(&rules, 1, &bytes(&[still, right, still, still])).expect("a state of these rules");
+    assert_eq!(back[0].headings[1], Heading { angle: right.0, turn_rate: right.1 });
+    assert!(bytes(&[still, right, still, still]).len() <= most_bytes(&rules, 1));
+    for forged in [(3.2, 0.0), (f32::NAN, 0.0), (0.0, 4.1), (0.0, -4.1), (0.0, f32::NAN)] {
+        let error = load(&rules, 1, &bytes(&[still, forged, still, still])).expect_err("a forged heading");
+        assert_eq!(error.to_string(), "snapshot: env 0 does not fit the scenario: its headings");
+    }
+    for forged in [&[still, right, still][..], &[still; 5], &[], &[right, right, still, still]] {
+        let error = load(&rules, 1, &bytes(forged)).expect_err("forged headings").to_string();
+        assert_eq!(error, "snapshot: env 0 does not fit the scenario: its headings");
+    }
+}
+
+#[test]
 fn sightings_are_kept_and_checked() {
     use crate::sight::NEVER;
     type Change = fn(&mut World);

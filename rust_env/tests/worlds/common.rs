@@ -257,6 +257,20 @@ pub fn with_layers(mut scenario: Scenario) -> Scenario {
     Scenario { rescue_radius_m: 0.4, ..scenario }
 }
 
+/// The same with robots on wheels, every second a unicycle and every fourth a differential drive, of unlike
+/// limits.
+pub fn with_wheels(mut scenario: Scenario) -> Scenario {
+    for (index, robot) in scenario.robots.iter_mut().enumerate() {
+        robot.drive =
+            [DriveMode::Unicycle, DriveMode::Differential, DriveMode::Unicycle, DriveMode::Force][index % 4];
+        robot.max_turn_rad_s = [4.0, 25.0, 1.5][index % 3];
+        robot.acceleration_m_s2 = [5.0, 2.0, 20.0][index % 3];
+        robot.turn_acceleration_rad_s2 = [20.0, 100.0][index % 2];
+        robot.wheel_base_m = (index % 2 == 0).then_some(robot.radius_m);
+    }
+    Scenario { rescue_radius_m: 0.4, ..scenario }
+}
+
 /// The same with robots that see from a quarter of the arena's half width to all of it, and every fourth
 /// everything that no obstacle hides.
 pub fn with_sight(mut scenario: Scenario) -> Scenario {

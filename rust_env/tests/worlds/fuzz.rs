@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
     with_amounts, with_an_end, with_arrivals, with_batteries, with_layers, with_leaving, with_list,
-    with_loads, with_order, with_sight, with_times,
+    with_loads, with_order, with_sight, with_times, with_wheels,
 };
 
 const ENVS: usize = 2;
@@ -63,6 +63,8 @@ fn scenarios() -> Vec<Scenario> {
             with_layers(Scenario { engine, obstacles: some_obstacles(), ..Scenario::default() }),
             with_sight(Scenario { engine, obstacles: some_obstacles(), ..Scenario::default() }),
             with_sight(with_leaving(Scenario { engine, ..tight.clone() })),
+            with_wheels(with_leaving(Scenario { engine, ..tight.clone() })),
+            with_wheels(Scenario { engine, actions: Actions::Continuous, ..tight.clone() }),
         ]
     };
     ENGINES.into_iter().flat_map(with).collect()
@@ -146,6 +148,8 @@ fn strange(source: &mut Stream) -> Value {
         json!("air"),
         json!(["air"]),
         json!("velocity"),
+        json!("unicycle"),
+        json!("differential"),
         json!(large),
         json!([]),
         json!([0.1, 0.1]),

@@ -24,3 +24,4 @@ mod speed;
 mod structure;
 mod tasks;
 mod victims;
+mod wheels;

@@ -88,7 +88,9 @@ class _Dispatcher(ABC):
         if self._loading.is_needed:
             targets = self._loading.targets(state, targets, chosen)
         faults = self._faults(state)
-        return self.steering.actions(state.positions, state.velocities, targets, faults)
+        return self.steering.actions(
+            state.positions, state.velocities, targets, faults, state.headings
+        )
 
     def reset(self, seed: int) -> None:
         """See `Policy.reset`; there is nothing to forget and nothing is drawn."""
@@ -98,6 +100,14 @@ class _Dispatcher(ABC):
         """Where robots without a victim go, in the form of (E, R, 2) [m]."""
         del state
         return 0.0
+
+    def _times(
+        self, state: WorldState, places: NDArray[np.float64], faults: NDArray[np.void] | None = None
+    ) -> NDArray[np.float64]:
+        """When robots could be at places (E, R, V) [s]."""
+        return self.steering.arrival_times(
+            state.positions, state.velocities, places, faults, state.headings
+        )
 
     def _faults(self, state: WorldState) -> NDArray[np.void] | None:
         return state.faults if self.knows_faults else None
@@ -123,7 +133,7 @@ class GreedyPolicy(_Dispatcher):
         way = places[:, None] - state.positions[:, :, None]
         distance = np.where(helpful, (way * way).sum(-1), np.inf)
         if self._timing.is_needed:
-            times = self.steering.arrival_times(state.positions, state.velocities, places)
+            times = self._times(state, places)
             if self._coalitions.is_needed:
                 permitted = self._coalitions.alone(state, times, permitted)
             helpful &= self._timing.in_time(state, times, permitted)[:, None]
@@ -161,7 +171,7 @@ class GreedySeenPolicy(_Dispatcher):
             helpful &= self._loading.can_help(state)[..., None]
         way = places[:, None] - state.positions[:, :, None]
         distance = np.where(helpful, (way * way).sum(-1), np.inf)
-        times = self.steering.arrival_times(state.positions, state.velocities, places)
+        times = self._times(state, places)
         distance = np.where(helpful & self._timing.held(state, times), -1.0, distance)
         return np.where(helpful.any(-1), distance.argmin(-1), -1)
 
@@ -192,7 +202,7 @@ class HungarianPolicy(_Dispatcher):
             permitted &= self._loading.can_help(state)[..., None, None]
             if not self._loading.has_depots:
                 permitted &= self._hopeful(state, permitted, needed)
-        times = self.steering.arrival_times(state.positions, state.velocities, places, faults)
+        times = self._times(state, places, faults)
         blocked = state.victims["blocked"] if self._timing.has_order else None
         if self._coalitions.is_needed:
             if blocked is not None:  # their coalitions would take robots from others
@@ -232,7 +242,7 @@ class PlannerPolicy(_Dispatcher):
 
     def choose(self, state: WorldState, places: NDArray[np.float64]) -> NDArray[np.int64]:
         """See `_Dispatcher.choose`."""
-        times = self.steering.arrival_times(state.positions, state.velocities, places)
+        times = self._times(state, places)
         return self._lookahead.choose(state, places, times)
 
 

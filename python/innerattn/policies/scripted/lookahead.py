@@ -70,7 +70,7 @@ class Lookahead:
             [(one.position_m, one.radius_m, one.recharge_w) for one in scenario.stations],
             [(one.position_m, one.radius_m) for one in scenario.depots],
             scenario.rescue_radius_m,
-            scenario.actions == "discrete",
+            steering.along_axes,
             _AIMS.get(scenario.situation, (1.0, 0.0)),
             _ORDERS,
         )

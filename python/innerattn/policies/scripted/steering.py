@@ -3,7 +3,7 @@
 Where faults of the drive are given, they are reckoned with. It follows the world's law of motion
 without contacts: each control period starts with
 v <- clip((1 - damping) v + F/m dt u, max_speed), and then p <- p + v dt. Where actions set the
-velocity, it is v <- max_speed u.
+velocity, it is v <- max_speed u. Robots on wheels are steered by `WheelSteering`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
+from innerattn.policies.scripted.wheel_steering import WheelSteering
 
 Array = NDArray[np.float64]
 
@@ -41,6 +42,9 @@ class Steering:
         self._limit = np.array([robot.max_speed_mps for robot in robots])
         self._push = np.array([robot.gain_mps(self._dt) for robot in robots])
         self._continuous = scenario.actions == "continuous"
+        self._wheels = WheelSteering(scenario) if scenario.has_wheels else None
+        self._rolls = np.array([robot.has_wheels for robot in robots])
+        self.along_axes = not self._continuous and not self._rolls.all()
         self.speed, self.lag = self._speed_and_lag(self._push, self._limit)
         self._known: tuple[Array, Array, Array] | None = None
 
@@ -61,29 +65,42 @@ class Steering:
         """
         if self._known is None or not np.array_equal(self._known[0], cases):
             gain, cap = np.moveaxis(cases.reshape(len(cases), -1, 2), -1, 0)
-            found = self._speed_and_lag(self._push * gain, self._limit * cap)
+            # A weak motor takes longer; on wheels it is slower, too.
+            most = np.where(self._rolls, np.minimum(gain, cap), cap)
+            found = self._speed_and_lag(
+                self._push * np.where(self._rolls, 1.0, gain), self._limit * most
+            )
             self._known = (cases, *found)
         return self._known[1:]
 
     def way(self, apart: Array) -> Array:
-        """Lengths of ways (..., 2) as robots drive them [m]: with discrete actions along axes."""
-        if self._continuous:
+        """Lengths of ways (..., 2) as robots drive them [m]: with discrete actions along axes.
+
+        Robots on wheels drive straight on; in teams of both, the longer way counts for all.
+        """
+        if not self.along_axes:
             return np.asarray(np.sqrt((apart * apart).sum(-1)))
         return np.asarray(np.abs(apart).sum(-1))
 
     def arrival_times(
-        self, positions: Any, velocities: Any, places: Any, faults: NDArray[np.void] | None = None
+        self,
+        positions: Any,
+        velocities: Any,
+        places: Any,
+        faults: NDArray[np.void] | None = None,
+        headings: Any = None,
     ) -> Array:
         """Estimated time until each robot is within the rescue radius of each place.
 
-        The way at final speed, and the part of the lag that the present velocity has not made up
-        for already.
+        The way at final speed, the part of the lag that the present velocity has not made up for
+        already, and the time that a robot on wheels takes to turn to the way.
 
         Args:
             positions: (E, R, 2) [m].
             velocities: (E, R, 2) [m/s].
             places: (E, V, 2) [m].
             faults: (E, R) structured, the fields of `BatchEnv.fault_state`; None: all are healthy.
+            headings: (E, R, 2) angles [rad] and turn rates [rad/s], needed where robots have wheels.
 
         Returns:
             (E, R, V) float64 [s]; 0 for a robot that is there, at most `NEVER_S`.
@@ -99,28 +116,51 @@ class Steering:
             speed, lag = (found[case.reshape(-1)] for found in self._of_cases(cases))
         speed, lag = np.maximum(speed, 1e-9)[..., None], lag[..., None]
         times = gap / speed + np.maximum(lag * (1.0 - towards / speed), 0.0)
+        if self._wheels is not None and headings is not None:
+            turning = self._wheels.turning_times(way, np.asarray(headings, np.float64))
+            times = times + np.where(self._rolls[:, None], turning, 0.0)
         return np.where(gap > 0.0, np.minimum(times, NEVER_S), 0.0)
 
     def actions(
-        self, positions: Any, velocities: Any, targets: Any, faults: NDArray[np.void] | None = None
+        self,
+        positions: Any,
+        velocities: Any,
+        targets: Any,
+        faults: NDArray[np.void] | None = None,
+        headings: Any = None,
     ) -> NDArray[Any]:
         """Drive every robot to its target and let it come to rest there.
 
         The action chosen is the one after which, coasting for one period more, the robot is
         nearest to its target. Looking so little ahead it drives at full speed until the target is
-        two periods away; looking further it would brake where braking is not needed.
+        two periods away; looking further it would brake where braking is not needed. Robots on
+        wheels are steered as `WheelSteering` says.
 
         Args:
             positions: (E, R, 2) [m].
             velocities: (E, R, 2) [m/s].
             targets: (E, R, 2) [m].
             faults: (E, R) structured, the fields of `BatchEnv.fault_state`; None: all are healthy.
+            headings: (E, R, 2) angles [rad] and turn rates [rad/s], needed where robots have wheels.
 
         Returns:
             (E, R) int64, or (E, R, 2) float32 in [-1, 1] where actions are continuous.
         """
         way = np.asarray(targets, np.float64) - positions
-        kept = self._keep[:, None] * np.asarray(velocities, np.float64)
+        found = self._driven(way, np.asarray(velocities, np.float64), faults)
+        if self._wheels is None:
+            return found
+        if headings is None:
+            raise ValueError("headings = None: must be given where robots have wheels")
+        rolling = self._wheels.actions(way, velocities, np.asarray(headings, np.float64), faults)
+        rolls = self._rolls[:, None] if self._continuous else self._rolls
+        return np.where(rolls, rolling, found)
+
+    def _driven(
+        self, way: Array, velocities: Array, faults: NDArray[np.void] | None
+    ) -> NDArray[Any]:
+        """The actions of robots without wheels; see `actions`."""
+        kept = self._keep[:, None] * velocities
         reach = self._dt * (1.0 + self._keep)[:, None]
         push, limit, bias = self._push, self._limit, np.zeros(len(self._push))
         if faults is not None:
