@@ -32,6 +32,7 @@ def draw_world(
     velocities: NDArray[np.float32],
     victims: NDArray[np.void],
     obstacles: NDArray[np.float32],
+    headings: NDArray[np.float32] | None = None,
     *,
     title: str = "",
     pixels: int = 600,
@@ -44,6 +45,7 @@ def draw_world(
         velocities: (R, 2) robots' velocities [m/s].
         victims: (V,) structured; fields ``present``, ``task``, ``x``, ``y`` [m] are used.
         obstacles: (O, 2) obstacles' centres [m].
+        headings: (R,) angles of robots on wheels [rad]; None: no nose is drawn.
         title: text above the picture.
         pixels: height of the picture.
 
@@ -55,7 +57,7 @@ def draw_world(
 
     figure = Figure(figsize=(8, 6), dpi=pixels / 6)
     canvas = FigureCanvasAgg(figure)
-    paint_figure(figure, scenario, positions, velocities, victims, obstacles, title=title)
+    paint_figure(figure, scenario, positions, velocities, victims, obstacles, headings, title=title)
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels_rgba = canvas.buffer_rgba()  # type: ignore[no-untyped-call]
     return np.asarray(pixels_rgba, np.uint8)[..., :3].copy()
@@ -73,14 +75,15 @@ def paint_figure(
     velocities: NDArray[np.float32],
     victims: NDArray[np.void],
     obstacles: NDArray[np.float32],
+    headings: NDArray[np.float32] | None = None,
     *,
     title: str = "",
 ) -> None:
     """Paint one world with its legend on an empty figure; arguments as in `draw_world`."""
     axes = figure.add_axes((0.1, 0.1, 0.63, 0.84))
     axes.set_title(title)
-    legend = paint_world(axes, scenario, positions, velocities, victims, obstacles)
-    low = 0.6 - 0.08 * (len(scenario.layers) - 1)
+    legend = paint_world(axes, scenario, positions, velocities, victims, obstacles, headings)
+    low = 0.6 - 0.08 * (len(scenario.layers) - 1 + scenario.has_wheels)
     figure.legend(legend.values(), legend.keys(), loc=(0.74, low), frameon=False, labelspacing=0.9)
 
 
@@ -91,6 +94,7 @@ def paint_world(
     velocities: NDArray[np.float32],
     victims: NDArray[np.void],
     obstacles: NDArray[np.float32],
+    headings: NDArray[np.float32] | None = None,
 ) -> dict[str, Artist]:
     """Paint one world on ``axes``; arguments as in `draw_world`.
 
@@ -103,7 +107,8 @@ def paint_world(
     axes.set_ylabel("y [m]")
     _paint_arena(axes, scenario, obstacles)
     legend = _paint_victims(axes, scenario, victims)
-    return legend | _paint_robots(axes, scenario, positions, velocities)
+    legend |= _paint_robots(axes, scenario, positions, velocities)
+    return legend | _paint_noses(axes, scenario, positions, headings)
 
 
 def _paint_arena(axes: Axes, scenario: Scenario, obstacles: NDArray[np.float32]) -> None:
@@ -205,6 +210,25 @@ def _paint_robots(
         [], [], color="k", marker=r"$\rightarrow$", linestyle="", markersize=14
     )
     return legend
+
+
+def _paint_noses(
+    axes: Axes,
+    scenario: Scenario,
+    positions: NDArray[np.float32],
+    headings: NDArray[np.float32] | None,
+) -> dict[str, Artist]:
+    """Where robots on wheels point."""
+    from matplotlib.lines import Line2D
+
+    if headings is None or not scenario.has_wheels:
+        return {}
+    for robot, (x, y), angle in zip(scenario.robots, positions, headings.tolist(), strict=True):
+        if robot.has_wheels:
+            ahead = robot.radius_m * np.array([np.cos(angle), np.sin(angle)])
+            ends = [x, x + 1.5 * ahead[0]], [y, y + 1.5 * ahead[1]]
+            axes.plot(*ends, color="k", linewidth=3, solid_capstyle="butt", zorder=4)
+    return {"heading": Line2D([], [], color="k", linewidth=3)}
 
 
 def _sides_of_names(

@@ -93,6 +93,7 @@ class Screen:
             env.velocities()[world],
             env.victims()[world],
             env.obstacles()[world],
+            env.headings()[world],
         )
         title = f"step {int(env.step_counts()[world])} of {env.scenario.episode_steps}"
         if self.mode == "rgb_array":

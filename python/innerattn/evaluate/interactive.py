@@ -16,6 +16,7 @@ from innerattn.evaluate.moment import Handoff, Loss, Moment, Rescue
 from innerattn.evaluate.play import Attentive
 from innerattn.measures.moments import blocked_between
 from innerattn.policies import Policy, PolicyInput, WorldState
+from innerattn.policies.policy import pointing
 
 LONGEST_EPISODE = 1_000_000
 """Control steps after which an endless world begins its next episode: a day at 0.1 s."""
@@ -80,6 +81,7 @@ class InteractiveWorld:
             velocities=env.velocities()[0],
             victims=env.victims()[0],
             faults=env.fault_state()[0],
+            headings=None if (headings := pointing(env)) is None else headings[0],
             charge=env.charge()[0] if env.scenario.has_batteries else None,
             load=env.load()[0] if env.scenario.has_loads else None,
             obstacles=env.obstacles()[0],
@@ -96,6 +98,7 @@ class InteractiveWorld:
         """Do one control step."""
         env = self._env
         before, velocities, faults = env.positions(), env.velocities(), env.fault_state()
+        headings = pointing(env)
         step = env.step(self._actions)
         if step.truncated[0] or step.terminated[0]:
             self._begin(step.obs)
@@ -109,6 +112,7 @@ class InteractiveWorld:
             self._actions,
             faults,
             env.obstacles(),
+            headings,
         )[0]
         self._note(step.rescues)
         self._note_lost(env.lost())
@@ -135,7 +139,8 @@ class InteractiveWorld:
 
         Args:
             robot: its index; none: the policy drives all.
-            drive: x and y, -1 to 1. Where actions are discrete, the larger one counts.
+            drive: x and y, -1 to 1; on wheels y is ahead and -x to the left, as seen on the way.
+                Where actions are discrete, the larger one counts.
         """
         steered = None if robot is None else self._robot(robot)
         for axis, share in zip("xy", drive, strict=True):
@@ -244,8 +249,13 @@ class InteractiveWorld:
 
     def _steered_action(self) -> Any:
         x, y = self._drive
+        robot = self.scenario.robots[self._steered or 0]
+        if robot.has_wheels:
+            x, y = y, -x
         if self.scenario.actions == "continuous":
-            return np.array(self._drive, np.float32)
+            if robot.drive == "differential":
+                x, y = max(-1.0, min(1.0, x - y)), max(-1.0, min(1.0, x + y))
+            return np.array((x, y), np.float32)
         if x == y == 0.0:
             return 0
         return (1 if x > 0 else 2) if abs(x) >= abs(y) else (3 if y > 0 else 4)

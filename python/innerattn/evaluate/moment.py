@@ -49,6 +49,7 @@ class Moment:
         velocities: (R, 2) float32 [m/s].
         victims: (V,) structured, the fields of `BatchEnv.victims`.
         faults: (R,) structured, the fields of `BatchEnv.fault_state`.
+        headings: (R, 2) float32, angles [rad] and turn rates [rad/s]; none: no robot has any.
         charge: (R,) float32, shares of batteries; none: no robot has one.
         load: (R,) float32, shares of full loads; none: no robot has one.
         obstacles: (O, 2) float32 [m].
@@ -69,6 +70,7 @@ class Moment:
     velocities: NDArray[np.float32]
     victims: NDArray[np.void]
     faults: NDArray[np.void]
+    headings: NDArray[np.float32] | None
     charge: NDArray[np.float32] | None
     load: NDArray[np.float32] | None
     obstacles: NDArray[np.float32]

@@ -51,7 +51,7 @@ def run_episodes(
         seed: seed of the worlds, 0 to 2**63 - 1; with ``first_episode`` it fixes the starts.
         first_episode: number of the first episode.
         record: which of `FIELDS` to keep for every step; attention is kept only if the policy has
-            it, and charge and load only if some robots have a battery and a load.
+            it, and headings, charge and load only if some robots have such.
         num_threads: threads that step the worlds; none: all cores.
         progress: called with the number of episodes each time some are done.
         purpose: "training" for the random streams that a training with this seed has; those of

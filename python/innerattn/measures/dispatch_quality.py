@@ -120,7 +120,11 @@ def _times(record: Record, events: NDArray[np.void]) -> NDArray[np.float64]:
     places = np.stack([victim["x"], victim["y"]], -1)[:, None]
     positions = record.steps["positions"][episode, appeared]
     velocities = record.steps["velocities"][episode, appeared]
-    return Steering(record.scenario).arrival_times(positions, velocities, places)[..., 0]
+    headings = None
+    if "headings" in record.steps:
+        headings = record.steps["headings"][episode, appeared]
+    steering = Steering(record.scenario)
+    return steering.arrival_times(positions, velocities, places, headings=headings)[..., 0]
 
 
 MEASURES = (

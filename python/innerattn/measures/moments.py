@@ -15,6 +15,7 @@ from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.measures.sharing.handoff import HANDOFF, handoffs
+from innerattn.policies.scripted.wheels import Wheels
 from innerattn.records.record import Record
 
 FAULT_SPELL = np.dtype(
@@ -105,6 +106,7 @@ def blocked(record: Record) -> NDArray[np.bool_]:
         record.steps["actions"][:, :-1],
         record.steps["faults"][:, :-1],
         obstacle_places(record)[:, None],
+        record.steps["headings"][:, :-1] if "headings" in record.steps else None,
     )
     found[:, :-1] = stopped & going_on[..., None]
     return found
@@ -118,6 +120,7 @@ def blocked_between(
     actions: NDArray[Any],
     faults: NDArray[np.void],
     obstacles: NDArray[np.float32],
+    headings: NDArray[np.float32] | None = None,
 ) -> NDArray[np.bool_]:
     """Whether something stopped each robot in a step; see `blocked`.
 
@@ -129,11 +132,18 @@ def blocked_between(
         actions: (..., R) integers, or (..., R, 2) where actions are continuous.
         faults: (..., R) structured, in effect in the step.
         obstacles: (..., O, 2) places of the obstacles [m].
+        headings: (..., R, 2) angles [rad] and turn rates [rad/s] when it began, where robots have
+            wheels; None: robots on wheels count as not stopped.
 
     Returns:
         (..., R) bool.
     """
     way = _free_way(scenario, velocities, actions, faults)
+    if scenario.has_wheels:
+        rolled = np.zeros_like(way)
+        if headings is not None:
+            rolled = _rolled_way(scenario, velocities, actions, faults, headings)
+        way = np.where(np.array([[robot.has_wheels] for robot in scenario.robots]), rolled, way)
     length = np.linalg.norm(way, axis=-1)
     end = after.astype(np.float64)
     along = ((end - before) * way).sum(-1) / np.maximum(length, 1e-9)
@@ -164,6 +174,25 @@ def _free_way(
     velocity = velocity * np.minimum(1.0, cap / np.maximum(speed, 1e-9))[..., None]
     driving = np.linalg.norm(drive, axis=-1) > 0.0
     return np.asarray(velocity * driving[..., None] * scenario.dt_s)
+
+
+def _rolled_way(
+    scenario: Scenario,
+    velocities: NDArray[np.float32],
+    actions: NDArray[Any],
+    faults: NDArray[np.void],
+    headings: NDArray[np.float32],
+) -> NDArray[np.float64]:
+    """Where wheels alone would have moved each robot within a step, (..., R, 2) [m]."""
+    wheels = Wheels(scenario)
+    gain = faults["motor_gain"] * (faults["unavailable"] == 0.0)
+    bias = faults["heading_bias"].astype(np.float64)
+    now = wheels.rolling(velocities.astype(np.float64), headings.astype(np.float64), bias)
+    shares = wheels.shares(actions)
+    then = wheels.after(now, shares, gain, faults["speed_limit"])
+    driving = (shares[..., 0] != 0.0) & (gain > 0.0)
+    way = wheels.velocities(headings[..., 0].astype(np.float64), then, bias) * scenario.dt_s
+    return np.asarray(way * driving[..., None])
 
 
 def _touching(

@@ -2,11 +2,13 @@
 
 An element of the group is a number 0 to 7: bit 0 mirrors x, bit 1 mirrors y, and bit 2 then swaps
 x and y. Everything here moves columns, changes signs and looks up actions: turning there and back
-is exact to the bit.
+is exact to the bit. Actions of robots on wheels do not turn with the world: where it is mirrored,
+they change left and right.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -15,6 +17,8 @@ from torch import Tensor
 NUM_ELEMENTS = 8
 _ACTIONS = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 """What the discrete actions of a world push to: stay, +x, -x, +y, -y."""
+_MIRRORED = (0, 1, 2, 4, 3)
+"""What stop, forward, backward, left and right of robots on wheels are in a mirrored world."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +46,16 @@ class SquareSymmetry:
     next ones decide. An observation from a turned world therefore has the same form in its frame.
     """
 
-    def __init__(self, columns: VectorColumns, device: torch.device) -> None:
+    def __init__(
+        self, columns: VectorColumns, device: torch.device, drives: Sequence[str] = ()
+    ) -> None:
         """Prepare the tables of signs, columns and actions on ``device``.
+
+        Args:
+            columns: Which columns turn.
+            device: Where.
+            drives: What actions set of each robot, as `Robot.drive` says; none: directions in the
+                plane. With them, the last axis of actions is that of the robots.
 
         Raises:
             ValueError: There is no anchor, or a column is not one of the observation.
@@ -60,9 +72,15 @@ class SquareSymmetry:
             signs[[2, 3, 6, 7], y] = -1.0
             swapped[x], swapped[y] = y, x
         # A mirror, and a swap, turn left into right; two of them do not.
-        signs[:, list(columns.handed)] = torch.tensor(
-            [(-1.0) ** element.bit_count() for element in range(NUM_ELEMENTS)]
-        ).unsqueeze(1)
+        odd = torch.tensor([element.bit_count() % 2 == 1 for element in range(NUM_ELEMENTS)])
+        signs[:, list(columns.handed)] = (1.0 - 2.0 * odd.float()).unsqueeze(1)
+        self._odd = odd.to(device)
+        self._unicycle, self._differential = (
+            torch.tensor([drive == name for drive in drives], dtype=torch.bool, device=device)
+            for name in ("unicycle", "differential")
+        )
+        self._has_wheels = bool((self._unicycle | self._differential).any())
+        self._left_right = torch.tensor([range(5), _MIRRORED], device=device)
         self._signs, self._swapped = signs.to(device), swapped.to(device)
         self._anchors = columns.anchors
         powers = range(len(columns.anchors) - 1, -1, -1)
@@ -111,15 +129,34 @@ class SquareSymmetry:
         """
         if actions.is_floating_point():
             x, y = self._mirrored(actions, element).unbind(-1)
-            return _swapped(x, y, element)
-        return self._forward[element, actions]
+            return self._on_wheels(actions, element, _swapped(x, y, element))
+        return self._on_wheels(actions, element, self._forward[element, actions])
 
     def turn_actions_back(self, actions: Tensor, element: Tensor) -> Tensor:
         """The inverse of `turn_actions`."""
         if actions.is_floating_point():
             x, y = actions.unbind(-1)
-            return self._mirrored(_swapped(x, y, element), element)
-        return self._back[element, actions]
+            turned = self._mirrored(_swapped(x, y, element), element)
+            return self._on_wheels(actions, element, turned)
+        return self._on_wheels(actions, element, self._back[element, actions])
+
+    def _on_wheels(self, actions: Tensor, element: Tensor, turned: Tensor) -> Tensor:
+        """Turned actions, in which those of robots on wheels are mirrored at most.
+
+        That is its own inverse.
+        """
+        if not self._has_wheels:
+            return turned
+        odd = self._odd[element]
+        if not actions.is_floating_point():
+            mirrored = self._left_right[odd.long(), actions]
+            return torch.where(self._unicycle | self._differential, mirrored, turned)
+        odd = odd.unsqueeze(-1)
+        speed, turn = actions.unbind(-1)
+        mirrored = torch.where(odd, torch.stack([speed, -turn], -1), actions)
+        turned = torch.where(self._unicycle.unsqueeze(-1), mirrored, turned)
+        wheels = torch.where(odd, actions.flip(-1), actions)
+        return torch.where(self._differential.unsqueeze(-1), wheels, turned)
 
     def _mirrored(self, vectors: Tensor, element: Tensor) -> Tensor:
         return vectors * self._mirrors[element].to(vectors.dtype)

@@ -49,8 +49,15 @@ class WorldState(NamedTuple):
             env.charge() if env.scenario.has_batteries else None,
             env.load() if env.scenario.has_loads else None,
             env.last_seen() if env.scenario.has_limited_sight else None,
-            np.stack([env.headings(), env.turn_rates()], -1) if env.scenario.has_wheels else None,
+            pointing(env),
         )
+
+
+def pointing(env: BatchEnv) -> NDArray[np.float32] | None:
+    """Angles [rad] and turn rates [rad/s] of robots, (E, R, 2); None where none has a heading."""
+    if not env.scenario.has_wheels:
+        return None
+    return np.stack([env.headings(), env.turn_rates()], -1)
 
 
 class PolicyInput(NamedTuple):

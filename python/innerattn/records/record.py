@@ -14,7 +14,7 @@ from innerattn.shown import Shown
 
 FIELDS = (
     *("obs", "actions", "rewards", "positions", "velocities", "victims", "faults"),
-    *("charge", "load", "attention"),
+    *("headings", "charge", "load", "attention"),
 )
 """What can be recorded step by step."""
 
@@ -53,8 +53,9 @@ class Record(Shown):
         length: which of an evaluation's two lengths of episodes this is.
         steps: by name, arrays (E, T, ...): obs (R, D) float32, actions (R,) int64 or (R, 2)
             float32, rewards (R, C) float32, positions and velocities (R, 2) float32, victims (V,)
-            structured, faults (R,) structured, charge and load (R,) float32, where some robots have
-            a battery and a load, attention (H, R, R) float32.
+            structured, faults (R,) structured, headings (R, 2) float32 (angles [rad] and turn rates
+            [rad/s]), where some robots have a heading, charge and load (R,) float32, where some
+            have a battery and a load, attention (H, R, R) float32.
     """
 
     policy: str

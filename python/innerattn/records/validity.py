@@ -14,6 +14,8 @@ from innerattn.records.record import Record
 
 _MOST_EPISODE = 2**53
 _KINDS = "biuf"
+_HALF_CIRCLE = float(np.float32(np.pi))  # as worlds hold it
+_MOST_TURN = 1e4  # rad/s
 _MOST_SPEED_MPS = 1e4  # worlds take no more, see `BatchEnv.set_state`
 _MOST_SEEN = 1e6
 _MOST_REWARD = 1e12
@@ -100,6 +102,9 @@ def _ranges(record: Record) -> Iterator[tuple[str, NDArray[Any], float, float]]:
             yield name, steps[name], -size, size
     if "attention" in steps:
         yield "attention", steps["attention"], -_ROUNDING, 1.0 + _ROUNDING
+    if "headings" in steps:
+        yield "heading", steps["headings"][..., 0], -_HALF_CIRCLE, _HALF_CIRCLE
+        yield "turn rate", steps["headings"][..., 1], -_MOST_TURN, _MOST_TURN
     for name in ("charge", "load"):
         if name in steps:
             yield name, steps[name], 0.0, 1.0

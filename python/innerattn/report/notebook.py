@@ -86,6 +86,7 @@ def _picture(env: BatchEnv, title: str) -> str:
             env.velocities()[0],
             env.victims()[0],
             env.obstacles()[0],
+            env.headings()[0],
             title=title,
             pixels=_PIXELS,
         )

@@ -83,8 +83,15 @@ def _stores(scenario: Scenario) -> Iterator[str]:
             yield f"{robot.name}: helps with {rescues}, then {until}"
 
 
+_WHEELS = {
+    "unicycle": "the speed along a heading and the turn rate",
+    "differential": "the speeds of two wheels",
+}
+"""What actions set of robots with a heading, by their drive."""
+
+
 def _motion(scenario: Scenario) -> Iterator[str]:
-    """Who touches whom, and whose velocity is set."""
+    """Who touches whom, and what actions set but forces."""
     layers = scenario.layers
     for layer in layers if len(layers) > 1 else ():
         robots = ", ".join(robot.name for robot in scenario.robots if robot.layer == layer)
@@ -94,6 +101,9 @@ def _motion(scenario: Scenario) -> Iterator[str]:
             yield f"obstacles[{index}]: robots of {' and '.join(passing)} pass it"
     if quick := [robot.name for robot in scenario.robots if robot.drive == "velocity"]:
         yield f"{', '.join(quick)}: actions set the velocity"
+    for drive, what in _WHEELS.items():
+        if rolling := [robot.name for robot in scenario.robots if robot.drive == drive]:
+            yield f"{', '.join(rolling)}: actions set {what}"
 
 
 def _sight(scenario: Scenario) -> Iterator[str]:

@@ -34,6 +34,7 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
                 "has_battery": robot.battery is not None,
                 "load": robot.load,
                 "layer": robot.layer,
+                "has_wheels": robot.has_wheels,
             }
             for robot in scenario.robots
         ],

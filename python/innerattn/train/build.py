@@ -52,7 +52,8 @@ def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -
     learner = make(team, config.network, config.algorithm, seed=config.train.seed, device=device)
     if config.network.symmetry == "none":
         return learner
-    symmetry = SquareSymmetry(_turning_columns(config.scenario, names), device)
+    drives = [robot.drive for robot in config.scenario.robots]
+    symmetry = SquareSymmetry(_turning_columns(config.scenario, names), device, drives)
     if config.network.symmetry == "canonical":
         states = None
         if config.algorithm.needs_afterstates:

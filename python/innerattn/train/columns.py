@@ -8,6 +8,9 @@ from itertools import zip_longest
 from innerattn.errors import ConfigError
 from innerattn.nn import EntityColumns, PartnerColumns, VectorColumns
 
+_HANDED = (".fault.heading_bias", ".turn_rate", ".left")
+"""Ends of names of columns that change their sign in a mirrored world."""
+
 
 def entity_columns(names: Sequence[str]) -> EntityColumns:
     """Numbers of columns of the robot itself, of its teammates and of the victims.
@@ -48,7 +51,7 @@ def entity_columns(names: Sequence[str]) -> EntityColumns:
 
 
 def vector_columns(names: Sequence[str]) -> VectorColumns:
-    """Columns that turn with the world: pairs ``*.x`` and ``*.y``, and angles.
+    """Columns that turn with the world: pairs ``*.x`` and ``*.y``, angles, and ways to the left.
 
     Victims choose the frame, in the order of their slots; then the robot's own place and velocity.
 
@@ -72,7 +75,7 @@ def vector_columns(names: Sequence[str]) -> VectorColumns:
     return VectorColumns(
         width=len(names),
         vectors=tuple(pairs.values()),
-        handed=tuple(place[name] for name in names if name.endswith(".fault.heading_bias")),
+        handed=tuple(place[name] for name in names if name.endswith(_HANDED)),
         anchors=tuple(anchors),
     )
 
@@ -89,9 +92,13 @@ def state_columns(names: Sequence[str]) -> VectorColumns:
     stems = [name.removesuffix(".x") for name in names if name.endswith(".x")]
     pairs = {stem: (place[f"{stem}.x"], place[f"{stem}.y"]) for stem in stems}
     victims = [pairs[stem] for stem in stems if stem.startswith("victim_")]
-    robots = [pairs[stem] for stem in stems if not stem.startswith(("victim_", "obstacle_"))]
+    others = [stem for stem in stems if not stem.startswith(("victim_", "obstacle_"))]
+    robots = [pairs[stem] for stem in others if not stem.endswith(".heading")]
     return VectorColumns(
-        width=len(names), vectors=tuple(pairs.values()), handed=(), anchors=(*victims, *robots)
+        width=len(names),
+        vectors=tuple(pairs.values()),
+        handed=tuple(place[name] for name in names if name.endswith(_HANDED)),
+        anchors=(*victims, *robots),
     )
 
 

@@ -100,7 +100,7 @@ class Steering:
             velocities: (E, R, 2) [m/s].
             places: (E, V, 2) [m].
             faults: (E, R) structured, the fields of `BatchEnv.fault_state`; None: all are healthy.
-            headings: (E, R, 2) angles [rad] and turn rates [rad/s], needed where robots have wheels.
+            headings: (E, R, 2) angles [rad] and turn rates [rad/s], for robots on wheels.
 
         Returns:
             (E, R, V) float64 [s]; 0 for a robot that is there, at most `NEVER_S`.
@@ -141,7 +141,7 @@ class Steering:
             velocities: (E, R, 2) [m/s].
             targets: (E, R, 2) [m].
             faults: (E, R) structured, the fields of `BatchEnv.fault_state`; None: all are healthy.
-            headings: (E, R, 2) angles [rad] and turn rates [rad/s], needed where robots have wheels.
+            headings: (E, R, 2) angles [rad] and turn rates [rad/s], for robots on wheels.
 
         Returns:
             (E, R) int64, or (E, R, 2) float32 in [-1, 1] where actions are continuous.

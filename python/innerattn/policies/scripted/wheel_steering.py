@@ -1,4 +1,4 @@
-"""How scripts steer robots on wheels: they turn towards a target, and slow down while they face away."""
+"""How scripts steer robots on wheels: towards a target, and slower while they face away from it."""
 
 from __future__ import annotations
 
@@ -29,8 +29,12 @@ class WheelSteering:
         self._continuous = scenario.actions == "continuous"
 
     def turning_times(self, way: Array, headings: Array) -> Array:
-        """Time to turn to places that are ``way`` (..., R, V, 2) away, to drive there forwards or
-        backwards (..., R, V) [s]."""
+        """Times to turn to places, to drive there forwards or backwards, (..., R, V) [s].
+
+        Args:
+            way: from the robots to the places, (..., R, V, 2) [m].
+            headings: (..., R, 2) angles [rad] and turn rates [rad/s].
+        """
         err = self._error(way, headings[..., None, 0])
         err = np.minimum(np.abs(err), np.pi - np.abs(err))
         return np.asarray(err / self.wheels.turn[:, None])
@@ -88,8 +92,10 @@ class WheelSteering:
         return wheels.actions(shares)
 
     def _turned_first(self, speed: Array, turn: Array, now: Rolling) -> tuple[Array, Array]:
-        """What of a speed and a turn rate the wheels of a differential reach in a period, each of
-        which gains so much at most; they turn first. Those of a unicycle reach both by themselves."""
+        """What of a speed and a turn rate the two wheels of a differential reach in a period.
+
+        They turn first. A unicycle reaches both by itself.
+        """
         wheels = self.wheels
         spread = np.clip((turn - now.turn_rate) * wheels.arm, -wheels.gain, wheels.gain)
         room = wheels.gain - np.abs(spread)
@@ -118,7 +124,7 @@ class WheelSteering:
         return way - self.wheels.velocities(angle, then) * dt, angle + then.turn_rate * dt
 
     def _cost(self, way: Array, angle: Array, then: Rolling) -> Array:
-        """About how long a robot still takes to its target that drives so for a period and stops."""
+        """About how long a robot takes to its target that drives so for a period, and stops."""
         wheels, dt = self.wheels, self.wheels.dt
         way, angle = self._moved(way, angle, then)
         on, turned = (
@@ -130,7 +136,7 @@ class WheelSteering:
         distance = np.sqrt((left * left).sum(-1))
         err = np.abs(self._error(left, angle + turned))
         err = np.minimum(err, np.pi - err) * np.clip(distance / self._radius - _NEAR, 0.0, 1.0)
-        return distance / wheels.speed + _TURN * err / wheels.turn
+        return np.asarray(distance / wheels.speed + _TURN * err / wheels.turn)
 
 
 def _braked(left: Array, gain: Array, dt: float) -> Array:

@@ -105,11 +105,14 @@ class Wheels:
 
         def toward(speed: Array, share: Array) -> Array:
             change = np.clip(share * self.speed - speed, -self.gain, self.gain)
-            return np.clip(speed + change, -limit, limit)
+            return np.asarray(np.clip(speed + change, -limit, limit))
 
         change = np.clip(left * self._most - now.turn_rate, -self.turn_gain, self.turn_gain)
         spread = now.turn_rate * self.arm
-        slow, fast = toward(now.speed - spread, ahead - left), toward(now.speed + spread, ahead + left)
+        slow, fast = (
+            toward(now.speed - spread, ahead - left),
+            toward(now.speed + spread, ahead + left),
+        )
         turn_rate = np.where(
             self._two,
             (fast - slow) / np.where(self._two, 2.0 * self.arm, 1.0),
@@ -126,7 +129,7 @@ class Wheels:
 
 
 def _sinc(x: Array) -> Array:
-    """sin x / x."""
+    """Sine of x, divided by x."""
     return np.asarray(np.sinc(x / np.pi))
 
 

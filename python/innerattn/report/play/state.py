@@ -42,6 +42,7 @@ def state_document(moment: Moment) -> dict[str, Any]:
         "velocities": _rounded(moment.velocities),
         "blocked": moment.blocked.tolist(),
         "faults": [_wrong(robot) for robot in moment.faults],
+        "headings": None if moment.headings is None else _rounded(moment.headings[:, :1]),
         "charge": None if moment.charge is None else np.round(moment.charge, _DECIMALS).tolist(),
         "load": None if moment.load is None else np.round(moment.load, _DECIMALS).tolist(),
         "victims": [

@@ -28,7 +28,8 @@ NEEDED = ("actions", "positions", "velocities", "victims", "faults")
 MOST_RECORDS = 4
 """As many policies a page shows side by side."""
 
-_STEPS_OF_INT16 = 32000  # positions, from the arena's centre to its wall; rewards, to the largest
+_STEPS_OF_INT16 = 32000
+"""Of positions, from the centre to a wall; of rewards, to the largest; and of half a circle."""
 
 _TABLES = {
     "rescues": ("episode", "step", "victim", "task"),
@@ -63,7 +64,8 @@ def replay_document(records: Sequence[Record], names: Sequence[str]) -> dict[str
     """What a replay page shows, as plain values.
 
     Positions are rounded to 1/32,000 of the arena's half width, velocities to 1/127 of the largest,
-    attention to 1/255, rewards to 1/32,000 of each component's largest.
+    headings to 1/32,000 of half a circle, attention to 1/255, rewards to 1/32,000 of each
+    component's largest.
 
     Args:
         records: of one to four policies, in the same worlds.
@@ -166,6 +168,10 @@ def _run(record: Record, name: str, arrays: _Arrays) -> dict[str, Any]:
         found["served"] = arrays.add(_quantised(kept["victims"]["served"], 1 / 255, "uint8"))
     if "blocked" in (kept["victims"].dtype.names or ()):
         found["waits"] = arrays.add(kept["victims"]["blocked"].astype(np.uint8))
+    if "headings" in kept:
+        found["headings"] = arrays.add(
+            _quantised(kept["headings"][..., 0], np.pi / _STEPS_OF_INT16)
+        )
     if "charge" in kept:
         charge = np.ceil(255 * kept["charge"])  # only an empty battery is 0
         found["charge"] = arrays.add(charge.astype(np.uint8))

@@ -161,8 +161,9 @@ def _paint(
     positions = kept["positions"] + np.float32(moment - int(moment)) * (later - kept["positions"])
     if record.scenario.robots_leave and "faults" in kept:
         positions = positions_of(positions, kept["faults"]["unavailable"] < 1.0)
+    headings = kept["headings"][:, 0] if "headings" in kept else None
     legend = paint_world(
-        axes, record.scenario, positions, kept["velocities"], kept["victims"], obstacles
+        axes, record.scenario, positions, kept["velocities"], kept["victims"], obstacles, headings
     )
     discs = axes.patches[-record.scenario.num_robots :]
     axes.set(xlabel="", ylabel="", xticks=[], yticks=[])

@@ -114,6 +114,10 @@ function fillLegend(list, worlds) {
   const kind = kindColour(0), cross = svg("path", { d: "M-6 -6L6 6M6 -6L-6 6", stroke: "var(--blocked)", "stroke-width": 3 });
   row(symbol(svg("circle", { r: 10, fill: "none", stroke: "var(--ink)", "stroke-width": 2 }), disc(kind, "none", 6)), "the chosen robot");
   row(line("M-9 0H9"), "line out of a robot: its velocity");
+  if (worlds.robots.some((robot) => robot.has_wheels)) {
+    const nose = svg("path", { d: "M10 0L3 -4V4Z", fill: "var(--ink)" });
+    row(symbol(svg("circle", { r: 5, cx: -1, fill: kindColour(0) }), nose), "nose of a robot on wheels: where it points");
+  }
   row(line("M-9 0H9", kind, { opacity: 0.4 }), "pale line behind a robot: its trail, the last 15 steps");
   row(line("M-9 4Q-2 -6 5 -1M1 -4L7 1L0 3", kind), "arrow: attention, from the robot that attends; the wider, the larger the weight");
   row(symbol(disc("var(--floor)", kind)), "small disc at a victim: what it needs");

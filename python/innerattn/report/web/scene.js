@@ -288,7 +288,8 @@ class Scene {
     context.setLineDash(edgeOf(robot));
     context.stroke();
     context.setLineDash([]);
-    this.drawHeading(robot, x, y, radius);
+    this.drawVelocity(robot, x, y, radius);
+    this.drawNose(robot, x, y, radius);
     const letters = robot.abilities.map((ability) => this.worlds.letters[ability]).join("");
     const size = Math.min(15, (1.5 * radius) / Math.max(1, 0.8 * letters.length));
     this.font(size, true);
@@ -299,7 +300,21 @@ class Scene {
     if (away) this.drawCross(x, y, 0.8 * radius);
   }
 
-  drawHeading(robot, x, y, radius) {
+  /** The nose of a robot on wheels, where it points. */
+  drawNose(robot, x, y, radius) {
+    const heading = this.run.heading(this.episode, this.step, robot.index);
+    if (heading === null) return;
+    const { context } = this, reach = Math.max(1.5 * radius, radius + 5);
+    context.fillStyle = this.paint.ink;
+    context.beginPath();
+    for (const [turn, far] of [[0, reach], [0.55, radius], [-0.55, radius]]) {
+      context.lineTo(x + far * Math.cos(heading + turn), y - far * Math.sin(heading + turn));
+    }
+    context.closePath();
+    context.fill();
+  }
+
+  drawVelocity(robot, x, y, radius) {
     const [vx, vy] = this.run.velocity(this.episode, this.step, robot.index);
     const speed = Math.hypot(vx, vy);
     if (speed < 0.02) return;

@@ -115,6 +115,11 @@ class LiveRun {
     return this.moment(step).velocities[robot];
   }
 
+  /** Where a robot on wheels points, rad; null for another one. */
+  heading(episode, step, robot) {
+    return this.worlds.robots[robot].has_wheels ? this.moment(step).headings[robot][0] : null;
+  }
+
   served(episode, step, { id }) {
     return this.moment(step).victims.find((one) => one.id === id)?.served ?? 0;
   }

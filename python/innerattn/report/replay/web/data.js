@@ -26,6 +26,8 @@ function byEpisode(buffer, spec, episodes, toRow) {
   return lists;
 }
 
+const HALF_CIRCLE = 32000; // as headings are packed
+
 /** One policy's episodes. Positions are metres, velocities metres per second. */
 class Run {
   constructor(described, buffer, worlds) {
@@ -46,6 +48,7 @@ class Run {
     const lists = (spec, toRow) => byEpisode(buffer, spec, this.episodes, toRow);
     this.shares = described.served ? view(buffer, described.served) : null;
     this.waiting = described.waits ? view(buffer, described.waits) : null;
+    this.headings = described.headings ? view(buffer, described.headings) : null;
     this.charges = described.charge ? view(buffer, described.charge) : null;
     this.loads = described.load ? view(buffer, described.load) : null;
     this.slots = (described.served ?? described.waits)?.shape[2] ?? 0;
@@ -86,6 +89,13 @@ class Run {
   velocity(episode, step, robot) {
     const at = 2 * ((episode * this.steps + Math.floor(step)) * this.size + robot);
     return [this.velocities[at] * this.velocityUnit, this.velocities[at + 1] * this.velocityUnit];
+  }
+
+  /** Where a robot on wheels points, rad; null for another one. */
+  heading(episode, step, robot) {
+    if (!this.headings || !this.worlds.robots[robot].has_wheels) return null;
+    const at = Math.min(Math.floor(step), this.lengths[episode] - 1);
+    return (this.headings[(episode * this.steps + at) * this.size + robot] * Math.PI) / HALF_CIRCLE;
   }
 
   /** Share of its service that a victim has had, 0 to 1. */
