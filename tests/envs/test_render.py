@@ -1,5 +1,7 @@
 """The picture of a world shows what is in it, where it is."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
@@ -84,6 +86,27 @@ def test_render_through_the_environment() -> None:
     silent = parallel_env()
     silent.reset(seed=0)
     assert silent.render() is None
+
+
+def test_robots_on_wheels_have_a_nose() -> None:
+    def noses(scenario: Scenario, angles: NDArray[np.float32] | None) -> tuple[list[Any], str]:
+        figure = Figure()
+        still, victims = np.zeros_like(PLACES), np.array([(1, 0, 0.0, 0.0)], VICTIM)
+        paint_figure(figure, scenario, PLACES, still, victims, np.zeros((0, 2), "f4"), angles)
+        found = [one.get_xydata() for one in figure.axes[0].lines if one.get_linewidth() == 3]
+        return found, " ".join(text.get_text() for text in figure.legends[0].get_texts())
+
+    preset = Scenario.preset("mixed-wheels")
+    angles = np.array([0.0, np.pi / 2, 0.0, 0.0], np.float32)
+    found, legend = noses(preset, angles)
+    np.testing.assert_allclose(found[0], [PLACES[0], PLACES[0] + [0.075, 0.0]], atol=1e-6)
+    np.testing.assert_allclose(found[1], [PLACES[1], PLACES[1] + [0.0, 0.075]], atol=1e-6)
+    assert len(found) == 2
+    assert "heading" in legend
+    for scenario, given in ((preset, None), (Scenario(), angles)):
+        found, legend = noses(scenario, given)
+        assert not found
+        assert "heading" not in legend
 
 
 def test_layers_are_told_apart_with_a_legend() -> None:

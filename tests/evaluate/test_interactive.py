@@ -214,6 +214,30 @@ def test_charges_are_told_where_robots_have_a_battery() -> None:
     assert world(plain).moment().charge is None
 
 
+@pytest.mark.parametrize("actions", ["discrete", "continuous"])
+@pytest.mark.parametrize("drive", ["unicycle", "differential"])
+def test_robots_on_wheels_are_steered_as_they_point(drive: str, actions: str) -> None:
+    plain = Scenario.preset("mixed").replace(actions=actions, engine="none")
+    first, *others = plain.robots
+    robots = (first.replace(drive=drive, start_m=(0.0, 0.0)), *others)
+    found = world(plain.replace(robots=robots))
+    assert world(plain).moment().headings is None
+    headings = found.moment().headings
+    assert headings is not None
+    angle = float(headings[0, 0])
+    found.steer(0, (0.0, 1.0))
+    for _ in range(3):
+        found.step()
+    ahead = np.array([np.cos(angle), np.sin(angle)])
+    np.testing.assert_allclose(found.moment().positions[0], 0.25 * ahead, atol=1e-5)
+    assert not found.moment().blocked[0]
+    found.steer(0, (-1.0, 0.0))
+    found.step()
+    headings = found.moment().headings
+    assert headings is not None
+    assert headings[0, 1] > 0.0  # to the left
+
+
 def test_loads_are_told_where_robots_have_one() -> None:
     plain = Scenario.preset("mixed").replace(rescue_radius_m=3.0)
     loaded = plain.replace(robots=(plain.robots[0].replace(load=4), *plain.robots[1:]))

@@ -59,6 +59,20 @@ def test_robots_that_drive_at_a_wall_are_blocked_there() -> None:
     assert not found[:, -1].any()
 
 
+@pytest.mark.parametrize("drive", ["unicycle", "differential"])
+def test_robots_on_wheels_that_drive_at_a_wall_are_blocked_there(drive: str) -> None:
+    robots = [robot.replace(drive=drive) for robot in Scenario.preset("mixed").robots]
+    found = blocked(record := always(1, robots=robots))
+    wall = record.scenario.arena_half_width_m
+    angle = record.steps["headings"][..., 0]
+    at_wall = record.steps["positions"][..., 0] > wall - 0.052
+    faces_it = at_wall & (np.cos(angle) > 0.9) & (abs(record.steps["positions"][..., 1]) < 0.5)
+    assert faces_it[:, 30:-1].any()
+    assert found[:, 30:-1][faces_it[:, 30:-1]].all()
+    assert not blocked(always(0, robots=robots)).any()
+    assert not blocked(always(3, robots=robots)).any()
+
+
 def test_nobody_is_blocked_who_does_not_drive_or_touches_nothing() -> None:
     assert not blocked(always(0)).any()
     record = watched(Scenario.preset("mixed").replace(contact_cost=1.0), episodes=30)

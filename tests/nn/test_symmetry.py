@@ -99,6 +99,28 @@ def test_vectors_turn_as_by_hand_and_back_to_the_bit(element: int) -> None:
     assert torch.equal(SYMMETRY.turn_actions_back(there, elements), vectors)
 
 
+@pytest.mark.parametrize("element", range(NUM_ELEMENTS))
+def test_actions_on_wheels_are_mirrored_and_do_not_turn(element: int) -> None:
+    drives = ("force", "unicycle", "differential", "velocity")
+    symmetry = SquareSymmetry(COLUMNS, CPU, drives)
+    odd = element in (1, 2, 4, 7)
+    actions = torch.arange(5).unsqueeze(1).expand(5, 4)
+    elements = torch.full((5, 4), element)
+    there = symmetry.turn_actions(actions, elements)
+    wheels = [0, 1, 2, 4, 3] if odd else [0, 1, 2, 3, 4]
+    assert there[:, 1].tolist() == there[:, 2].tolist() == wheels
+    for robot in (0, 3):
+        for action, got in zip(ACTIONS, there[:, robot].tolist(), strict=True):
+            assert ACTIONS[got] == by_hand(action, element)
+    assert torch.equal(symmetry.turn_actions_back(there, elements), actions)
+    pairs = torch.tensor([[0.3, -0.7]] * 4, dtype=torch.float64)
+    there = symmetry.turn_actions(pairs, elements[0])
+    assert there[1].tolist() == ([0.3, 0.7] if odd else [0.3, -0.7])
+    assert there[2].tolist() == ([-0.7, 0.3] if odd else [0.3, -0.7])
+    assert there[0].tolist() == there[3].tolist() == list(by_hand((0.3, -0.7), element))
+    assert torch.equal(symmetry.turn_actions_back(there, elements[0]), pairs)
+
+
 def test_columns_that_are_none_are_refused() -> None:
     with pytest.raises(ValueError, match="needs an anchor"):
         SquareSymmetry(VectorColumns(2, ((0, 1),), (), ()), CPU)

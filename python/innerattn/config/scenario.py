@@ -64,9 +64,9 @@ class Robot(Model):
     turn_acceleration_rad_s2: Annotated[float, ADDED_LATER, Told(0.01, 1e6)] = Field(
         20.0, description="acceleration of the turn rate of a unicycle [rad/s^2]"
     )
-    wheel_base_m: Annotated[float | None, ADDED_LATER] = Field(
+    wheel_base_m: Annotated[float | None, ADDED_LATER, Told(0.005, 20.0)] = Field(
         None,
-        description="distance of the two wheels of a differential, 0.005 to 2 radius_m [m]; "
+        description="distance of the two wheels of a differential, at most 2 radius_m [m]; "
         "None: 2 radius_m",
     )
     layer: Annotated[str, ADDED_LATER] = Field(

@@ -74,7 +74,8 @@ def _observation_columns(scenario: Scenario, own: int, speeds: list[float]) -> I
         if robot == own:
             spots = bool(scenario.stations) + bool(scenario.depots)
             yield from [_both_ways(2 * half + far)] * (2 * spots)
-            yield from [_both_ways(_most_turn(scenario))] * scenario.has_wheels
+            if scenario.has_wheels:
+                yield _both_ways(_most_turn(scenario))
         elif scenario.has_limited_sight:
             yield from (_FLAG, _FLAG)  # whether it is seen, and the time since then
     for _ in range(scenario.num_victims):

@@ -39,8 +39,9 @@ def contract_of(scenario: Scenario, names: list[str]) -> Contract:
     return contract_in(contract_text(document))
 
 
-WITHOUT_ROWS = ("mixed-faults", "mixed-sight")
-"""Presets whose rows follow from more than readings: senses fail, or the sight is limited."""
+WITHOUT_ROWS = ("mixed-faults", "mixed-sight", "mixed-wheels")
+"""Presets whose rows follow from more than readings: senses fail, the sight is limited, or robots
+have a heading."""
 
 
 def check(scenario: Scenario, seed: int, worlds: int = 6) -> None:
