@@ -149,7 +149,7 @@ def test_drives_agree() -> None:
     for drive in get_args(Robot.model_fields["drive"].annotation):
         table = {"robots": [*TEAM, {**ROBOT, "drive": drive}]}
         assert compiled(table) == Scenario.model_validate(table).model_dump(mode="json")
-    with pytest.raises(ValueError, match="expected `force` or `velocity`"):
+    with pytest.raises(ValueError, match="expected one of `force`, `velocity`, `unicycle`, `diff"):
         compiled({"robots": [*TEAM, {**ROBOT, "drive": "jet"}]})
 
 
@@ -183,6 +183,11 @@ def test_every_value_survives_the_way_there_and_back() -> None:
             {**TEAM[0], "radius_m": 0.04, "drive_force_n": 3.5, "start_m": [0.25, -0.5]},
             {**TEAM[0], "name": "last", "battery": {**BATTERY, "idle_w": 0.25}, "load": 4},
             {**TEAM[0], "name": "drone", "drive": "velocity", "layer": "air", "sight_m": 0.75},
+            {
+                **{**TEAM[0], "name": "rover", "drive": "differential", "wheel_base_m": 0.07},
+                **{"max_turn_rad_s": 3.0, "acceleration_m_s2": 2.0},
+                "turn_acceleration_rad_s2": 9.0,
+            },
         ],
         "tasks": [
             {

@@ -244,7 +244,10 @@ def test_who_knows_forces_alone_refuses_wheels() -> None:
         ({"max_turn_rad_s": 0.0}, r"max_turn_rad_s = 0: must be in 0.01..=10000 rad/s"),
         ({"acceleration_m_s2": 0.0}, r"acceleration_m_s2 = 0: must be in 0.01..=100000 m/s\^2"),
         ({"turn_acceleration_rad_s2": -1.0}, r"turn_acceleration_rad_s2 = -1: must be in 0.01..="),
-        ({"wheel_base_m": 0.11}, r"wheel_base_m = 0.11: must be in 0.005..=0.1 m, its diameter"),
+        (
+            {"wheel_base_m": 0.11},
+            r"wheel_base_m = 0.11: must be at most 0.1 m: both wheels are on it",
+        ),
         ({"drive": "tracks"}, "drive"),
     ],
 )

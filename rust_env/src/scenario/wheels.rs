@@ -51,7 +51,12 @@ impl Scenario {
             let turn = robot.turn_acceleration_rad_s2;
             within(&key("turn_acceleration_rad_s2"), turn, 0.01, 1e6, "rad/s^2")?;
             if let Some(base) = robot.wheel_base_m {
-                within(&key("wheel_base_m"), base, 0.005, 2.0 * robot.radius_m, "m, its diameter")?;
+                within(&key("wheel_base_m"), base, 0.005, 20.0, "m")?;
+                let most = 2.0 * robot.radius_m;
+                if base > most * (1.0 + 1e-12) {
+                    let rule = format!("must be at most {most} m: both wheels are on its disc");
+                    return broken(&key("wheel_base_m"), &base, &rule);
+                }
             }
             if robot.has_wheels() && robot.max_turn_rad_s * self.dt_s > PI * (1.0 + 1e-12) {
                 let rule = format!(

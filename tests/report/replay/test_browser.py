@@ -290,3 +290,19 @@ def test_layers_are_told_apart_and_explained(browser: Browser, tmp_path: Path) -
     assert "layer" not in legends[1]
     assert "pass" not in legends[1]
     assert shown[0] != shown[1]
+
+
+def test_robots_on_wheels_have_a_nose_that_is_explained(browser: Browser, tmp_path: Path) -> None:
+    wheeled = Scenario.preset("mixed-wheels")
+    plain = tuple(robot.replace(drive="force") for robot in wheeled.robots)
+    record, shown, legends = watched(wheeled, episodes=2), [], []
+    for name, scenario in (("wheels", wheeled), ("plain", wheeled.replace(robots=plain))):
+        (tmp_path / name).mkdir()
+        with visit(browser, written(tmp_path / name, replace(record, scenario=scenario))) as seen:
+            ready(seen.page)
+            legends.append(seen.page.locator("#legend").text_content() or "")
+            shown.append(pixels(seen.page))
+            assert not seen.problems
+    assert "nose of a robot on wheels: where it points" in legends[0]
+    assert "nose" not in legends[1]
+    assert shown[0] != shown[1]
