@@ -7,6 +7,7 @@ use innerattn_env::fault::{Fault, Kind};
 use innerattn_env::rng::Stream;
 use innerattn_env::robot::Commands;
 use innerattn_env::scenario::{Actions, DriveMode, Engine, Robot, Scenario};
+use innerattn_env::wheels::Heading;
 use innerattn_env::world::World;
 use proptest::prelude::*;
 
@@ -169,14 +170,17 @@ proptest! {
             [cos * x - sin * y, sin * x + cos * y]
         };
         // Nearer to the centre, so that all of it is in the arena when it is turned.
-        let nearer: Vec<f32> = one(&tables[0]).positions.iter().flat_map(|at| [0.1 * at.x, 0.1 * at.y]).collect();
+        let places = &one(&tables[0]).positions;
+        let nearer: Vec<f32> = places.iter().flat_map(|at| [0.1 * at.x, 0.1 * at.y]).collect();
         tables[0].batch.set_motion(&nearer, &vec![0.0; 2 * robots]).expect("places");
         let start = one(&tables[0]).clone();
         let wide = |vector: &innerattn_env::geometry::Vec2| [vector.x, vector.y].map(f64::from);
-        let places: Vec<f32> = start.positions.iter().flat_map(|at| turned(wide(at)).map(|x| x as f32)).collect();
+        let narrow = |at| turned(wide(at)).map(|metres| metres as f32);
+        let places: Vec<f32> = start.positions.iter().flat_map(narrow).collect();
         let wrapped = |angle: f64| (angle + PI).rem_euclid(TAU) - PI;
-        let headings = start.headings.iter().map(|one| (wrapped(f64::from(one.angle) + angle) as f32).clamp(-3.141_592, 3.141_592));
-        let headings: Vec<f32> = headings.collect();
+        let most = std::f32::consts::PI;
+        let other = |one: &Heading| (wrapped(f64::from(one.angle) + angle) as f32).clamp(-most, most);
+        let headings: Vec<f32> = start.headings.iter().map(other).collect();
         tables[1].batch.set_motion(&places, &vec![0.0; 2 * robots]).expect("places");
         tables[1].batch.set_headings(&headings).expect("headings");
         for number in 0..20 {
@@ -186,9 +190,11 @@ proptest! {
             let [plain, other] = [0, 1].map(|index| one(&tables[index]).clone());
             for robot in 0..robots {
                 let [x, y] = turned(wide(&plain.positions[robot]));
-                let miss = (f64::from(other.positions[robot].x) - x).hypot(f64::from(other.positions[robot].y) - y);
+                let [there_x, there_y] = wide(&other.positions[robot]);
+                let miss = (there_x - x).hypot(there_y - y);
                 prop_assert!(miss < 1e-4, "{miss}"); // of places up to 10 m away, in 20 steps
-                let apart = wrapped(f64::from(plain.headings[robot].angle) + angle - f64::from(other.headings[robot].angle));
+                let [from, to] = [&plain, &other].map(|world| f64::from(world.headings[robot].angle));
+                let apart = wrapped(from + angle - to);
                 prop_assert!(apart.abs() < 1e-4 || TAU - apart.abs() < 1e-4, "{apart}");
             }
         }
