@@ -179,11 +179,11 @@ impl Batch {
     }
 
     fn headings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        self.shares(py, |world, robot| world.headings.get(robot).map_or(0.0, |heading| heading.angle))
+        self.by_robot(py, |world, robot| world.headings.get(robot).map_or(0.0, |heading| heading.angle))
     }
 
     fn turn_rates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        self.shares(py, |world, robot| world.headings.get(robot).map_or(0.0, |heading| heading.turn_rate))
+        self.by_robot(py, |world, robot| world.headings.get(robot).map_or(0.0, |heading| heading.turn_rate))
     }
 
     fn charge<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
