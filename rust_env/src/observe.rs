@@ -1,5 +1,7 @@
 //! Observations: world → one row of numbers for each robot, with named columns.
 
+mod headings;
+mod sight;
 mod stores;
 
 use crate::fault::{HEALTHY, KINDS, Kind, Levels};
@@ -274,21 +276,6 @@ impl Layout {
         }
     }
 
-    /// Leaves nothing of teammates that the robot does not see, and says for how long it has not seen each of
-    /// them.
-    #[inline(never)]
-    fn hide_mates(&self, sight: &Sight, scene: Scene, own: usize, row: &mut [f32]) {
-        let seen = sight.mates(own, scene.sightings);
-        for (block, last) in self.blocks(row).skip(1).zip(seen) {
-            if last != scene.step {
-                block.fill(0.0);
-            }
-            let flags = self.widths.robot;
-            block[flags] = f32::from(u8::from(last == scene.step));
-            block[flags + 1] = sight.since(last, scene.step);
-        }
-    }
-
     /// Leaves a robot nothing of its row but what it knows of itself: abilities, availability, faults,
     /// charge, load.
     pub fn darken(&self, row: &mut [f32]) {
@@ -330,50 +317,6 @@ impl Layout {
         if let Some(wheels) = &self.wheels {
             self.write_headings(wheels, scene, own, row);
         }
-    }
-
-    /// Writes where robots point, how fast the robot itself turns, and how far ahead of it and to its left each
-    /// victim is that it sees.
-    #[inline(never)]
-    fn write_headings(&self, wheels: &Wheels, scene: Scene, own: usize, row: &mut [f32]) {
-        let others = (0..self.robots).filter(|other| *other != own);
-        let from = self.widths.robot - self.widths.heading;
-        for (block, robot) in self.blocks(row).zip(std::iter::once(own).chain(others)) {
-            let ahead = wheels.ahead(robot, scene.headings);
-            block[from..from + 2].copy_from_slice(&[ahead.x, ahead.y]);
-        }
-        let ahead = Vec2::new(row[from], row[from + 1]);
-        row[self.widths.robot + self.widths.ways - 1] = scene.headings[own].turn_rate;
-        let (width, place) = (self.widths.victim, 1 + self.abilities.len());
-        for victim in row[self.widths.victims_from..].chunks_exact_mut(width) {
-            let way = Vec2::new(victim[place], victim[place + 1]);
-            (victim[width - 2], victim[width - 1]) = (ahead.dot(&way), ahead.perp(&way));
-        }
-    }
-
-    /// Writes the victims that the robot sees, and for how long it has not seen each.
-    #[inline(never)] // worlds in which all is seen are faster without it
-    fn write_seen(&self, sight: &Sight, scene: Scene, own: usize, position: Vec2, rows: &mut [f32]) {
-        let seen = sight.seen(own, scene.sightings, scene.step, scene.victims);
-        let in_sight = Scene { victims: &seen[..scene.victims.len()], ..scene };
-        self.write_victims(in_sight, &scene.team[own], position, rows);
-        self.write_since(sight, scene, own, rows);
-    }
-
-    /// Writes for how long the robot has not seen each victim. In the order of relevance those that it sees come
-    /// first, then those that it saw later than others, so that nothing tells of what it does not see.
-    fn write_since(&self, sight: &Sight, scene: Scene, own: usize, rows: &mut [f32]) {
-        let mut since = [1.0; MAX_VICTIMS];
-        let last = sight.victims(own, scene.sightings);
-        for (since, last) in since.iter_mut().zip(last) {
-            *since = sight.since(*last, scene.step);
-        }
-        if self.sorted == VictimOrder::Relevant {
-            since[..last.len()].sort_unstable_by(f32::total_cmp);
-        }
-        let width = self.widths.victim;
-        let at = width - 1 - self.widths.heading;
-        rows.chunks_exact_mut(width).zip(since).for_each(|(row, since)| row[at] = since);
     }
 
     #[allow(clippy::inline_always)] // twice, and one of the two is the hottest path of all
