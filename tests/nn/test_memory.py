@@ -67,10 +67,12 @@ def test_a_sequence_is_its_steps_one_by_one(framed: bool, sharing: str, attentio
         of_critic = torch.where(new, torch.zeros(()), of_critic)
         found = critic(obs[:, step], actions[:, step], None, of_critic, None, element).q
         torch.testing.assert_close(q[:, :, step], found)
-        found = actor(obs[:, step], of_actor, None, element)
+        found, after = actor.act(obs[:, step], of_actor, element)
         torch.testing.assert_close(logits[:, :, step], found)
+        assert torch.equal(actor(obs[:, step], of_actor, None, element), found)
         of_critic = critic.remember(obs[:, step], of_critic, element)
         of_actor = actor.remember(obs[:, step], of_actor, element)
+        assert torch.equal(of_actor, after)
     assert of_actor.abs().max() <= 1.0
     assert not torch.equal(of_actor, of_critic)
 

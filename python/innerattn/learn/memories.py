@@ -36,12 +36,9 @@ class Memories:
             self.now = self.now.new_zeros(len(obs), obs.shape[1], self._width)
         self.before = self.now
         of_actor, of_critic = parts_of(self.before)
-        found = [
-            net.remember(obs, past, elements)
-            for net, past in ((self._actor, of_actor), (self._critic, of_critic))
-        ]
-        self.now = torch.cat(found, dim=2)
-        outputs: Tensor = self._actor(obs, of_actor, None, elements)
+        outputs, of_actor = self._actor.act(obs, of_actor, elements)
+        of_critic = self._critic.remember(obs, of_critic, elements)
+        self.now = torch.cat([of_actor, of_critic], dim=2)
         return outputs
 
     def forget(self, ended: Tensor | None = None) -> None:

@@ -109,8 +109,7 @@ class Remembering(nn.Module):
         Returns:
             (R, n, W); vectors lie as in the world.
         """
-        remembered = self.memory(obs, past, None, element)[0]
-        return remembered if element is None else turned_memory(remembered, inverse(element))
+        return _as_in_world(self.memory(obs, past, None, element)[0], element)
 
     def _inputs(
         self, obs: Tensor, past: Tensor, begins: Tensor | None, turns: Tensor | None
@@ -139,6 +138,14 @@ class RememberingActor(Remembering):
         logits: Tensor = self.network(self._inputs(obs, past, begins, turns))
         return logits
 
+    def act(
+        self, obs: Tensor, past: Tensor, element: Tensor | None = None
+    ) -> tuple[Tensor, Tensor]:
+        """The logits (R, A, n) of one step, and what `remember` gives; arguments as there."""
+        (remembered,) = self.memory(obs, past, None, element)
+        logits: Tensor = self.network(torch.cat([obs, remembered.to(obs.dtype)], dim=2))
+        return logits, _as_in_world(remembered, element)
+
 
 class RememberingCritic(Remembering):
     """The critics of all robots, each with a memory; `network` gives a `CriticOutput`."""
@@ -165,6 +172,11 @@ class RememberingCritic(Remembering):
         inputs = self._inputs(obs, past, begins, turns)
         output: CriticOutput = self.network(inputs, actions, available)
         return output
+
+
+def _as_in_world(remembered: Tensor, element: Tensor | None) -> Tensor:
+    """Memories (R, n, W) of the frames into which the world was turned by elements (R, n)."""
+    return remembered if element is None else turned_memory(remembered, inverse(element))
 
 
 def turned_memory(remembered: Tensor, element: Tensor) -> Tensor:
