@@ -104,7 +104,6 @@ def test_gymnasium_tells_the_team() -> None:
 
 
 def test_torchrl_tells_each_kind() -> None:
-    pytest.importorskip("torchrl")
     from torchrl.envs.utils import check_env_specs
 
     env = RescueTorchRLEnv(SOMETIMES, 6, seed=3)

@@ -492,10 +492,14 @@ class Scenario(Model, Shown):
         return self.unavailable_robots == "leave"
 
     @property
-    def robots_may_stop(self) -> bool:
-        """Whether there are times at which a robot cannot act: unavailable, or without charge."""
+    def has_action_masks(self) -> bool:
+        """Whether views tell which discrete actions have an effect.
+
+        They do where robots may be unavailable or without charge, and cannot act then.
+        """
         faulty = any(fault.kind == "unavailable" for fault in self.faults)
-        return faulty or self.robots_leave or self.has_batteries
+        unable = faulty or self.robots_leave or self.has_batteries
+        return unable and self.actions == "discrete"
 
     @property
     def has_arrivals(self) -> bool:

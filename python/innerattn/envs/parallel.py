@@ -229,7 +229,7 @@ class RescueParallelEnv(ParallelEnv[str, Obs, Action]):  # type: ignore[misc]
 
     def _with_masks(self, infos: dict[str, Info]) -> dict[str, Info]:
         """Infos by agent, with action masks where there are any."""
-        if self.scenario.robots_may_stop and self.scenario.actions == "discrete":
+        if self.scenario.has_action_masks:
             masks = self._of(list(self._env.action_mask()[0].astype(np.int8)), list(infos))
             for agent, info in infos.items():
                 info["action_mask"] = masks[agent]

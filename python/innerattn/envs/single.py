@@ -131,7 +131,7 @@ class RescueEnv(gymnasium.Env[Any, Any]):
         return self._env.action_mask().reshape(-1)
 
     def _masks(self) -> dict[str, Any]:
-        if self.scenario.robots_may_stop and self.scenario.actions == "discrete":
+        if self.scenario.has_action_masks:
             return {"action_mask": self._env.action_mask()[0].astype(np.int8)}
         return {}
 

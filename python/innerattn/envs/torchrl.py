@@ -85,7 +85,6 @@ class RescueTorchRLEnv(EnvBase):  # type: ignore[misc]
             self._robots.setdefault(robot.kind, []).append(index)
         names = worlds.robot_names
         self.group_map = {kind: [names[i] for i in own] for kind, own in self._robots.items()}
-        self._masked = scenario.robots_may_stop and scenario.actions == "discrete"
         self._make_specs()
 
     def _make_specs(self) -> None:
@@ -95,7 +94,7 @@ class RescueTorchRLEnv(EnvBase):  # type: ignore[misc]
             shape = torch.Size([*self.batch_size, len(own)])
             bounds = (bound.expand(*shape, -1).clone() for bound in (low, high))
             observations[kind] = Composite(observation=Bounded(*bounds), shape=shape)
-            if self._masked:
+            if self.scenario.has_action_masks:
                 mask = Categorical(2, shape=(*shape, NUM_DISCRETE_ACTIONS), dtype=torch.bool)
                 observations[kind]["action_mask"] = mask
             actions[kind] = Composite(action=self._action_spec(shape), shape=shape)
@@ -150,7 +149,9 @@ class RescueTorchRLEnv(EnvBase):  # type: ignore[misc]
             },
             batch_size=self.batch_size,
         )
-        masks = torch.from_numpy(self._worlds.action_mask()) if self._masked else None
+        masks = (
+            torch.from_numpy(self._worlds.action_mask()) if self.scenario.has_action_masks else None
+        )
         for kind, own in self._robots.items():
             part = {"observation": torch.from_numpy(obs[:, own])}  # indexing by a list copies
             if masks is not None:

@@ -126,11 +126,13 @@ class FramedLearner:
 
         Elements that are drawn in training are left out.
         """
-        element = None if self._generator is not None else self._symmetry.frame(obs)
-        seen = self.as_seen(obs, actions)
+        element = None
+        if self._generator is None:
+            element, obs = self._look(obs)
+            actions = self._symmetry.turn_actions(actions, element)
         if isinstance(self.learner, RememberingLearner):
-            return self.learner.attention(*seen, remembered, element)
-        return self.learner.attention(*seen)
+            return self.learner.attention(obs, actions, remembered, element)
+        return self.learner.attention(obs, actions)
 
     def forget(self) -> None:
         """Begin new episodes in all worlds; see `RememberingLearner`."""

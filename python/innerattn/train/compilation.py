@@ -20,8 +20,8 @@ updates save about 15 to 30 microseconds a row (`benches/compare_learner.py`).""
 def compiles(config: RunConfig) -> bool:
     """Whether to compile the updates of this run.
 
-    Those of networks with a memory never are: the compiler takes two minutes for their sequences,
-    and compiled updates save a quarter of the time.
+    Those of networks with a memory never are: to compile their sequences, which are unrolled, takes
+    longer than it saves in trainings of minutes.
     If they should be compiled and there is no working compiler, a warning says so.
     """
     choice = config.train.compile
