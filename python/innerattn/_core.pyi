@@ -12,6 +12,7 @@ __all__ = [
     "Batch",
     "Dispatcher",
     "Instance",
+    "Routes",
     "Rules",
     "__version__",
 ]
@@ -154,6 +155,56 @@ class Dispatcher:
         Raises:
             TypeError: not arrays of such numbers.
             ValueError: wrong shapes, an unknown type, or victims wait for each other in a circle.
+        """
+
+@final
+class Routes:
+    """Shortest ways of a scenario's robots around the obstacles of its worlds.
+
+    E worlds, O obstacles, R robots, each with G goals or K places. Ways are those of discs on a
+    grid of cells half a robot's radius wide, of which an arena has 256 along a side at most.
+    Lengths are infinite where there is no way. A robot that no obstacle blocks goes straight.
+    """
+
+    def __new__(cls, rules: Rules) -> Routes: ...
+    def ways(
+        self,
+        obstacles: NDArray[np.float32],
+        positions: NDArray[np.float32],
+        goals: NDArray[np.float32],
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Lengths (E, R, G) and first turns (E, R, G, 2) of the ways to goals [m].
+
+        Args:
+            obstacles: (E, O, 2) [m].
+            positions: (E, R, 2) [m].
+            goals: (E, R, G, 2) [m].
+
+        Raises:
+            TypeError: not arrays of floats.
+            ValueError: wrong shapes, or not numbers.
+        """
+
+    def left(
+        self,
+        obstacles: NDArray[np.float32],
+        positions: NDArray[np.float32],
+        towards: NDArray[np.float32],
+        goals: NDArray[np.float32],
+    ) -> NDArray[np.float32]:
+        """Lengths (E, R, K) of the ways that are left after driving straight towards places [m].
+
+        Robots drive as far as they come before an obstacle stops them.
+
+        Args:
+            obstacles: (E, O, 2) [m].
+            positions: (E, R, 2) [m].
+            towards: (E, R, K, 2) [m].
+            goals: (E, R, 2) [m].
+
+        Raises:
+            TypeError: not arrays of floats.
+            ValueError: wrong shapes, or not numbers.
         """
 
 @final

@@ -35,6 +35,9 @@ pub mod reward;
 
 pub mod rules;
 
+pub mod distance_field;
+pub mod routes;
+
 pub mod fault_state;
 
 pub mod world;

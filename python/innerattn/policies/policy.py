@@ -25,6 +25,7 @@ class WorldState(NamedTuple):
         last_seen: (E, R, R + V) int64, see `BatchEnv.last_seen`; None where no sight is limited.
         headings: (E, R, 2) float32, angles [rad] and turn rates [rad/s] of robots on wheels; None
             where no robot has a heading.
+        obstacles: (E, O, 2) float32 [m]; None where there are none.
     """
 
     positions: NDArray[np.float32]
@@ -36,6 +37,7 @@ class WorldState(NamedTuple):
     load: NDArray[np.float32] | None = None
     last_seen: NDArray[np.int64] | None = None
     headings: NDArray[np.float32] | None = None
+    obstacles: NDArray[np.float32] | None = None
 
     @classmethod
     def of(cls, env: BatchEnv) -> Self:
@@ -50,6 +52,7 @@ class WorldState(NamedTuple):
             env.load() if env.scenario.has_loads else None,
             env.last_seen() if env.scenario.has_limited_sight else None,
             pointing(env),
+            env.obstacles() if env.scenario.obstacles else None,
         )
 
 

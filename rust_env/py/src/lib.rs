@@ -6,6 +6,7 @@ mod batch;
 mod dispatch;
 mod door;
 mod instance;
+mod routes;
 mod rules;
 
 /// rapier makes and frees hundreds of small things a period, which this does faster than the system.
@@ -60,5 +61,6 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_class::<rules::Rules>()?;
     module.add_class::<dispatch::Dispatcher>()?;
     module.add_class::<instance::Instance>()?;
+    module.add_class::<routes::Routes>()?;
     module.add_class::<batch::Batch>()
 }

@@ -89,7 +89,7 @@ class _Dispatcher(ABC):
             targets = self._loading.targets(state, targets, chosen)
         faults = self._faults(state)
         return self.steering.actions(
-            state.positions, state.velocities, targets, faults, state.headings
+            state.positions, state.velocities, targets, faults, state.headings, state.obstacles
         )
 
     def reset(self, seed: int) -> None:
@@ -106,7 +106,7 @@ class _Dispatcher(ABC):
     ) -> NDArray[np.float64]:
         """When robots could be at places (E, R, V) [s]."""
         return self.steering.arrival_times(
-            state.positions, state.velocities, places, faults, state.headings
+            state.positions, state.velocities, places, faults, state.headings, state.obstacles
         )
 
     def _faults(self, state: WorldState) -> NDArray[np.void] | None:

@@ -3,7 +3,8 @@
 Where faults of the drive are given, they are reckoned with. It follows the world's law of motion
 without contacts: each control period starts with
 v <- clip((1 - damping) v + F/m dt u, max_speed), and then p <- p + v dt. Where actions set the
-velocity, it is v <- max_speed u. Robots on wheels are steered by `WheelSteering`.
+velocity, it is v <- max_speed u. Robots on wheels are steered by `WheelSteering`. Where places of
+obstacles are given, ways lead around them.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
+from innerattn.policies.scripted.routes import Routes
 from innerattn.policies.scripted.wheel_steering import WheelSteering
 
 Array = NDArray[np.float64]
@@ -38,6 +40,7 @@ class Steering:
         robots = scenario.robots
         self._dt = scenario.dt_s
         self._keep = np.array([robot.kept(scenario.damping) for robot in robots])
+        self._reach = self._dt * (1.0 + self._keep)[:, None]
         self._radius = scenario.rescue_radius_m
         self._limit = np.array([robot.max_speed_mps for robot in robots])
         self._push = np.array([robot.gain_mps(self._dt) for robot in robots])
@@ -46,6 +49,7 @@ class Steering:
         self._rolls = np.array([robot.has_wheels for robot in robots])
         self.along_axes = not self._continuous and not self._rolls.all()
         self.speed, self.lag = self._speed_and_lag(self._push, self._limit)
+        self._routes = Routes(scenario) if scenario.obstacles else None
         self._known: tuple[Array, Array, Array] | None = None
 
     def _speed_and_lag(self, push: Array, limit: Array) -> tuple[Array, Array]:
@@ -89,6 +93,7 @@ class Steering:
         places: Any,
         faults: NDArray[np.void] | None = None,
         headings: Any = None,
+        obstacles: NDArray[np.float32] | None = None,
     ) -> Array:
         """Estimated time until each robot is within the rescue radius of each place.
 
@@ -101,6 +106,7 @@ class Steering:
             places: (E, V, 2) [m].
             faults: (E, R) structured, the fields of `BatchEnv.fault_state`; None: all are healthy.
             headings: (E, R, 2) angles [rad] and turn rates [rad/s], for robots on wheels.
+            obstacles: (E, O, 2) [m]; None: ways lead straight through them.
 
         Returns:
             (E, R, V) float64 [s]; 0 for a robot that is there, at most `NEVER_S`.
@@ -108,6 +114,11 @@ class Steering:
         way = np.asarray(places, np.float64)[:, None] - np.asarray(positions)[:, :, None]
         distance = np.sqrt((way * way).sum(-1))
         gap = np.maximum(distance - self._radius, 0.0)
+        if self._routes is not None and obstacles is not None:
+            goals = np.broadcast_to(np.asarray(places)[:, None], way.shape)
+            lengths, way = self._routes.ways(obstacles, positions, goals)
+            gap = np.where(gap > 0.0, np.maximum(lengths - self._radius, 1e-9), 0.0)
+            distance = np.sqrt((way * way).sum(-1))
         towards = (way * np.asarray(velocities)[:, :, None]).sum(-1) / np.maximum(distance, 1e-9)
         speed, lag = self.speed, self.lag
         if faults is not None:
@@ -128,13 +139,15 @@ class Steering:
         targets: Any,
         faults: NDArray[np.void] | None = None,
         headings: Any = None,
+        obstacles: NDArray[np.float32] | None = None,
     ) -> NDArray[Any]:
         """Drive every robot to its target and let it come to rest there.
 
         The action chosen is the one after which, coasting for one period more, the robot is
         nearest to its target. Looking so little ahead it drives at full speed until the target is
         two periods away; looking further it would brake where braking is not needed. Robots on
-        wheels are steered as `WheelSteering` says.
+        wheels are steered as `WheelSteering` says; these, and robots with continuous actions, drive
+        to where their way turns first.
 
         Args:
             positions: (E, R, 2) [m].
@@ -142,42 +155,67 @@ class Steering:
             targets: (E, R, 2) [m].
             faults: (E, R) structured, the fields of `BatchEnv.fault_state`; None: all are healthy.
             headings: (E, R, 2) angles [rad] and turn rates [rad/s], for robots on wheels.
+            obstacles: (E, O, 2) [m]; None: ways lead straight through them.
 
         Returns:
             (E, R) int64, or (E, R, 2) float32 in [-1, 1] where actions are continuous.
         """
         way = np.asarray(targets, np.float64) - positions
-        found = self._driven(way, np.asarray(velocities, np.float64), faults)
+        turn = way
+        routes = self._routes if obstacles is not None else None
+        if routes is not None and (self._continuous or self._wheels is not None):
+            turn = routes.aims(obstacles, positions, targets)
+        velocities = np.asarray(velocities, np.float64)
+        found: NDArray[Any]
+        if self._continuous:
+            found = self._pushes(turn, velocities, faults)
+        else:
+            moves = self._moves(velocities, faults)
+            if routes is not None:
+                left = routes.left(obstacles, positions, moves, targets)
+            else:
+                miss = way[:, :, None] - moves
+                left = (miss * miss).sum(-1)
+            found = left.argmin(-1)
         if self._wheels is None:
             return found
         if headings is None:
             raise ValueError("headings = None: must be given where robots have wheels")
-        rolling = self._wheels.actions(way, velocities, np.asarray(headings, np.float64), faults)
+        headings = np.asarray(headings, np.float64)
+        rolling = self._wheels.actions(turn, velocities, headings, faults)
         rolls = self._rolls[:, None] if self._continuous else self._rolls
         return np.where(rolls, rolling, found)
 
-    def _driven(
+    def _pushes(
         self, way: Array, velocities: Array, faults: NDArray[np.void] | None
-    ) -> NDArray[Any]:
-        """The actions of robots without wheels; see `actions`."""
-        kept = self._keep[:, None] * velocities
-        reach = self._dt * (1.0 + self._keep)[:, None]
-        push, limit, bias = self._push, self._limit, np.zeros(len(self._push))
-        if faults is not None:
-            push = push * faults["motor_gain"]
-            limit = limit * faults["speed_limit"]
-            bias = faults["heading_bias"].astype(np.float64)
-        if self._continuous:
-            wish = (way / reach - kept) / np.maximum(push, 1e-12)[..., None]
-            wish = _turned(wish, -bias)
-            length = np.sqrt((wish * wish).sum(-1, keepdims=True))
-            return np.asarray(wish / np.maximum(length, 1.0), np.float32)
+    ) -> NDArray[np.float32]:
+        """The continuous actions of robots without wheels; see `actions`."""
+        push, _, bias = self._drive(faults)
+        wish = (way / self._reach - self._keep[:, None] * velocities) / np.maximum(push, 1e-12)[
+            ..., None
+        ]
+        wish = _turned(wish, -bias)
+        length = np.sqrt((wish * wish).sum(-1, keepdims=True))
+        return np.asarray(wish / np.maximum(length, 1.0), np.float32)
+
+    def _moves(self, velocities: Array, faults: NDArray[np.void] | None) -> Array:
+        """How far each action brings robots without wheels that then coast for a period.
+
+        (E, R, 5, 2) [m].
+        """
+        push, limit, bias = self._drive(faults)
         drives = _turned(_DIRECTIONS, np.expand_dims(bias, -1)) * push[..., None, None]
-        after = kept[:, :, None] + drives
+        after = (self._keep[:, None] * velocities)[:, :, None] + drives
         speed = np.sqrt((after * after).sum(-1, keepdims=True))
         after *= np.minimum(1.0, limit[..., None, None] / np.maximum(speed, 1e-12))
-        miss = way[:, :, None] - reach[:, None] * after
-        return np.asarray((miss * miss).sum(-1).argmin(-1))
+        return np.asarray(self._reach[:, None] * after)
+
+    def _drive(self, faults: NDArray[np.void] | None) -> tuple[Array, Array, Array]:
+        """What a push adds to speeds [m/s], speed limits [m/s] and biases [rad] of directions."""
+        if faults is None:
+            return self._push, self._limit, np.zeros(len(self._push))
+        push, limit = self._push * faults["motor_gain"], self._limit * faults["speed_limit"]
+        return push, limit, faults["heading_bias"].astype(np.float64)
 
 
 def _turned(vectors: Array, angle: Array) -> Array:
