@@ -96,7 +96,8 @@ impl Radio {
     /// Lets all robots send and hear at the present step. `sightings` are what they have seen, by `sight`, up to
     /// now. Losses are drawn from `stream`: those of a step depend on the step alone.
     ///
-    /// A second exchange in the same step, after somebody was moved, takes the place of the first.
+    /// A robot whose sensors repeat an older reading hears, but learns nothing. A second exchange in the same step,
+    /// after somebody was moved, takes the place of the first.
     pub fn exchange(
         &self,
         view: &View,
@@ -116,7 +117,7 @@ impl Radio {
                 traffic.sent[sends + own] = seen.fold(0, |slots, (slot, _)| slots | 1 << slot);
             }
         }
-        let closed = view.absent | view.blind | view.deaf | view.held;
+        let closed = view.absent | view.blind | view.deaf;
         for own in 0..self.robots {
             let hears = closed >> own & 1 == 0;
             traffic.heard[own] = if hears { traffic.links[arrives + own] } else { 0 };

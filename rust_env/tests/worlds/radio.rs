@@ -115,8 +115,7 @@ proptest! {
                     let freezes = world.faults.levels(own)[Kind::FrozenSensor as usize] > 0.0;
                     let held = is(Kind::FrozenSensor) && frozen[env][own];
                     let blind = is(Kind::Blackout) && !freezes;
-                    let open = now.absent >> own & 1 == 0
-                        && !blind && !held && !is(Kind::LostCommunication);
+                    let open = now.absent >> own & 1 == 0 && !blind && !is(Kind::LostCommunication);
                     let mut news = vec![];
                     for other in 0..robots {
                         let hears = heard[own] >> other & 1 == 1;
