@@ -147,11 +147,8 @@ proptest! {
                             known[env].insert((own, *id), world.step);
                         }
                     }
-                    if !freezes {
-                        frozen[env][own] = false;
-                    } else {
-                        frozen[env][own] |= world.faults.frozen_row(own).is_some();
-                    }
+                    let is_kept = world.faults.frozen_row(own).is_some();
+                    frozen[env][own] = freezes && (frozen[env][own] || is_kept);
                     let row = &table.obs[(env * robots + own) * names.len()..][..names.len()];
                     if freezes || is(Kind::Blackout) || now.absent >> own & 1 == 1 {
                         continue;
@@ -235,7 +232,9 @@ proptest! {
         for step in 0..60 {
             if step > 0 {
                 let drives: Vec<_> = (0..4).map(|_| random_drive(&mut source)).collect();
-                tables.iter_mut().for_each(|table| table.step(&drives));
+                for table in &mut tables {
+                    table.step(&drives);
+                }
                 plain.step(&drives);
             }
             let worlds = tables.each_ref().map(|table| table.batch.worlds().next().expect("one"));
