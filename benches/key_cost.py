@@ -11,7 +11,7 @@ from typing import Any
 from fault_cost import MIXED, shares
 from page import machine, publish
 
-from innerattn.config import Scenario
+from innerattn.config import Communication, Scenario
 
 
 def changed(**keys: Any) -> Scenario:
@@ -32,6 +32,10 @@ WORLDS = {
     'drive = "unicycle"': changed(drive="unicycle"),
     'drive = "differential"': changed(drive="differential"),
     "sight_m = 0.8": changed(sight_m=0.8),
+    "a radio": MIXED.replace(communication=Communication(range_m=0.8, delay_steps=2, loss=0.1)),
+    "victims are shared": changed(sight_m=0.8).replace(
+        communication=Communication(share="victims")
+    ),
 }
 
 

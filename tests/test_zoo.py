@@ -39,7 +39,7 @@ def packed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return packing.pack(run.folder, "single", "quick", tmp_path / "zoo")
 
 
-WITHOUT_A_TEAM = {"air-ground", "mixed-sight", "mixed-wheels"}
+WITHOUT_A_TEAM = {"air-ground", "mixed-radio", "mixed-sight", "mixed-wheels"}
 """The obstacles of the first have fixed places, so the recipes of the budgets, with symmetry, do
 not take it; those of the others are on their pages, and take a few minutes."""
 

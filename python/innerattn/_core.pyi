@@ -311,6 +311,9 @@ class Batch:
     def last_seen(self) -> NDArray[np.int64]:
         """Steps at which robots last saw robots and victims, (E, R, R + V); -1: never."""
 
+    def heard(self) -> NDArray[np.bool_]:
+        """Whether robot i hears robot j now, (E, R, R)."""
+
     def positions(self) -> NDArray[np.float32]:
         """Places of the robots, (E, R, 2), m."""
 

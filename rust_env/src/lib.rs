@@ -24,6 +24,8 @@ pub mod tasks;
 
 pub mod meeting;
 pub mod sight;
+
+pub mod radio;
 pub mod supply;
 
 pub mod spawn;

@@ -1,11 +1,13 @@
 //! Observations: world → one row of numbers for each robot, with named columns.
 
 mod headings;
+mod radio;
 mod sight;
 mod stores;
 
 use crate::fault::{HEALTHY, KINDS, Kind, Levels};
 use crate::geometry::Vec2;
+use crate::radio::Radio;
 use crate::robot::Body;
 use crate::scenario::{MAX_VICTIMS, Scenario, VictimOrder};
 use crate::sight::Sight;
@@ -37,6 +39,10 @@ pub struct Scene<'a> {
     pub victims: &'a [Option<Victim>],
     /// When robots last saw each other and the victims, see [`Sight::look`]; none where all see everything.
     pub sightings: &'a [u32],
+    /// Whom robots hear, as bits; none where everybody hears everybody.
+    pub heard: &'a [u64],
+    /// What robots were told of the victims, see [`Radio::told`]; none where nothing is shared.
+    pub told: &'a [u32],
     /// Steps done in the episode.
     pub step: u32,
 }
@@ -76,6 +82,9 @@ pub struct Layout {
     stores: Option<Stores>,
     wheels: Option<Wheels>,
     sight: Option<Sight>,
+    radio: Option<Radio>,
+    /// Whether each teammate's block says whether it is heard.
+    hears: bool,
     widths: Widths,
     /// The columns that never change, of all robots (R × D); zeros elsewhere.
     fixed: Vec<f32>,
@@ -88,7 +97,7 @@ struct Widths {
     robot: usize,
     /// Of the ways to the nearest station and depot and of the turn rate, behind a robot's own block.
     ways: usize,
-    /// Of one teammate: those of a robot, whether it is seen, and for how long it was not.
+    /// Of one teammate: those of a robot, whether it is seen, for how long it was not, and whether it is heard.
     mate: usize,
     /// Before those of victims.
     victims_from: usize,
@@ -103,7 +112,12 @@ struct Widths {
 impl Layout {
     /// The columns of `scenario`.
     #[must_use]
-    pub(crate) fn new(scenario: &Scenario, tasks: &[Needs], sight: Option<Sight>) -> Self {
+    pub(crate) fn new(
+        scenario: &Scenario,
+        tasks: &[Needs],
+        sight: Option<Sight>,
+        radio: Option<Radio>,
+    ) -> Self {
         let abilities: Vec<String> = scenario.abilities().iter().map(ToString::to_string).collect();
         let amounts =
             |needs: &Needs| (0..abilities.len() as u32).map(|ability| needs.amount(ability)).collect();
@@ -119,6 +133,8 @@ impl Layout {
             stores: Stores::new(scenario),
             wheels: Wheels::new(scenario),
             sight,
+            radio,
+            hears: scenario.communication.is_some_and(|one| one.limits()),
             widths: Widths::default(),
             abilities,
             needs,
@@ -176,7 +192,7 @@ impl Layout {
             + limited
             + heading;
         let ways = stores.map_or(0, Stores::ways_width) + usize::from(self.wheels.is_some());
-        let mate = robot + 2 * limited;
+        let mate = robot + 2 * limited + usize::from(self.hears);
         let victims_from = robot + ways + (self.robots - 1) * mate;
         let row = victims_from + self.victims * victim;
         Widths { robot, ways, mate, victims_from, victim, heading, row }
@@ -226,8 +242,13 @@ impl Layout {
             if robot == 0 {
                 names.extend(stores.into_iter().flat_map(Stores::names_of_ways));
                 names.extend(self.wheels.iter().map(|_| format!("{who}.turn_rate")));
-            } else if self.sight.is_some() {
+                continue;
+            }
+            if self.sight.is_some() {
                 names.extend(["seen", "since_seen"].map(|name| format!("{who}.{name}")));
+            }
+            if self.hears {
+                names.push(format!("{who}.heard"));
             }
         }
         for victim in 0..self.victims {
@@ -252,6 +273,9 @@ impl Layout {
             if let Some(sight) = &self.sight {
                 self.hide_mates(sight, scene, own, row);
             }
+            if self.hears {
+                self.write_heard(scene, own, row);
+            }
         }
     }
 
@@ -273,6 +297,9 @@ impl Layout {
         }
         if let Some(sight) = &self.sight {
             self.hide_mates(sight, scene, own, row);
+        }
+        if self.hears {
+            self.write_heard(scene, own, row);
         }
     }
 
@@ -311,7 +338,7 @@ impl Layout {
         }
         let victims = &mut row[self.widths.victims_from..];
         match &self.sight {
-            None => self.write_victims(scene, &scene.team[own], position, victims),
+            None => self.write_victims(scene, &scene.team[own], position, &[], victims),
             Some(sight) => self.write_seen(sight, scene, own, position, victims),
         }
         if let Some(wheels) = &self.wheels {
@@ -319,9 +346,14 @@ impl Layout {
         }
     }
 
+    /// Column of the time since it was last seen in a victim's block, where sight is limited.
+    fn since_seen(&self) -> usize {
+        self.widths.victim - 1 - self.widths.heading
+    }
+
     #[allow(clippy::inline_always)] // twice, and one of the two is the hottest path of all
     #[inline(always)]
-    fn write_victims(&self, scene: Scene, body: &Body, own: Vec2, rows: &mut [f32]) {
+    fn write_victims(&self, scene: Scene, body: &Body, own: Vec2, since: &[f32], rows: &mut [f32]) {
         let Scene { tasks, victims, step, .. } = scene;
         let mut sorted = [(0_u8, 0.0_f32, 0_u8); MAX_VICTIMS];
         for (slot, victim) in victims.iter().enumerate() {
@@ -359,6 +391,9 @@ impl Layout {
                 row[self.widths.victim - 1 - usize::from(self.sight.is_some()) - self.widths.heading] =
                     f32::from(u8::from(order.is_blocked(victim, victims)));
             }
+            if let Some(since) = since.get(usize::from(*slot)) {
+                row[self.since_seen()] = *since;
+            }
         }
     }
 }
@@ -385,7 +420,7 @@ mod tests {
         scenario.robots = vec![scenario.robots[0].clone(), scenario.robots[3].clone()];
         scenario.tasks[1].needs = vec!["food".into()].into();
         let (team, tasks) = (bodies(&scenario), Needs::of_tasks(&scenario));
-        let layout = Layout::new(&scenario, &tasks, None);
+        let layout = Layout::new(&scenario, &tasks, None, None);
         let victim = |task, x| Some(Victim::new(0, task, 0, Vec2::new(x, 0.0)));
         // The near one needs food alone; the far one food and medicine.
         let victims = [victim(1, 0.5), victim(0, -0.5)];
@@ -402,6 +437,8 @@ mod tests {
             loads: &[],
             victims: &victims,
             sightings: &[],
+            heard: &[],
+            told: &[],
             step: 0,
         };
         layout.write(scene, &mut rows);

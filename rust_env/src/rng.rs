@@ -25,6 +25,8 @@ pub enum Purpose {
     Returns = 7,
     /// Where robots on wheels point when an episode starts.
     Headings = 8,
+    /// Which messages do not arrive.
+    Losses = 9,
 }
 
 /// A stream of random numbers whose state is its key and the count of words drawn.

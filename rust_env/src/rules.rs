@@ -8,6 +8,7 @@ use crate::geometry::{Solid, Vec2};
 use crate::meeting::{can_reach, least_rescue_radius};
 use crate::observe::Layout;
 use crate::physics::Physics;
+use crate::radio::Radio;
 use crate::reward::Weights;
 use crate::robot::{Body, bodies};
 use crate::scenario::{Arrival, Engine, Scenario};
@@ -63,6 +64,8 @@ pub struct Rules {
     pub wheels: Option<Wheels>,
     /// How far robots see, where something limits it.
     pub sight: Option<Sight>,
+    /// How robots communicate, where something limits it or they share something.
+    pub radio: Option<Radio>,
     /// The obstacles' forms.
     pub solids: Vec<Solid>,
     /// Motion and contacts.
@@ -106,10 +109,10 @@ impl Rules {
                 });
             }
         }
-        let sight = Sight::new(&scenario, &team, &solids);
+        let (sight, radio) = (Sight::new(&scenario, &team, &solids), Radio::new(&scenario));
         Ok(Self {
             physics: Physics::new(&scenario),
-            layout: Layout::new(&scenario, &tasks, sight.clone()),
+            layout: Layout::new(&scenario, &tasks, sight.clone(), radio.clone()),
             services: Service::of_tasks(&scenario),
             deadlines: Deadlines::new(&scenario),
             arrivals: Arrivals::new(&scenario),
@@ -120,6 +123,7 @@ impl Rules {
             weights: Weights::new(&scenario),
             faults: processes(&scenario),
             sight,
+            radio,
             spawn,
             scenario,
             team,

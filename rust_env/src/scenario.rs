@@ -5,6 +5,7 @@ mod abilities;
 mod arrivals;
 mod battery;
 mod check;
+mod communication;
 mod depot;
 mod layers;
 mod order;
@@ -22,6 +23,7 @@ use crate::fault::Fault;
 pub use abilities::{Abilities, reaches};
 pub use arrivals::Arrival;
 pub use battery::{Battery, Station};
+pub use communication::{Communication, Share};
 pub use depot::Depot;
 pub(crate) use task::steps_of;
 pub use task::{Deadline, Interrupted, Task};
@@ -268,6 +270,8 @@ pub struct Scenario {
     pub obstacles: Vec<Obstacle>,
     /// Whether obstacles hide from robots what is behind them.
     pub occlusion: bool,
+    /// How robots communicate; everybody hears everybody, at once, if absent.
+    pub communication: Option<Communication>,
     /// Places that charge batteries.
     pub stations: Vec<Station>,
     /// Places that refill loads.
@@ -364,6 +368,7 @@ impl Default for Scenario {
             arrivals: vec![],
             obstacles: vec![],
             occlusion: false,
+            communication: None,
             stations: vec![],
             depots: vec![],
             arena_half_width_m: 1.0,

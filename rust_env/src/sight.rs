@@ -143,6 +143,12 @@ impl Sight {
         &last[own * self.width()..][self.reach.len()..self.width()]
     }
 
+    /// The same, to be changed.
+    pub fn victims_mut<'a>(&self, own: usize, last: &'a mut [u32]) -> &'a mut [u32] {
+        let robots = self.reach.len();
+        &mut last[own * self.width()..][robots..self.width()]
+    }
+
     /// Those of the victims that robot `own` sees at a step.
     #[must_use]
     pub fn seen(
@@ -175,8 +181,14 @@ impl Sight {
     }
 }
 
+/// The later of two steps at which something was seen.
+#[must_use]
+pub(crate) fn later(one: u32, other: u32) -> u32 {
+    [one, other].into_iter().filter(|last| *last != NEVER).max().unwrap_or(NEVER)
+}
+
 /// Notes that something is seen at a step, or takes back that it was.
-fn note(seen: bool, step: u32, last: &mut u32) {
+pub(crate) fn note(seen: bool, step: u32, last: &mut u32) {
     if seen {
         *last = step;
     } else if *last == step {

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::fault::NUM_KINDS;
 use crate::geometry::Vec2;
+use crate::radio::Radio;
 use crate::robot::MAX_SET_SPEED_MPS;
 use crate::rules::Rules;
 use crate::scenario::Scenario;
@@ -74,8 +75,10 @@ pub fn most_bytes(rules: &Rules, num_envs: usize) -> usize {
     let charges = if rules.energy.is_some() { 10 + 8 * robots } else { 0 };
     let loads = if rules.supplies.is_some() { 10 + 5 * robots } else { 0 };
     let sightings = rules.sight.as_ref().map_or(0, |sight| 10 + 5 * sight.numbers());
+    let (long, short) = rules.radio.as_ref().map_or((0, 0), Radio::numbers);
+    let traffic = if rules.radio.is_some() { 4 * 10 + 10 * long + 5 * short } else { 0 };
     let head = MAGIC.len() + 2 * 10 + rules.scenario.to_json().len() + CHECKSUM_BYTES;
-    head + num_envs * (counts + places + faults + headings + charges + loads + sightings)
+    head + num_envs * (counts + places + faults + headings + charges + loads + sightings + traffic)
 }
 
 /// The image of `worlds`, which were made by `rules`.
@@ -103,6 +106,9 @@ pub fn save<'a>(rules: &Rules, num_envs: usize, worlds: impl Iterator<Item = &'a
         }
         if rules.sight.is_some() {
             bytes = postcard::to_extend(&world.sightings, bytes).expect("plain data serialises");
+        }
+        if rules.radio.is_some() {
+            bytes = postcard::to_extend(&world.traffic, bytes).expect("plain data serialises");
         }
         bytes
     };
@@ -169,6 +175,9 @@ pub fn load(rules: &Rules, num_envs: usize, bytes: &[u8]) -> Result<Vec<World>> 
         if rules.sight.is_some() {
             (world.sightings, later) = postcard::take_from_bytes(later).map_err(|_| unread())?;
         }
+        if rules.radio.is_some() {
+            (world.traffic, later) = postcard::take_from_bytes(later).map_err(|_| unread())?;
+        }
         if let Some(what) = misfit(rules, &world) {
             return refuse(format!("env {env} does not fit the scenario: its {what}"));
         }
@@ -225,8 +234,9 @@ fn misfit(rules: &Rules, world: &World) -> Option<&'static str> {
         ("faults", world.faults.fits(rules, world.now())),
     ];
     let broken = checks.into_iter().find(|(_, fits)| !fits).map(|(what, _)| what);
-    // A look needs a world in which all else is right.
-    broken.or_else(|| (!world.sightings_fit(rules)).then_some("sightings"))
+    // A look needs a world in which all else is right, and an exchange one that is right about what is seen.
+    let broken = broken.or_else(|| (!world.sightings_fit(rules)).then_some("sightings"));
+    broken.or_else(|| (!world.traffic_fits(rules)).then_some("traffic"))
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use crate::geometry::Vec2;
 use crate::observe::Scene;
 use crate::physics::Workspace;
 use crate::place::DRAWS;
+use crate::radio::{Radio, Traffic};
 use crate::reward::{self, Happened, total_distance};
 use crate::rng::{Purpose, Stream};
 use crate::robot::Commands;
@@ -79,6 +80,9 @@ pub struct World {
     /// everything. Images have them apart.
     #[serde(skip)]
     pub sightings: Vec<u32>,
+    /// What was sent and heard; nothing where everybody hears everybody. Images have it apart.
+    #[serde(skip)]
+    pub traffic: Traffic,
     /// Places of the obstacles, m.
     pub obstacles: Vec<Vec2>,
     /// Victims by slot.
@@ -108,6 +112,7 @@ impl World {
             charges: vec![],
             loads: vec![],
             sightings: vec![],
+            traffic: Traffic::default(),
             obstacles: vec![Vec2::zeros(); rules.solids.len()],
             victims: vec![None; rules.scenario.num_victims()],
             faults: FaultState::default(),
@@ -127,10 +132,13 @@ impl World {
         let charges = if rules.energy.is_some() { robots * size_of::<f64>() } else { 0 };
         let loads = if rules.supplies.is_some() { robots * size_of::<u32>() } else { 0 };
         let sightings = rules.sight.as_ref().map_or(0, |sight| sight.numbers() * size_of::<u32>());
+        let traffic = rules.radio.as_ref().map_or((0, 0), Radio::numbers);
+        let traffic = traffic.0 * size_of::<u64>() + traffic.1 * size_of::<u32>();
         // Allocators round up, and keep a little beside each list.
         size_of::<Self>()
-            + (places + victims + struck + headings + charges + loads + sightings + 8 * faults) * 9 / 8
-            + 9 * 16
+            + (places + victims + struck + headings + charges + loads + sightings + traffic + 8 * faults) * 9
+                / 8
+            + 13 * 16
     }
 
     /// Starts `episode`: places everything anew from that episode's streams.
@@ -152,6 +160,9 @@ impl World {
         }
         if let Some(sight) = &rules.sight {
             sight.forget(&mut self.sightings);
+        }
+        if let Some(radio) = &rules.radio {
+            radio.forget(&mut self.traffic);
         }
         if let Some(wheels) = &rules.wheels {
             let mut stream = Stream::new(self.seed, self.stream, episode, Purpose::Headings);
@@ -345,13 +356,32 @@ impl World {
         if let Some(sight) = &rules.sight {
             self.look(rules, sight);
         }
+        if let Some(radio) = &rules.radio {
+            let mut traffic = std::mem::take(&mut self.traffic);
+            self.exchange(rules, radio, &mut traffic);
+            self.traffic = traffic;
+        }
         self.freeze(rules);
     }
 
     /// Notes what robots see at the present step.
     #[inline(never)]
     fn look(&mut self, rules: &Rules, sight: &Sight) {
-        let view = View {
+        let mut sightings = std::mem::take(&mut self.sightings);
+        sight.look(&self.view(rules), &mut sightings);
+        self.sightings = sightings;
+    }
+
+    /// Lets robots send and hear at the present step.
+    #[inline(never)]
+    fn exchange(&self, rules: &Rules, radio: &Radio, traffic: &mut Traffic) {
+        let stream = Stream::new(self.seed, self.stream, self.episode, Purpose::Losses);
+        radio.exchange(&self.view(rules), rules.sight.as_ref(), &self.sightings, stream, traffic);
+    }
+
+    /// What there is to see, and whose senses fail.
+    fn view(&self, rules: &Rules) -> View<'_> {
+        View {
             positions: &self.positions,
             obstacles: &self.obstacles,
             victims: &self.victims,
@@ -360,8 +390,29 @@ impl World {
             blind: self.faults.blind(),
             deaf: self.faults.struck(Kind::LostCommunication),
             held: self.faults.held(),
-        };
-        sight.look(&view, &mut self.sightings);
+        }
+    }
+
+    /// Whom each robot hears now, as bits.
+    #[must_use]
+    pub fn heard(&self, rules: &Rules) -> Vec<u64> {
+        if rules.radio.is_some() {
+            return self.traffic.heard.clone();
+        }
+        let (open, mut traffic) = (Radio::open(&rules.scenario), Traffic::default());
+        open.forget(&mut traffic);
+        self.exchange(rules, &open, &mut traffic);
+        traffic.heard
+    }
+
+    /// When robots last saw each other and the victims, or were told of them; none where all see everything.
+    #[must_use]
+    pub fn last_seen(&self, rules: &Rules) -> Vec<u32> {
+        let mut last = self.sightings.clone();
+        if let (Some(sight), Some(radio)) = (&rules.sight, &rules.radio) {
+            radio.add_told(sight, &self.traffic, &mut last);
+        }
+        last
     }
 
     /// Whether robots of an otherwise valid world may have seen things when it says that they did.
@@ -372,6 +423,17 @@ impl World {
             let mut again = self.clone();
             again.look(rules, sight);
             again.sightings == self.sightings
+        }
+    }
+
+    /// Whether an otherwise valid world may have its traffic.
+    #[must_use]
+    pub fn traffic_fits(&self, rules: &Rules) -> bool {
+        let Some(radio) = &rules.radio else { return true };
+        radio.may_be(&self.traffic, self.step, &self.victims) && {
+            let mut again = self.traffic.clone();
+            self.exchange(rules, radio, &mut again);
+            again == self.traffic
         }
     }
 
@@ -403,6 +465,8 @@ impl World {
             loads: &self.loads,
             victims: &self.victims,
             sightings: &self.sightings,
+            heard: &self.traffic.heard,
+            told: &self.traffic.told,
             step: self.step,
         }
     }

@@ -38,6 +38,7 @@ def test_every_key_stands_in_it_with_its_meaning() -> None:
         "end_when_rescued",
         "victim_area_m",
         "victim_places_m",
+        "communication",
         "start_m",
         "obstacles",
         "faults",

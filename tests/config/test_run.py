@@ -253,6 +253,7 @@ ADDED_SINCE = {
         "depots",
         "end_when_done",
         "occlusion",
+        "communication",
     ),
     "network": ("swapped_robots", "shared_gradients", "joint_critic", "symmetry", "memory_width"),
     "train": (

@@ -42,7 +42,7 @@ def test_presets(name: str, victims: int) -> None:
 
 def test_preset_names_are_complete() -> None:
     teams = {"mixed-1-food": 3, "mixed-4-food": 6, "mixed-8": 8, "mixed-16": 16}
-    others = {"mixed-faults", "mixed-sight", "mixed-wheels", "air-ground"}
+    others = {"mixed-faults", "mixed-radio", "mixed-sight", "mixed-wheels", "air-ground"}
     assert set(SCENARIOS) == {"single", "double", "mixed", *others, *teams}
     assert {name: Scenario.preset(name).num_robots for name in teams} == teams
 

@@ -11,6 +11,7 @@ from innerattn import _core
 from innerattn.config import (
     Arrival,
     Battery,
+    Communication,
     Depot,
     Fault,
     Obstacle,
@@ -153,6 +154,18 @@ def test_drives_agree() -> None:
         compiled({"robots": [*TEAM, {**ROBOT, "drive": "jet"}]})
 
 
+def test_keys_of_communication_agree() -> None:
+    ours = Scenario(communication=Communication()).model_dump(mode="json")["communication"]
+    assert compiled({"communication": {}})["communication"] == ours
+    for share in get_args(Communication.model_fields["share"].annotation):
+        table = {"obstacles": [OBSTACLE], "occlusion": True, "communication": {"share": share}}
+        assert compiled(table) == Scenario.model_validate(table).model_dump(mode="json")
+    with pytest.raises(ValueError, match="expected `nothing` or `victims`"):
+        compiled({"communication": {"share": "all"}})
+    with pytest.raises(ValueError, match="unknown field `colour`"):
+        compiled({"communication": {"colour": 1}})
+
+
 def test_shapes_agree() -> None:
     shapes = {"disc": {"radius_m": 0.1}, "box": {"half_extents_m": [0.1, 0.2]}}
     assert {*get_args(Obstacle.model_fields["shape"].annotation)} == shapes.keys()
@@ -210,6 +223,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
             }
         ],
         "occlusion": True,
+        "communication": {"range_m": 0.5, "delay_steps": 3, "loss": 0.25, "share": "victims"},
         "stations": [{**STATION, "radius_m": 0.25}],
         "depots": [{**DEPOT, "radius_m": 0.375}],
         "arena_half_width_m": 2.0,
@@ -264,7 +278,7 @@ def test_models_are_all_mirrored() -> None:
         for argument in get_args(field.annotation)
         if isinstance(argument, type) and issubclass(argument, BaseModel)
     }
-    assert inner == {model for model, _ in NESTED.values()}
+    assert inner == {model for model, _ in NESTED.values()} | {Communication}
 
 
 @pytest.mark.parametrize(

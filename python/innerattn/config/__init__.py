@@ -11,6 +11,7 @@ from innerattn.lazy import lazy_names
 if TYPE_CHECKING:
     from innerattn.config.algorithm import Algorithm, AlgorithmConfig
     from innerattn.config.battery import Battery, Depot, Station
+    from innerattn.config.communication import Communication
     from innerattn.config.load import load_run_config, read_toml, write_toml
     from innerattn.config.ppo import PPOConfig
     from innerattn.config.registry import register_algorithm, register_attention
@@ -32,6 +33,7 @@ __all__ = [
     "AlgorithmConfig",
     "Arrival",
     "Battery",
+    "Communication",
     "Depot",
     "EvaluateConfig",
     "Fault",
@@ -62,6 +64,7 @@ __getattr__ = lazy_names(
         "Arrival": "task",
         "BUDGETS": "run",
         "Battery": "battery",
+        "Communication": "communication",
         "Depot": "battery",
         "EvaluateConfig": "sections",
         "Fault": "scenario",

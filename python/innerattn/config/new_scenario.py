@@ -24,6 +24,7 @@ _EXAMPLES: dict[str, Any] = {
     "end_when_rescued": 10,
     "victim_area_m": [-0.5, -0.5, 0.5, 0.5],
     "victim_places_m": [[0.5, 0.5], [-0.5, 0.5], [0.0, -0.5]],
+    "communication": {"range_m": 0.8, "delay_steps": 2},
 }
 _OF_TABLES = {"robots": ("start_m", [-0.5, 0.0]), "tasks": ("deadline_s", [10.0, 20.0])}
 _TABLES: dict[str, dict[str, Any]] = {
@@ -82,4 +83,7 @@ def _table(key: str, values: dict[str, Any]) -> str:
 
 def _line(key: str, value: Any) -> str:
     """A key of a TOML file; numbers, words and lists of them are written as in JSON."""
+    if isinstance(value, dict):
+        inner = ", ".join(_line(name, one).rstrip() for name, one in value.items())
+        return f"{key} = {{ {inner} }}\n"
     return f"{key} = {json.dumps(value)}\n"

@@ -16,6 +16,7 @@ from pydantic import Field, PrivateAttr, ValidationError, field_validator
 from innerattn import _core
 from innerattn.config.amounts import Amounts, list_or_table
 from innerattn.config.battery import Battery, Depot, Station
+from innerattn.config.communication import Communication
 from innerattn.config.files import preset_names, preset_table, toml_table
 from innerattn.config.model import ADDED_LATER, Model, Told, config_error
 from innerattn.config.near import did_you_mean
@@ -267,6 +268,11 @@ class Scenario(Model, Shown):
         description="let obstacles hide what is behind them, from robots of the layers that they "
         "block; true only where there are obstacles",
     )
+    communication: Annotated[Communication | None, ADDED_LATER] = Field(
+        None,
+        description="who hears whom, when, and what robots tell each other, such as "
+        "{ range_m = 0.8, delay_steps = 2 }; None: all hear all others at once",
+    )
     stations: Annotated[tuple[Station, ...], ADDED_LATER, Told(0, 64)] = Field(
         (), description="places that charge batteries"
     )
@@ -474,6 +480,11 @@ class Scenario(Model, Shown):
     def has_limited_sight(self) -> bool:
         """Whether there is something in an arena that some robot does not see."""
         return self.occlusion or any(robot.sight_m is not None for robot in self.robots)
+
+    @property
+    def limits_communication(self) -> bool:
+        """Whether some robots do not hear others, or not at once."""
+        return self.communication is not None and self.communication.limits
 
     @property
     def has_wheels(self) -> bool:

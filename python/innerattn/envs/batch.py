@@ -216,8 +216,18 @@ class BatchEnv(Shown):
 
         (E, R, R + V) int64, -1 for what it never saw in this episode, as itself. A robot sees
         something now where this is `step_counts`. Where no sight is limited, it is so everywhere.
+        Where robots share victims, what a robot was told counts as seen when the teller saw it.
         """
         return self._core.last_seen()
+
+    def heard(self) -> NDArray[np.bool_]:
+        """Who hears whom now, (E, R, R) bool: robot i hears what robot j sent.
+
+        The diagonal is False. Nobody hears a robot that was not in the arena when it sent. A robot
+        hears nobody while it is not in the arena, in a blackout and while its communication is
+        lost. Where nothing limits communication, each robot hears all others.
+        """
+        return self._core.heard()
 
     def obstacles(self) -> NDArray[np.float32]:
         """Centres of the obstacles in scenario order, (E, O, 2) float32, m."""

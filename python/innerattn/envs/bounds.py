@@ -76,8 +76,11 @@ def _observation_columns(scenario: Scenario, own: int, speeds: list[float]) -> I
             yield from [_both_ways(2 * half + far)] * (2 * spots)
             if scenario.has_wheels:
                 yield _both_ways(_most_turn(scenario))
-        elif scenario.has_limited_sight:
+            continue
+        if scenario.has_limited_sight:
             yield from (_FLAG, _FLAG)  # whether it is seen, and the time since then
+        if scenario.limits_communication:
+            yield _FLAG  # whether it is heard
     for _ in range(scenario.num_victims):
         yield _FLAG
         for ability in abilities:

@@ -22,11 +22,11 @@ _WHAT = {
 
 
 def scenario_words(scenario: Scenario) -> str:
-    """Sentences, a line each: tasks and who can do them, stores, layers, sights, doubts, faults."""
+    """Sentences, a line each: tasks and who can do them, stores, layers, senses, doubts, faults."""
     faults = map(_fault, scenario.faults)
     gone = ["Robots that are out are not in the arena."] if scenario.robots_leave else []
     who = [*_tasks(scenario), *_end(scenario), *_stores(scenario), *_motion(scenario)]
-    who += _sight(scenario)
+    who += [*_sight(scenario), *_communication(scenario)]
     return "\n".join([*who, *_doubts(scenario), *faults, *gone])
 
 
@@ -114,6 +114,21 @@ def _sight(scenario: Scenario) -> Iterator[str]:
         yield f"{robots}: sees teammates and victims up to {sight_m:g} m away"
     if scenario.occlusion:
         yield "Obstacles hide what is behind them."
+
+
+def _communication(scenario: Scenario) -> Iterator[str]:
+    """Who hears whom, when, and what robots tell each other."""
+    found = scenario.communication
+    if found is None:
+        return
+    if found.range_m is not None:
+        yield f"Robots hear each other up to {found.range_m:g} m away."
+    if found.delay_steps:
+        yield f"Robots hear what was sent {found.delay_steps * scenario.dt_s:g} s before."
+    if found.loss > 0.0:
+        yield f"Of what robots send, {found.loss:.3g} is lost."
+    if found.share == "victims":
+        yield "Robots tell those who hear them which victims they see."
 
 
 def _reach_m(robot: Robot) -> float:

@@ -207,10 +207,25 @@ impl Batch {
         let shape = [self.worlds.num_envs(), robots, robots + rules.scenario.num_victims()];
         let of = |world: &World| match &rules.sight {
             Some(_) => {
-                world.sightings.iter().map(|last| if *last == NEVER { -1 } else { (*last).into() }).collect()
+                let last = world.last_seen(rules);
+                last.iter().map(|last| if *last == NEVER { -1 } else { (*last).into() }).collect()
             }
             None => vec![i64::from(world.step); shape[1] * shape[2]],
         };
+        shaped(py, gather(shape.iter().product(), self.worlds.worlds().flat_map(of))?, shape)
+    }
+
+    fn heard<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<bool>>> {
+        let rules = self.worlds.rules();
+        let robots = rules.team.len();
+        let of = |world: &World| {
+            let heard = world.heard(rules);
+            heard
+                .into_iter()
+                .flat_map(|one| (0..robots).map(move |other| one >> other & 1 == 1))
+                .collect::<Vec<_>>()
+        };
+        let shape = [self.worlds.num_envs(), robots, robots];
         shaped(py, gather(shape.iter().product(), self.worlds.worlds().flat_map(of))?, shape)
     }
 

@@ -3,7 +3,8 @@
 use super::{Layout, Scene};
 use crate::geometry::Vec2;
 use crate::scenario::{MAX_VICTIMS, VictimOrder};
-use crate::sight::Sight;
+use crate::sight::{Sight, later};
+use crate::tasks::Victim;
 
 impl Layout {
     /// Leaves nothing of teammates that the robot does not see, and says for how long it has not seen each of
@@ -21,7 +22,7 @@ impl Layout {
         }
     }
 
-    /// Writes the victims that the robot sees, and for how long it has not seen each.
+    /// Writes the victims that the robot sees or is told of, and for how long it has not seen each.
     #[inline(never)] // worlds in which all is seen are faster without it
     pub(super) fn write_seen(
         &self,
@@ -31,25 +32,42 @@ impl Layout {
         position: Vec2,
         rows: &mut [f32],
     ) {
-        let seen = sight.seen(own, scene.sightings, scene.step, scene.victims);
-        let in_sight = Scene { victims: &seen[..scene.victims.len()], ..scene };
-        self.write_victims(in_sight, &scene.team[own], position, rows);
-        self.write_since(sight, scene, own, rows);
-    }
-
-    /// Writes for how long the robot has not seen each victim. In the order of relevance those that it sees come
-    /// first, then those that it saw later than others, so that nothing tells of what it does not see.
-    fn write_since(&self, sight: &Sight, scene: Scene, own: usize, rows: &mut [f32]) {
+        let (slots, seen) = (scene.victims.len(), sight.victims(own, scene.sightings));
+        let mut known = sight.seen(own, scene.sightings, scene.step, scene.victims);
         let mut since = [1.0; MAX_VICTIMS];
-        let last = sight.victims(own, scene.sightings);
-        for (since, last) in since.iter_mut().zip(last) {
+        for (since, last) in since.iter_mut().zip(seen) {
             *since = sight.since(*last, scene.step);
         }
-        if self.sorted == VictimOrder::Relevant {
-            since[..last.len()].sort_unstable_by(f32::total_cmp);
+        if let Some(radio) = &self.radio {
+            for (slot, told) in radio.told(own, scene.told).iter().enumerate() {
+                since[slot] = sight.since(later(seen[slot], *told), scene.step);
+                known[slot] =
+                    known[slot].or(scene.victims[slot].filter(|_| radio.is_news(*told, scene.step)));
+            }
         }
-        let width = self.widths.victim;
-        let at = width - 1 - self.widths.heading;
-        rows.chunks_exact_mut(width).zip(since).for_each(|(row, since)| row[at] = since);
+        let (known, since) = (&known[..slots], &mut since[..slots]);
+        let in_sight = Scene { victims: known, ..scene };
+        self.write_victims(in_sight, &scene.team[own], position, since, rows);
+        self.write_since(known, since, rows);
+    }
+
+    /// Writes for how long the robot has not seen the victims that it does not know now. In the order of relevance
+    /// they follow the others, by that time, so that nothing tells of what it does not know.
+    fn write_since(&self, known: &[Option<Victim>], since: &mut [f32], rows: &mut [f32]) {
+        let (width, at) = (self.widths.victim, self.since_seen());
+        if self.sorted == VictimOrder::Slot {
+            return rows.chunks_exact_mut(width).zip(since).for_each(|(row, since)| row[at] = *since);
+        }
+        let mut rest = 0;
+        for (slot, victim) in known.iter().enumerate() {
+            if victim.is_none() {
+                since[rest] = since[slot];
+                rest += 1;
+            }
+        }
+        let hidden = &mut since[..rest];
+        hidden.sort_unstable_by(f32::total_cmp);
+        let rows = rows.chunks_exact_mut(width).skip(known.len() - rest);
+        rows.zip(hidden).for_each(|(row, since)| row[at] = *since);
     }
 }

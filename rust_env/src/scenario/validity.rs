@@ -23,6 +23,7 @@ impl Scenario {
         self.validate_order()?;
         self.validate_obstacles()?;
         self.validate_sight()?;
+        self.validate_communication()?;
         self.validate_faults()?;
         self.validate_sizes()?;
         self.validate_starts()?;

@@ -271,6 +271,56 @@ fn sightings_are_kept_and_checked() {
 }
 
 #[test]
+fn traffic_is_kept_and_checked() {
+    use crate::scenario::{Communication, Share};
+    use crate::sight::NEVER;
+    type Change = fn(&mut World);
+    let told = Communication { delay_steps: 2, share: Share::Victims, ..Communication::default() };
+    let mut scenario =
+        Scenario { situation: Situation::Double, communication: Some(told), ..Scenario::default() };
+    scenario.robots[0].sight_m = Some(0.06); // it sees nobody
+    let rules = rules(scenario);
+    let mut world = World::new(&rules, 5, 7);
+    world.fresh = false;
+    for step in 1..5 {
+        world.step = step;
+        world.perceive(&rules);
+    }
+    // By step modulo 3: of steps 3, 4 and 2, of which the last is heard now.
+    assert_eq!(world.traffic.heard, [0b1110, 0b1101, 0b1011, 0b0111]);
+    assert_eq!(world.traffic.sent, [0, 3, 3, 3].repeat(3));
+    assert_eq!(world.traffic.told, [2; 8]);
+    let bytes = |world: &World| save(&rules, 1, [world].into_iter());
+    assert_eq!(load(&rules, 1, &bytes(&world)), Ok(vec![world.clone()]));
+    assert!(bytes(&world).len() <= most_bytes(&rules, 1));
+    let changes: [Change; 14] = [
+        |world| world.traffic.links[0] |= 1,      // itself
+        |world| world.traffic.links[0] |= 1 << 4, // nobody
+        |world| world.traffic.links[4] &= !2,     // whom it reaches now
+        |world| world.traffic.links.truncate(11),
+        |world| world.traffic.sent[0] |= 4, // no slot
+        |world| world.traffic.sent[5] = 0,  // what it sees now
+        |world| world.traffic.sent.push(0),
+        |world| world.traffic.heard[0] = 0,
+        |world| world.traffic.heard.push(0),
+        |world| world.traffic.told[0] = 3, // it cannot have been told yet
+        |world| world.traffic.told[0] = 1, // it is told now
+        |world| world.traffic.told[0] = NEVER,
+        |world| world.traffic.told.truncate(7),
+        |world| world.traffic = crate::radio::Traffic::default(),
+    ];
+    for (number, change) in changes.into_iter().enumerate() {
+        let mut forged = world.clone();
+        change(&mut forged);
+        let error = load(&rules, 1, &bytes(&forged)).expect_err("a forged image").to_string();
+        assert_eq!(error, "snapshot: env 0 does not fit the scenario: its traffic", "{number}");
+    }
+    let mut early = World::new(&rules, 5, 7);
+    early.traffic.links[4] = 2; // of a step that has not come
+    assert!(load(&rules, 1, &bytes(&early)).is_err());
+}
+
+#[test]
 fn images_of_worlds_whose_victims_take_no_time_are_what_they_were() {
     let rules = rules(Scenario::default());
     let world = World::new(&rules, 0, 0);

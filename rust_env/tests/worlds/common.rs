@@ -9,8 +9,8 @@ use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
-    Abilities, Actions, Arrival, Battery, Deadline, Depot, DriveMode, Engine, Interrupted, Obstacle, Robot,
-    Scenario, Shape, Situation, Station, Unavailable,
+    Abilities, Actions, Arrival, Battery, Communication, Deadline, Depot, DriveMode, Engine, Interrupted,
+    Obstacle, Robot, Scenario, Shape, Share, Situation, Station, Unavailable,
 };
 use innerattn_env::tasks::{Loss, Rescue};
 
@@ -280,6 +280,13 @@ pub fn with_sight(mut scenario: Scenario) -> Scenario {
     }
     let occlusion = !scenario.obstacles.is_empty();
     Scenario { occlusion, rescue_radius_m: 0.4, ..scenario }
+}
+
+/// Robots with limited sight tell what they see, not far, late, and not always.
+pub fn with_radio(scenario: Scenario) -> Scenario {
+    let range_m = Some(1.2 * scenario.arena_half_width_m);
+    let told = Communication { range_m, delay_steps: 2, loss: 0.2, share: Share::Victims };
+    Scenario { communication: Some(told), ..with_sight(scenario) }
 }
 
 /// A disc at a random place, a box at a random place, and a box that stays.

@@ -8,7 +8,8 @@ use innerattn_env::error::Error;
 use innerattn_env::rng::Stream;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
-    Actions, DriveMode, Engine, MAX_TRAVEL_RADII, Obstacle, Robot, Scenario, Shape, Situation, Task,
+    Actions, Communication, DriveMode, Engine, MAX_TRAVEL_RADII, Obstacle, Robot, Scenario, Shape, Share,
+    Situation, Task,
 };
 use innerattn_env::world::World;
 
@@ -127,8 +128,20 @@ fn extreme(source: &mut Stream) -> Scenario {
         friction: if engine == Engine::Rapier { one_of(source, &[0.0, 0.5, 10.0]) } else { 0.0 },
         engine,
         actions: one_of(source, &[Actions::Discrete, Actions::Continuous]),
+        communication: communication(source),
         ..Scenario::default()
     }
+}
+
+/// A radio of some sort, or none.
+fn communication(source: &mut Stream) -> Option<Communication> {
+    let found = Communication {
+        range_m: (source.below(2) == 0).then(|| scaled(source, 0.005, 1000.0)),
+        delay_steps: one_of(source, &[0, 1, 20]),
+        loss: one_of(source, &[0.0, 0.5, 0.999_999_99]),
+        share: Share::Nothing,
+    };
+    (source.below(2) == 0).then_some(found)
 }
 
 /// How far the fastest robot goes in a period, in smallest radii.

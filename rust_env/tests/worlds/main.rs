@@ -18,6 +18,7 @@ mod layers;
 mod leaving;
 mod loads;
 mod order;
+mod radio;
 mod sight;
 mod snapshot;
 mod speed;

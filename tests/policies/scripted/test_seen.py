@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from innerattn.config import Scenario
+from innerattn.config import Communication, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.evaluate.play import run_episodes
 from innerattn.policies import WorldState, scripted_policy, scripts_of
@@ -93,3 +93,14 @@ def test_it_is_measured_where_sight_is_limited_and_is_between_chance_and_all_kno
         for name in ("random", "greedy-seen", "hungarian")
     }
     assert 3 * rescues["random"] < rescues["greedy-seen"] < rescues["hungarian"]
+
+
+def test_who_is_told_of_victims_goes_to_them() -> None:
+    """With what it was told it rescues more than without, and no more than one that sees all."""
+    alone = sighted(0.5, episode_steps=40)
+    told = alone.replace(communication=Communication(share="victims"))
+    alone_mean, told_mean, all_mean = (
+        run_episodes(scripted_policy(name, scenario), scenario, 100, 3).rescue_counts().mean()
+        for name, scenario in (("greedy-seen", alone), ("greedy-seen", told), ("greedy", told))
+    )
+    assert 1.1 * alone_mean < told_mean <= 1.05 * all_mean

@@ -39,7 +39,7 @@ def contract_of(scenario: Scenario, names: list[str]) -> Contract:
     return contract_in(contract_text(document))
 
 
-WITHOUT_ROWS = ("mixed-faults", "mixed-sight", "mixed-wheels")
+WITHOUT_ROWS = ("mixed-faults", "mixed-radio", "mixed-sight", "mixed-wheels")
 """Presets whose rows follow from more than readings: senses fail, the sight is limited, or robots
 have a heading."""
 

@@ -1,7 +1,8 @@
 """Scripted policies to measure trained ones against, from `random` to `planner` and `oracle`.
 
 They see the true state of the worlds and plan for all worlds of a batch at once; none learns. Only
-`oracle` knows of faults. `greedy-seen` uses of the state what each robot has seen itself.
+`oracle` knows of faults. `greedy-seen` uses of the state what each robot has seen itself or was
+told by teammates.
 """
 
 from __future__ import annotations
@@ -145,11 +146,12 @@ class GreedyPolicy(_Dispatcher):
 
 
 class GreedySeenPolicy(_Dispatcher):
-    """Every robot goes to the nearest victim that it can help and has seen itself, or searches.
+    """Every robot goes to the nearest victim that it can help and has seen, or searches.
 
-    Victims stay where they are, so one that was seen is known until all hear that it is gone. A
-    robot that knows of none to help follows a place that sweeps the arena. It uses nothing of what
-    it has not seen: neither victims nor teammates, nor whether somebody else makes it in time.
+    Where robots share victims, it has seen those that it was told of, too. Victims stay where they
+    are, so one that was seen is known until all hear that it is gone. A robot that knows of none to
+    help follows a place that sweeps the arena. It uses nothing of what it has not seen: neither
+    victims nor teammates, nor whether somebody else makes it in time.
     """
 
     name = "greedy-seen"

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from innerattn.config import RunConfig
 from innerattn.config.battery import refuse_stores_velocities_and_sights
+from innerattn.config.communication import refuse_communication
 from innerattn.config.files import sync_folder, write_whole
 from innerattn.envs import BatchEnv
 from innerattn.errors import ExportError, MissingLibraryError, missing_library
@@ -69,7 +70,7 @@ def export_run(run: str | Path, out: str | Path | None = None) -> tuple[Path, Co
         ExportError: the folder is already there or cannot be made, the run's policy is not one of
             this package, or the exported one differs from it.
         RunError, ConfigError: there is no readable run, it holds no weights, or its robots have a
-            battery, a load or a limited sight.
+            battery, a load, a limited sight or a radio.
         OSError: the run's manifest cannot be written.
     """
     needed_libraries()
@@ -101,6 +102,7 @@ def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: 
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         names = env.observation_names()
     refuse_stores_velocities_and_sights(config.scenario, "exported policies")
+    refuse_communication(config.scenario, "exported policies")
     if config.network.memory_width:
         raise ExportError(
             f"{run}: network.memory_width = {config.network.memory_width}: exported policies have "

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from innerattn.config import Scenario
 from innerattn.config.battery import refuse_stores_velocities_and_sights
+from innerattn.config.communication import refuse_communication
 from innerattn.errors import ConfigError
 from innerattn.nn.teams import TeamTables
 from innerattn.policies.scripted.steering import Steering
@@ -39,11 +40,12 @@ class TeamSheet:
 
         Raises:
             ConfigError: actions are continuous or set velocities, or robots have a battery or a
-                load or a limited sight.
+                load, a limited sight or a radio.
         """
         if scenario.actions != "discrete":
             raise ConfigError("scenario.actions = 'continuous': must be 'discrete' for any team")
         refuse_stores_velocities_and_sights(scenario, "policies for any team")
+        refuse_communication(scenario, "policies for any team")
         self.num_robots = len(scenario.robots)
         self.each_sees = any(fault.kind in SENSES for fault in scenario.faults)
         self._leave = scenario.robots_leave
