@@ -11,6 +11,8 @@ use crate::scenario::Engine;
 
 /// Cells of all fields that are kept.
 const MOST_KEPT: usize = 1 << 23;
+/// Calls for which a field is kept in any case: a step of a script has two.
+const RECENT: u64 = 4;
 
 /// Robots of one size and layer: the same stands in their way.
 struct Size {
@@ -71,12 +73,11 @@ impl Routes {
         }
     }
 
-    /// Begins a call: fields that were not used since the last one may be forgotten where there are too many.
+    /// Begins a call: fields that no recent one used may be forgotten where there are too many.
     pub fn begin(&mut self) {
         if self.cells > MOST_KEPT {
-            let used = self.calls;
             for known in self.known.values_mut() {
-                known.fields.retain(|_, (call, _)| *call >= used);
+                known.fields.retain(|_, (call, _)| *call + RECENT > self.calls);
             }
             self.known.retain(|_, known| !known.fields.is_empty());
             let fields = self.known.values().flat_map(|known| known.fields.values());
