@@ -163,7 +163,7 @@ def test_who_does_not_know_who_hears_whom_refuses_limits() -> None:
     for free in (Scenario(), told(), told(0.5, share="victims")):
         refuse_communication(free, "they")
     with pytest.raises(
-        ConfigError, match=r"^scenario.communication = range_m=0.5 .*: must be left"
+        ConfigError, match=r"^scenario.communication = { range_m = 0.5 }: must be left out; they"
     ):
         refuse_communication(told(range_m=0.5), "they")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
@@ -49,6 +50,9 @@ def refuse_communication(scenario: Scenario, who: str) -> None:
     """
     if scenario.limits_communication:
         found = scenario.communication
+        limits = found.model_dump(exclude_defaults=True) if found else {}
+        shown = ", ".join(f"{key} = {json.dumps(value)}" for key, value in limits.items())
         raise ConfigError(
-            f"scenario.communication = {found}: must be left out; {who} do not know who hears whom"
+            f"scenario.communication = {{ {shown} }}: must be left out; "
+            f"{who} do not know who hears whom"
         )
