@@ -90,7 +90,7 @@ impl FreeSpace {
         self.along(from, to).take_while(open).last().unwrap_or(from)
     }
 
-    /// The cells around a cell, as many as there are, and how far their centres are from its own, m.
+    /// The cells around a cell, as many as there are.
     fn around(&self, cell: usize) -> impl Iterator<Item = usize> {
         let (row, column, side) = (cell / self.side, cell % self.side, self.side);
         let rows = row.saturating_sub(1)..=(row + 1).min(side - 1);

@@ -21,10 +21,11 @@ struct Size {
     obstacles: Vec<usize>,
 }
 
-/// What fields are known by: the size of robots, the bits of the places of their obstacles, and those of a goal.
+/// What a space is known by: the size of robots, and the bits of the places of their obstacles.
 type SpaceKey = (usize, Vec<[u32; 2]>);
 
-/// Free cells around some obstacles, and the fields over them, with when they were used last.
+/// Free cells around some obstacles, and the fields over them by the bits of their goals, with the call that used
+/// them last.
 struct Known {
     space: FreeSpace,
     fields: HashMap<[u32; 2], (u64, DistanceField)>,

@@ -4,16 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
+from framed_rows import check_frames_keep
 
 from innerattn.config import Fault, Obstacle, Scenario
 from innerattn.config.battery import refuse_stores_velocities_and_sights
 from innerattn.envs import BatchEnv, parallel_env
 from innerattn.envs.bounds import observation_bounds
 from innerattn.errors import ConfigError
-from innerattn.nn.symmetry import NUM_ELEMENTS, SquareSymmetry
 from innerattn.report.scenario_words import scenario_words
-from innerattn.train.columns import entity_columns, vector_columns
 
 ENVS = 4
 DISC = Obstacle(shape="disc", radius_m=0.2, position_m=(0.0, 0.0))
@@ -94,16 +92,7 @@ def test_rows_are_within_their_bounds(order: Any) -> None:
 
 def test_frames_bring_turned_rows_to_one_form() -> None:
     env, rows = walked(sighted(None, 0.3, 0.5, 0.7, 0.3))
-    names = env.observation_names()
-    obs = torch.from_numpy(rows.reshape(-1, rows.shape[-1]))
-    assert entity_columns(names).width == obs.shape[1]
-    symmetry = SquareSymmetry(vector_columns(names), torch.device("cpu"))
-    own = symmetry.turn(obs, symmetry.frame(obs))
-    for element in range(NUM_ELEMENTS):
-        turned = symmetry.turn(obs, torch.full((len(obs),), element))
-        assert torch.equal(symmetry.turn(turned, symmetry.frame(turned)), own)
-    seen = [name.endswith("seen") for name in names]
-    assert torch.equal(own[:, seen], obs[:, seen])
+    check_frames_keep(rows, env.observation_names(), "seen")
 
 
 def test_who_hears_nobody_sees_nobody_and_who_comes_back_has_been_unseen() -> None:

@@ -70,7 +70,7 @@ def export_run(run: str | Path, out: str | Path | None = None) -> tuple[Path, Co
         ExportError: the folder is already there or cannot be made, the run's policy is not one of
             this package, or the exported one differs from it.
         RunError, ConfigError: there is no readable run, it holds no weights, or its robots have a
-            battery, a load, a limited sight or a radio.
+            battery, a load, a limited sight or limited communication.
         OSError: the run's manifest cannot be written.
     """
     needed_libraries()

@@ -40,7 +40,7 @@ class TeamSheet:
 
         Raises:
             ConfigError: actions are continuous or set velocities, or robots have a battery or a
-                load, a limited sight or a radio.
+                load, a limited sight or limited communication.
         """
         if scenario.actions != "discrete":
             raise ConfigError("scenario.actions = 'continuous': must be 'discrete' for any team")
