@@ -28,8 +28,10 @@ pub struct FreeSpace {
     half: f32,
     side: usize,
     cell: f32,
-    /// Whether the disc fits where each cell has its centre.
-    free: Vec<bool>,
+    scale: f32,
+    /// For how many steps of half a cell the disc fits wherever it goes from a cell, at least 1; 0 where it
+    /// does not fit at the centre.
+    ahead: Vec<u8>,
     /// Whether it can be there at all, as deep in a solid as contacts let it.
     open: Vec<bool>,
 }
@@ -40,16 +42,36 @@ impl FreeSpace {
     pub fn new(half: f32, radius: f32, solids: &[Placed]) -> Self {
         let wanted = (2.0 * half / (CELL_RADII * radius)).ceil();
         let side = (wanted as usize).clamp(1, MOST_CELLS);
-        let mut space = Self { half, side, cell: 2.0 * half / side as f32, free: vec![], open: vec![] };
+        let mut space = Self {
+            half,
+            side,
+            cell: 2.0 * half / side as f32,
+            scale: side as f32 / (2.0 * half),
+            ahead: vec![],
+            open: vec![],
+        };
         let room = |cell: usize| {
             let at = space.centre(cell);
             let nearest = solids.iter().map(|(solid, place)| solid.nearest(at - place).0);
             nearest.fold(half - at.amax(), f32::min)
         };
         let rooms: Vec<f32> = (0..side * side).map(room).collect();
-        space.free = rooms.iter().map(|room| *room >= radius).collect();
+        // Of two places, the centres of their cells are at most 1.42 cells farther apart than they are.
+        let steps = |room: f32| ((room - radius - 1.5 * space.cell) / (0.5 * space.cell)).max(1.0) as u8;
+        space.ahead = rooms.iter().map(|room| if *room >= radius { steps(*room) } else { 0 }).collect();
         space.open = rooms.iter().map(|room| *room >= INSIDE * radius).collect();
         space
+    }
+
+    /// How many cells there are.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.ahead.len()
+    }
+
+    /// Whether the disc fits where a cell has its centre.
+    fn is_free(&self, cell: usize) -> bool {
+        self.ahead[cell] > 0
     }
 
     /// The centre of a cell, m.
@@ -60,7 +82,8 @@ impl FreeSpace {
 
     /// Column and row of a place, those of the nearest cell where it is outside.
     fn indices(&self, at: Vec2) -> (usize, usize) {
-        let index = |value: f32| (((value + self.half) / self.cell).max(0.0) as usize).min(self.side - 1);
+        let index =
+            |value: f32| (((value + self.half) * self.scale).max(0.0) as u32 as usize).min(self.side - 1);
         (index(at.x), index(at.y))
     }
 
@@ -69,25 +92,36 @@ impl FreeSpace {
         row * self.side + column
     }
 
-    /// Places along a straight way that are half a cell apart or less, the first one after its beginning.
-    fn along(&self, from: Vec2, to: Vec2) -> impl Iterator<Item = Vec2> {
-        let way = to - from;
-        let steps = (way.norm() / (0.5 * self.cell)).ceil().max(1.0);
-        (1..=steps as usize).map(move |step| from + way * (step as f32 / steps))
+    /// Into how many steps of half a cell or less a straight way is cut.
+    fn steps(&self, way: Vec2) -> f32 {
+        (way.norm() / (0.5 * self.cell)).ceil().max(1.0)
     }
 
-    /// Whether the disc fits all along a straight way, but within `reach` of its end.
+    /// Whether the disc fits after each step of a straight way, but within `reach` of its end.
     fn is_clear(&self, from: Vec2, to: Vec2, reach: f32) -> bool {
-        let near = |at: Vec2| (to - at).norm_squared() <= reach * reach;
-        self.along(from, to).all(|at| self.free[self.cell(at)] || near(at))
+        let way = to - from;
+        let steps = self.steps(way);
+        let (one, last) = (way / steps, steps as u32);
+        let mut step = 1;
+        while step <= last {
+            let at = from + one * step as f32;
+            let ahead = self.ahead[self.cell(at)];
+            if ahead == 0 && (to - at).norm_squared() > reach * reach {
+                return false;
+            }
+            step += u32::from(ahead.max(1));
+        }
+        true
     }
 
     /// The last place of a straight way that a disc can come to.
     #[must_use]
     pub fn stopped(&self, from: Vec2, to: Vec2) -> Vec2 {
-        let outside = |at: Vec2| at.amax() > self.half;
-        let open = |at: &Vec2| self.open[self.cell(*at)] && !outside(*at);
-        self.along(from, to).take_while(open).last().unwrap_or(from)
+        let way = to - from;
+        let steps = self.steps(way);
+        let places = (1..=steps as usize).map(|step| from + way * (step as f32 / steps));
+        let open = |at: &Vec2| self.open[self.cell(*at)] && at.amax() <= self.half;
+        places.take_while(open).last().unwrap_or(from)
     }
 
     /// The cells around a cell, as many as there are.
@@ -114,7 +148,7 @@ impl FreeSpace {
                 let edge = other_row.abs_diff(row) == ring;
                 for other in low(column)..=high(column) {
                     let cell = other_row * self.side + other;
-                    if (edge || other.abs_diff(column) == ring) && self.free[cell] {
+                    if (edge || other.abs_diff(column) == ring) && self.is_free(cell) {
                         let distance = (self.centre(cell) - at).norm();
                         if best.is_none_or(|(least, _)| distance < least) {
                             best = Some((distance, cell));
@@ -157,8 +191,9 @@ impl PartialOrd for Next {
     }
 }
 
-/// Lengths of shortest ways to one goal, and their first turns.
-#[derive(Debug, Clone)]
+/// Lengths of shortest ways to one goal, and their first turns. Empty until a way is asked for that is not
+/// straight.
+#[derive(Debug, Clone, Default)]
 pub struct DistanceField {
     goal: Vec2,
     /// Who is so near to the goal is there, m.
@@ -166,37 +201,16 @@ pub struct DistanceField {
     lengths: Vec<f32>,
     turns: Vec<u32>,
     settled: Vec<bool>,
+    /// Whether it is known that the way from a cell is straight, or that it is not.
+    seen: Vec<bool>,
     next: BinaryHeap<Next>,
 }
 
 impl DistanceField {
     /// The field of a goal; a robot within `reach` of it is there, even behind a wall.
     #[must_use]
-    pub fn new(space: &FreeSpace, goal: Vec2, reach: f32) -> Self {
-        let count = space.free.len();
-        let mut field = Self {
-            goal,
-            reach,
-            lengths: vec![f32::INFINITY; count],
-            turns: vec![GOAL; count],
-            settled: vec![false; count],
-            next: BinaryHeap::new(),
-        };
-        let within = |cell: &usize| (space.centre(*cell) - goal).norm() <= reach;
-        let mut first: Vec<usize> = (0..count).filter(|cell| space.free[*cell]).filter(within).collect();
-        if first.is_empty() {
-            first.extend(space.nearest_free(goal));
-        }
-        for cell in first {
-            field.offer(cell, (space.centre(cell) - goal).norm(), GOAL);
-        }
-        field
-    }
-
-    /// How many cells it has.
-    #[must_use]
-    pub fn cells(&self) -> usize {
-        self.lengths.len()
+    pub fn new(goal: Vec2, reach: f32) -> Self {
+        Self { goal, reach, ..Self::default() }
     }
 
     /// The way from a place. Where the disc has no room, it first leaves that place the shortest way.
@@ -205,7 +219,7 @@ impl DistanceField {
             return Way { length: (self.goal - from).norm(), next: self.goal };
         }
         let cell = space.cell(from);
-        if space.free[cell] && self.settle(space, cell) {
+        if space.is_free(cell) && self.settle(space, cell) {
             let turn = self.place(space, self.turns[cell]);
             if self.turns[cell] != GOAL && space.is_clear(from, turn, 0.0) {
                 let rest = self.lengths[self.turns[cell] as usize];
@@ -226,6 +240,7 @@ impl DistanceField {
 
     /// Grows until a cell is settled. Returns whether there is a way from it.
     fn settle(&mut self, space: &FreeSpace, wanted: usize) -> bool {
+        self.look(space, wanted);
         while !self.settled[wanted] {
             let Some(Next { length, cell }) = self.next.pop() else { return false };
             let cell = cell as usize;
@@ -242,12 +257,48 @@ impl DistanceField {
             let turn = self.turns[cell];
             let (from, before) = (self.place(space, turn), self.before(turn));
             for other in space.around(cell) {
-                if space.free[other] && !self.settled[other] {
+                if space.is_free(other) && !self.settled[other] {
                     self.offer(other, before + (space.centre(other) - from).norm(), turn);
                 }
             }
         }
         true
+    }
+
+    /// Settles a cell from which the way leads straight to the goal. From another cell, finds all in the same
+    /// shadow: their ways turn in it, or where it ends.
+    fn look(&mut self, space: &FreeSpace, from: usize) {
+        if self.lengths.is_empty() {
+            let count = space.cells();
+            self.lengths = vec![f32::INFINITY; count];
+            self.turns = vec![GOAL; count];
+            self.settled = vec![false; count];
+            self.seen = vec![false; count];
+        }
+        let (mut left, mut shadow) = (vec![from], vec![]);
+        while let Some(cell) = left.pop() {
+            if std::mem::replace(&mut self.seen[cell], true) {
+                continue;
+            }
+            let at = space.centre(cell);
+            if space.is_clear(at, self.goal, self.reach) {
+                self.lengths[cell] = (at - self.goal).norm();
+                self.settled[cell] = true;
+            } else {
+                shadow.push(cell);
+                left.extend(space.around(cell).filter(|other| space.is_free(*other)));
+            }
+        }
+        let mut ends = shadow.is_empty();
+        for cell in &shadow {
+            ends |= self.turn_nearby(space, *cell);
+        }
+        if !ends {
+            // From nowhere the way is straight to a goal that is too deep in a solid.
+            if let Some(cell) = space.nearest_free(self.goal).filter(|cell| shadow.contains(cell)) {
+                self.offer(cell, (space.centre(cell) - self.goal).norm(), GOAL);
+            }
+        }
     }
 
     /// Lets the way of a cell turn at the best of the settled cells around it, if there is any.

@@ -40,7 +40,6 @@ pub struct Routes {
     half: f32,
     reach: f32,
     known: HashMap<SpaceKey, Known>,
-    cells: usize,
     calls: u64,
 }
 
@@ -69,22 +68,24 @@ impl Routes {
             half: rules.scenario.arena_half_width_m as f32,
             reach: rules.scenario.rescue_radius_m as f32,
             known: HashMap::new(),
-            cells: 0,
             calls: 0,
         }
     }
 
     /// Begins a call: fields that no recent one used may be forgotten where there are too many.
     pub fn begin(&mut self) {
-        if self.cells > MOST_KEPT {
+        if self.cells() > MOST_KEPT {
             for known in self.known.values_mut() {
                 known.fields.retain(|_, (call, _)| *call + RECENT > self.calls);
             }
             self.known.retain(|_, known| !known.fields.is_empty());
-            let fields = self.known.values().flat_map(|known| known.fields.values());
-            self.cells = fields.map(|(_, field)| field.cells()).sum();
         }
         self.calls += 1;
+    }
+
+    /// Cells of all that is kept, at most.
+    fn cells(&self) -> usize {
+        self.known.values().map(|known| known.space.cells() * (1 + known.fields.len())).sum()
     }
 
     /// The way of a robot in a world with these obstacles.
@@ -102,7 +103,7 @@ impl Routes {
     }
 
     fn field(&mut self, size: usize, obstacles: &[Vec2], goal: Vec2) -> (&FreeSpace, &mut DistanceField) {
-        let Self { solids, sizes, half, reach, known, cells, calls, .. } = self;
+        let Self { solids, sizes, half, reach, known, calls, .. } = self;
         let Size { radius, obstacles: own } = &sizes[size];
         let bits = |at: Vec2| [at.x.to_bits(), at.y.to_bits()];
         let key = (size, own.iter().map(|index| bits(obstacles[*index])).collect());
@@ -111,11 +112,8 @@ impl Routes {
             let placed: Vec<Placed> = own.iter().map(placed).collect();
             Known { space: FreeSpace::new(*half, *radius, &placed), fields: HashMap::new() }
         });
-        let (used, field) = fields.entry(bits(goal)).or_insert_with(|| {
-            let field = DistanceField::new(space, goal, *reach);
-            *cells += field.cells();
-            (*calls, field)
-        });
+        let (used, field) =
+            fields.entry(bits(goal)).or_insert_with(|| (*calls, DistanceField::new(goal, *reach)));
         *used = *calls;
         (space, field)
     }
