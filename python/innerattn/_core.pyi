@@ -45,6 +45,9 @@ class Rules:
     def num_victims(self) -> int:
         """Victim slots V."""
 
+    def map_boxes(self) -> list[list[float]]:
+        """The map's solid cells as few boxes: centre x, y and half extents x, y of each [m]."""
+
     def __eq__(self, other: object, /) -> bool:
         """Whether the other is the same scenario."""
 

@@ -98,6 +98,7 @@ EXTRA_OF = {
     "onnxruntime": "deploy",
     "onnxscript": "deploy",
     "optuna": "search",
+    "PIL": "maps",
     "pettingzoo": "gym",
     "ray": "ray",
     "rich": "train",
@@ -106,6 +107,7 @@ EXTRA_OF = {
     "torch": "train",
     "torchrl": "torchrl",
     "tyro": "train",
+    "yaml": "maps",
 }
 """The extra of this package that brings a library, by the library's module."""
 

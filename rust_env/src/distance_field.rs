@@ -1,5 +1,5 @@
-//! Shortest ways of a disc around solids to one goal: what is free on a grid of cells, and a field over
-//! it that knows, for every cell, how long the way is and where it turns first.
+//! Shortest ways of a disc around solids to one goal, by the cells where it has room: for every cell how long
+//! the way is and where it turns first.
 //!
 //! The field is Lazy Theta* (Nash, Koenig and Tovey, AAAI 2010) from the goal outwards. Ways turn at the
 //! centres of cells only, and go straight in between. A field grows no farther than it is asked for.
@@ -7,168 +7,11 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use crate::free_space::{FreeSpace, Way};
 use crate::geometry::Vec2;
-use crate::place::Placed;
 
-/// Most cells along one side of an arena.
-pub const MOST_CELLS: usize = 256;
-/// Widths of a cell in radii of the disc, where the arena is not too large for it.
-const CELL_RADII: f32 = 0.5;
-/// A disc that is nearer to a solid than this share of its radius would be deep inside of it.
-const INSIDE: f32 = 0.4;
-/// Length of a way out of where there is no room for the disc, for each metre; more than any detour is
-/// longer than the way that it avoids.
-const STEEP: f32 = 4.0;
 /// The turn of cells from which the way leads straight to the goal.
 const GOAL: u32 = u32::MAX;
-
-/// Which cells of an arena have room for a disc.
-#[derive(Debug, Clone)]
-pub struct FreeSpace {
-    half: f32,
-    side: usize,
-    cell: f32,
-    scale: f32,
-    /// For how many steps of half a cell the disc fits wherever it goes from a cell, at least 1; 0 where it
-    /// does not fit at the centre.
-    ahead: Vec<u8>,
-    /// Whether it can be there at all, as deep in a solid as contacts let it.
-    open: Vec<bool>,
-}
-
-impl FreeSpace {
-    /// The cells of an arena of half width `half`, for a disc among these solids; lengths in m.
-    #[must_use]
-    pub fn new(half: f32, radius: f32, solids: &[Placed]) -> Self {
-        let wanted = (2.0 * half / (CELL_RADII * radius)).ceil();
-        let side = (wanted as usize).clamp(1, MOST_CELLS);
-        let mut space = Self {
-            half,
-            side,
-            cell: 2.0 * half / side as f32,
-            scale: side as f32 / (2.0 * half),
-            ahead: vec![],
-            open: vec![],
-        };
-        let room = |cell: usize| {
-            let at = space.centre(cell);
-            let nearest = solids.iter().map(|(solid, place)| solid.nearest(at - place).0);
-            nearest.fold(half - at.amax(), f32::min)
-        };
-        let rooms: Vec<f32> = (0..side * side).map(room).collect();
-        // Of two places, the centres of their cells are at most 1.42 cells farther apart than they are.
-        let steps = |room: f32| ((room - radius - 1.5 * space.cell) / (0.5 * space.cell)).max(1.0) as u8;
-        space.ahead = rooms.iter().map(|room| if *room >= radius { steps(*room) } else { 0 }).collect();
-        space.open = rooms.iter().map(|room| *room >= INSIDE * radius).collect();
-        space
-    }
-
-    /// How many cells there are.
-    #[must_use]
-    pub fn cells(&self) -> usize {
-        self.ahead.len()
-    }
-
-    /// Whether the disc fits where a cell has its centre.
-    fn is_free(&self, cell: usize) -> bool {
-        self.ahead[cell] > 0
-    }
-
-    /// The centre of a cell, m.
-    fn centre(&self, cell: usize) -> Vec2 {
-        let (row, column) = (cell / self.side, cell % self.side);
-        Vec2::new(column as f32, row as f32).map(|index| (index + 0.5) * self.cell - self.half)
-    }
-
-    /// Column and row of a place, those of the nearest cell where it is outside.
-    fn indices(&self, at: Vec2) -> (usize, usize) {
-        let index =
-            |value: f32| (((value + self.half) * self.scale).max(0.0) as u32 as usize).min(self.side - 1);
-        (index(at.x), index(at.y))
-    }
-
-    fn cell(&self, at: Vec2) -> usize {
-        let (column, row) = self.indices(at);
-        row * self.side + column
-    }
-
-    /// Into how many steps of half a cell or less a straight way is cut.
-    fn steps(&self, way: Vec2) -> f32 {
-        (way.norm() / (0.5 * self.cell)).ceil().max(1.0)
-    }
-
-    /// Whether the disc fits after each step of a straight way, but within `reach` of its end.
-    fn is_clear(&self, from: Vec2, to: Vec2, reach: f32) -> bool {
-        let way = to - from;
-        let steps = self.steps(way);
-        let (one, last) = (way / steps, steps as u32);
-        let mut step = 1;
-        while step <= last {
-            let at = from + one * step as f32;
-            let ahead = self.ahead[self.cell(at)];
-            if ahead == 0 && (to - at).norm_squared() > reach * reach {
-                return false;
-            }
-            step += u32::from(ahead.max(1));
-        }
-        true
-    }
-
-    /// The last place of a straight way that a disc can come to.
-    #[must_use]
-    pub fn stopped(&self, from: Vec2, to: Vec2) -> Vec2 {
-        let way = to - from;
-        let steps = self.steps(way);
-        let places = (1..=steps as usize).map(|step| from + way * (step as f32 / steps));
-        let open = |at: &Vec2| self.open[self.cell(*at)] && at.amax() <= self.half;
-        places.take_while(open).last().unwrap_or(from)
-    }
-
-    /// The cells around a cell, as many as there are.
-    fn around(&self, cell: usize) -> impl Iterator<Item = usize> {
-        let (row, column, side) = (cell / self.side, cell % self.side, self.side);
-        let rows = row.saturating_sub(1)..=(row + 1).min(side - 1);
-        let columns = column.saturating_sub(1)..=(column + 1).min(side - 1);
-        let all = rows.flat_map(move |row| columns.clone().map(move |column| row * side + column));
-        all.filter(move |other| *other != cell)
-    }
-
-    /// The free cell whose centre is nearest to a place, if there is any.
-    fn nearest_free(&self, at: Vec2) -> Option<usize> {
-        let (column, row) = self.indices(at);
-        let mut best: Option<(f32, usize)> = None;
-        for ring in 0..self.side {
-            // All centres in this ring are at least so far away on one axis.
-            if best.is_some_and(|(distance, _)| distance < (ring as f32 - 1.0) * self.cell) {
-                break;
-            }
-            let low = |index: usize| index.saturating_sub(ring);
-            let high = |index: usize| (index + ring).min(self.side - 1);
-            for other_row in low(row)..=high(row) {
-                let edge = other_row.abs_diff(row) == ring;
-                for other in low(column)..=high(column) {
-                    let cell = other_row * self.side + other;
-                    if (edge || other.abs_diff(column) == ring) && self.is_free(cell) {
-                        let distance = (self.centre(cell) - at).norm();
-                        if best.is_none_or(|(least, _)| distance < least) {
-                            best = Some((distance, cell));
-                        }
-                    }
-                }
-            }
-        }
-        best.map(|(_, cell)| cell)
-    }
-}
-
-/// The way from a place to a goal.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Way {
-    /// Its length, m; infinite if there is none.
-    pub length: f32,
-    /// Where it turns first, or the goal, m.
-    pub next: Vec2,
-}
 
 /// A cell whose length may be settled next: the one with the shortest first.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -213,29 +56,20 @@ impl DistanceField {
         Self { goal, reach, ..Self::default() }
     }
 
-    /// The way from a place. Where the disc has no room, it first leaves that place the shortest way.
-    pub fn way(&mut self, space: &FreeSpace, from: Vec2) -> Way {
-        if space.is_clear(from, self.goal, self.reach) {
-            return Way { length: (self.goal - from).norm(), next: self.goal };
-        }
+    /// The way from a place in a free cell, if there is one.
+    pub fn way(&mut self, space: &FreeSpace, from: Vec2) -> Option<Way> {
         let cell = space.cell(from);
-        if space.is_free(cell) && self.settle(space, cell) {
-            let turn = self.place(space, self.turns[cell]);
-            if self.turns[cell] != GOAL && space.is_clear(from, turn, 0.0) {
-                let rest = self.lengths[self.turns[cell] as usize];
-                return Way { length: (turn - from).norm() + rest, next: turn };
-            }
-            let centre = space.centre(cell);
-            let next = if (centre - from).norm() < 0.25 * space.cell { turn } else { centre };
-            return Way { length: (centre - from).norm() + self.lengths[cell], next };
+        if !self.settle(space, cell) {
+            return None;
         }
-        match space.nearest_free(from) {
-            Some(out) if self.settle(space, out) => {
-                let centre = space.centre(out);
-                Way { length: STEEP * (centre - from).norm() + self.lengths[out], next: centre }
-            }
-            _ => Way { length: f32::INFINITY, next: self.goal },
+        let turn = self.place(space, self.turns[cell]);
+        if self.turns[cell] != GOAL && space.is_clear(from, turn, 0.0) {
+            let rest = self.lengths[self.turns[cell] as usize];
+            return Some(Way { length: (turn - from).norm() + rest, next: turn });
         }
+        let centre = space.centre(cell);
+        let next = if space.is_at(centre, from) { turn } else { centre };
+        Some(Way { length: (centre - from).norm() + self.lengths[cell], next })
     }
 
     /// Grows until a cell is settled. Returns whether there is a way from it.

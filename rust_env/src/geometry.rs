@@ -87,6 +87,15 @@ impl Solid {
         }
     }
 
+    /// Half width and half height of the smallest upright box that holds it, m.
+    #[must_use]
+    pub fn half_extents(&self) -> Vec2 {
+        match self {
+            Self::Disc(radius) => Vec2::repeat(*radius),
+            Self::Box(half) => *half,
+        }
+    }
+
     /// Half its shortest diameter, m.
     #[must_use]
     pub fn half_breadth(&self) -> f32 {

@@ -18,7 +18,9 @@ pub mod robot;
 
 pub mod wheels;
 
+pub mod blocks;
 pub mod energy;
+
 pub mod place;
 pub mod tasks;
 
@@ -37,6 +39,9 @@ pub mod reward;
 
 pub mod rules;
 
+pub mod free_space;
+
+pub mod corners;
 pub mod distance_field;
 pub mod routes;
 

@@ -6,6 +6,7 @@ mod discs;
 mod points;
 mod rapier;
 
+use crate::blocks::Blocks;
 use crate::geometry::{Solid, Touch, Vec2};
 use crate::robot::{Body, bodies};
 use crate::scenario::{Engine as Choice, Scenario};
@@ -140,8 +141,12 @@ struct Shapes {
     /// Of the robots, m.
     radii: Vec<f32>,
     solids: Vec<Solid>,
+    /// Solid cells of the map, if they block these robots.
+    blocks: Option<Blocks>,
     /// Half the side of the arena, m.
     arena: f32,
+    /// Control period, s.
+    dt: f32,
 }
 
 impl Shapes {
@@ -149,11 +154,20 @@ impl Shapes {
         Self {
             radii: team.iter().map(|body| body.radius).collect(),
             solids: solids.to_vec(),
+            blocks: Blocks::of(scenario),
             arena: scenario.arena_half_width_m as f32,
+            dt: scenario.dt_s as f32,
         }
     }
 
-    /// Time until anything would touch if all moved straight on, s; infinite if nothing ever would.
+    /// The obstacles, and those of the map's boxes that may be within `reach` of a place, with their centres.
+    fn solids_near(&self, at: Vec2, reach: f32, obstacles: &[Vec2]) -> impl Iterator<Item = (&Solid, Vec2)> {
+        let blocks = self.blocks.iter().flat_map(move |blocks| blocks.near(at, reach));
+        self.solids.iter().zip(obstacles.iter().copied()).chain(blocks)
+    }
+
+    /// Time until anything would touch if all moved straight on, s; infinite if nothing would in a control
+    /// period.
     fn first_touch(
         &self,
         touch: Touch,
@@ -174,7 +188,7 @@ impl Shapes {
                 let reach = radius + self.radii[other];
                 first = first.min(touch.discs(positions[other] - at, velocities[other] - velocity, reach));
             }
-            for (solid, centre) in self.solids.iter().zip(obstacles) {
+            for (solid, centre) in self.solids_near(*at, radius + velocity.norm() * self.dt, obstacles) {
                 first = first.min(touch.solid(solid, at - centre, *velocity, radius));
             }
         }
@@ -221,7 +235,7 @@ impl Shapes {
                     sunk |= 1 << index | 1 << other;
                 }
             }
-            for (solid, centre) in self.solids.iter().zip(obstacles) {
+            for (solid, centre) in self.solids_near(*at, radius, obstacles) {
                 let reach = radius - most * radius.min(solid.half_breadth());
                 if solid.nearest(at - centre).0 < reach {
                     sunk |= 1 << index;

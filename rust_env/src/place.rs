@@ -1,6 +1,7 @@
 //! Random places: for obstacles, robots and victims. Sampling is bounded: if no draw is far enough
 //! from everything, the farthest one is taken and the caller is told.
 
+use crate::blocks::Blocks;
 use crate::geometry::{Solid, Vec2};
 use crate::rng::Stream;
 use crate::robot::Body;
@@ -71,6 +72,8 @@ pub struct Placing {
     spawn_clearance: f32,
     wall_clearance: f32,
     victims: Region,
+    /// Solid cells of the map, if there is one.
+    blocks: Option<Blocks>,
 }
 
 impl Placing {
@@ -85,7 +88,14 @@ impl Placing {
             None if scenario.victim_places_m.is_empty() => Region::square(reach),
             None => Region::OneOf(scenario.victim_places_m.iter().map(|at| inside(at[0], at[1])).collect()),
         };
-        Self { arena, spawn_clearance: scenario.spawn_clearance_m as f32, wall_clearance: wall, victims }
+        let spawn_clearance = scenario.spawn_clearance_m as f32;
+        Self { arena, spawn_clearance, wall_clearance: wall, victims, blocks: Blocks::of(scenario) }
+    }
+
+    /// How much more than `gap` a place is away from the map's solid cells, m: negative if it is less, and
+    /// infinite if it is more.
+    fn room(&self, at: Vec2, gap: f32) -> f32 {
+        self.blocks.as_ref().map_or(f32::INFINITY, |blocks| blocks.distance(at, gap) - gap)
     }
 
     /// A place for an obstacle that blocks these layers (as bits), clear of those already `placed` and of robots
@@ -102,7 +112,7 @@ impl Placing {
             let solids = placed.iter().map(|(other, centre)| other.distance(at - centre) - solid.reach());
             let gap = |(body, start): &(&Body, Vec2)| solid.distance(start - at) - body.radius - START_GAP_M;
             let starts = starts.iter().filter(|(body, _)| body.layer & blocked != 0);
-            smallest(solids.chain(starts.map(gap)))
+            smallest(solids.chain(starts.map(gap))).min(self.room(at, solid.reach()))
         })
     }
 
@@ -138,7 +148,9 @@ impl Placing {
         let clearance = |at: Vec2| {
             let others = others.iter().filter(|(other, _)| other.layer == body.layer);
             let others = others.map(|(other, centre)| (at - centre).norm() - other.radius - gap);
-            smallest(others.chain(solids.iter().map(|(solid, centre)| solid.distance(at - centre) - gap)))
+            let solids = solids.iter().map(|(solid, centre)| solid.distance(at - centre) - gap);
+            let blocked = self.blocks.as_ref().is_some_and(|blocks| blocks.block(body.layer));
+            smallest(others.chain(solids)).min(if blocked { self.room(at, gap) } else { f32::INFINITY })
         };
         match given {
             Some(at) => Place { at, clear: clearance(at) >= 0.0 },
@@ -163,7 +175,7 @@ impl Placing {
             let robots = robots.iter().map(|robot| (at - robot).norm() - self.spawn_clearance);
             let solids =
                 solids.iter().map(|(solid, centre)| solid.distance(at - centre) - self.wall_clearance);
-            smallest(robots.chain(solids))
+            smallest(robots.chain(solids)).min(self.room(at, self.wall_clearance))
         });
         Place { clear: place.clear || listed, ..place }
     }
@@ -171,7 +183,8 @@ impl Placing {
     /// Whether one of these solids is too near for a victim to be there.
     #[must_use]
     pub fn is_blocked(&self, at: Vec2, solids: &[Placed]) -> bool {
-        solids.iter().any(|(solid, centre)| solid.distance(at - centre) < self.wall_clearance)
+        let near = |(solid, centre): &Placed| solid.distance(at - centre) < self.wall_clearance;
+        solids.iter().any(near) || self.room(at, self.wall_clearance) < 0.0
     }
 }
 

@@ -1,6 +1,7 @@
 //! A scenario found valid and made ready to play: every constant that worlds share, computed once. There
 //! is no other way from a description to a world.
 
+use crate::blocks::Blocks;
 use crate::energy::Energy;
 use crate::error::{Error, Result};
 use crate::fault::{HEALTHY, Kind};
@@ -68,6 +69,8 @@ pub struct Rules {
     pub radio: Option<Radio>,
     /// The obstacles' forms.
     pub solids: Vec<Solid>,
+    /// Solid cells of the map, if there is one.
+    pub blocks: Option<Blocks>,
     /// Motion and contacts.
     pub physics: Physics,
     /// Columns of an observation.
@@ -122,6 +125,7 @@ impl Rules {
             wheels: Wheels::new(&scenario),
             weights: Weights::new(&scenario),
             faults: processes(&scenario),
+            blocks: Blocks::of(&scenario),
             sight,
             radio,
             spawn,

@@ -8,6 +8,7 @@ mod check;
 mod communication;
 mod depot;
 mod layers;
+mod map;
 mod order;
 mod sight;
 mod spot;
@@ -25,6 +26,7 @@ pub use arrivals::Arrival;
 pub use battery::{Battery, Station};
 pub use communication::{Communication, Share};
 pub use depot::Depot;
+pub use map::Map;
 pub(crate) use task::steps_of;
 pub use task::{Deadline, Interrupted, Task};
 
@@ -268,6 +270,8 @@ pub struct Scenario {
     pub arrivals: Vec<Arrival>,
     /// Solid things in the arena.
     pub obstacles: Vec<Obstacle>,
+    /// Which cells of a grid over the arena are solid; none if absent.
+    pub map: Option<Map>,
     /// Whether obstacles hide from robots what is behind them.
     pub occlusion: bool,
     /// How robots communicate; everybody hears everybody, at once, if absent.
@@ -367,6 +371,7 @@ impl Default for Scenario {
             max_victims: 2,
             arrivals: vec![],
             obstacles: vec![],
+            map: None,
             occlusion: false,
             communication: None,
             stations: vec![],

@@ -5,6 +5,7 @@
 
 use std::iter::zip;
 
+use crate::blocks::Blocks;
 use crate::geometry::{Solid, Vec2};
 use crate::robot::Body;
 use crate::scenario::{MAX_VICTIMS, Scenario};
@@ -25,6 +26,8 @@ pub struct Sight {
     layers: Vec<u64>,
     /// Obstacles that hide what is behind them, and the layers they block; none without occlusion.
     hiding: Vec<(Solid, u64)>,
+    /// Solid cells of the map, which do so, too.
+    blocks: Option<Blocks>,
     /// Slots for victims.
     slots: usize,
     /// Control period, s.
@@ -62,6 +65,7 @@ impl Sight {
             reach: scenario.robots.iter().map(|one| one.sight_m.map_or(f32::INFINITY, square)).collect(),
             layers: team.iter().map(|body| body.layer).collect(),
             hiding: hiding.filter(|_| scenario.occlusion).collect(),
+            blocks: Blocks::of(scenario).filter(|_| scenario.occlusion),
             slots: scenario.num_victims(),
             dt: scenario.dt_s as f32,
         })
@@ -118,7 +122,10 @@ impl Sight {
         let hides = |((solid, layers), centre): (&(Solid, u64), &Vec2)| {
             layers & self.layers[own] != 0 && solid.is_crossed(from - centre, way)
         };
-        way.norm_squared() <= self.reach[own] && !zip(&self.hiding, view.obstacles).any(hides)
+        let blocks = self.blocks.iter().filter(|blocks| blocks.block(self.layers[own]));
+        way.norm_squared() <= self.reach[own]
+            && !zip(&self.hiding, view.obstacles).any(hides)
+            && !blocks.into_iter().any(|blocks| blocks.is_crossed(from, way))
     }
 
     /// The time since something was last seen as a share, t / (t + 1 s): 0 now, 1 if never in the episode.

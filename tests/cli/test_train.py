@@ -151,7 +151,7 @@ def test_every_key_is_an_option(capsys: pytest.CaptureFixture[str]) -> None:
     text = capsys.readouterr().out.replace("_", "-")
     lists = ("robots", "tasks", "obstacles", "stations", "depots", "faults", "arrivals")
     in_a_file = {f"scenario.{name}" for name in lists}
-    in_a_file |= {"scenario.communication", "train.schedule"}
+    in_a_file |= {"scenario.map", "scenario.communication", "train.schedule"}
     for section, table in load_run_config().model_dump().items():
         for key in table or ():  # a family has a file of its own
             offered = f"--{section}.{key.replace('_', '-')} " in text.replace(",", " ")

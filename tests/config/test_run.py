@@ -252,6 +252,7 @@ ADDED_SINCE = {
         "stations",
         "depots",
         "end_when_done",
+        "map",
         "occlusion",
         "communication",
     ),

@@ -14,6 +14,7 @@ from innerattn.config import (
     Communication,
     Depot,
     Fault,
+    Map,
     Obstacle,
     Robot,
     Scenario,
@@ -166,6 +167,14 @@ def test_keys_of_communication_agree() -> None:
         compiled({"communication": {"colour": 1}})
 
 
+def test_keys_of_a_map_agree() -> None:
+    rows = ["#..", "...", "..#"]
+    ours = Scenario(map=Map(rows=tuple(rows))).model_dump(mode="json")["map"]
+    assert compiled({"map": {"rows": rows}})["map"] == ours
+    with pytest.raises(ValueError, match="unknown field `colour`"):
+        compiled({"map": {"rows": rows, "colour": 1}})
+
+
 def test_shapes_agree() -> None:
     shapes = {"disc": {"radius_m": 0.1}, "box": {"half_extents_m": [0.1, 0.2]}}
     assert {*get_args(Obstacle.model_fields["shape"].annotation)} == shapes.keys()
@@ -222,6 +231,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
                 "layers": ["air"],
             }
         ],
+        "map": {"rows": ["####", "...#", "....", "...."], "layers": ["air"]},
         "occlusion": True,
         "communication": {"range_m": 0.5, "delay_steps": 3, "loss": 0.25, "share": "victims"},
         "stations": [{**STATION, "radius_m": 0.25}],
@@ -278,7 +288,7 @@ def test_models_are_all_mirrored() -> None:
         for argument in get_args(field.annotation)
         if isinstance(argument, type) and issubclass(argument, BaseModel)
     }
-    assert inner == {model for model, _ in NESTED.values()} | {Communication}
+    assert inner == {model for model, _ in NESTED.values()} | {Communication, Map}
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ _FILE_ONLY = frozenset(
         "scenario.robots",
         "scenario.tasks",
         "scenario.obstacles",
+        "scenario.map",
         "scenario.faults",
         "train.schedule",
     }

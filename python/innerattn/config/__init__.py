@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from innerattn.config.battery import Battery, Depot, Station
     from innerattn.config.communication import Communication
     from innerattn.config.load import load_run_config, read_toml, write_toml
+    from innerattn.config.map import Map
     from innerattn.config.ppo import PPOConfig
     from innerattn.config.registry import register_algorithm, register_attention
     from innerattn.config.run import BUDGETS, RunConfig, refuse_late_faults
@@ -38,6 +39,7 @@ __all__ = [
     "EvaluateConfig",
     "Fault",
     "ImitationConfig",
+    "Map",
     "NetworkConfig",
     "Obstacle",
     "PPOConfig",
@@ -70,6 +72,7 @@ __getattr__ = lazy_names(
         "Fault": "scenario",
         "ImitationConfig": "sections",
         "NetworkConfig": "sections",
+        "Map": "map",
         "Obstacle": "scenario",
         "PPOConfig": "ppo",
         "Robot": "scenario",

@@ -21,6 +21,7 @@ from innerattn.config.files import (
     toml_table_in,
     write_whole,
 )
+from innerattn.config.map_file import with_map_file
 from innerattn.config.model import config_error
 from innerattn.config.registry import methods
 from innerattn.config.run import RunConfig
@@ -62,6 +63,8 @@ def load_run_config(
     given: dict[str, Any] = {"train": {"method": method}}
     if config_file is not None:
         from_file = toml_table(config_file)
+        if isinstance(section := from_file.get(Scenario.place), dict):
+            from_file[Scenario.place] = with_map_file(section, config_file)
         if misplaced := [key for key in from_file if key in Scenario.model_fields]:
             raise ConfigError(
                 f"{config_file}: {misplaced[0]}: unknown key; a scenario's stand in [scenario], "

@@ -25,6 +25,7 @@ _EXAMPLES: dict[str, Any] = {
     "victim_area_m": [-0.5, -0.5, 0.5, 0.5],
     "victim_places_m": [[0.5, 0.5], [-0.5, 0.5], [0.0, -0.5]],
     "communication": {"range_m": 0.8, "delay_steps": 2},
+    "map": {"rows": ["....", ".##.", ".#..", "...."]},
 }
 _OF_TABLES = {"robots": ("start_m", [-0.5, 0.0]), "tasks": ("deadline_s", [10.0, 20.0])}
 _TABLES: dict[str, dict[str, Any]] = {

@@ -8,6 +8,7 @@ are made of.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -18,6 +19,8 @@ from innerattn.config.amounts import Amounts, list_or_table
 from innerattn.config.battery import Battery, Depot, Station
 from innerattn.config.communication import Communication
 from innerattn.config.files import preset_names, preset_table, toml_table
+from innerattn.config.map import Map
+from innerattn.config.map_file import with_map_file
 from innerattn.config.model import ADDED_LATER, Model, Told, config_error
 from innerattn.config.near import did_you_mean
 from innerattn.config.task import Arrival, Task
@@ -187,16 +190,18 @@ class Fault(Model):
 def scenario_table(path: str | Path) -> dict[str, Any]:
     """The keys of a scenario in a TOML file: those of its section ``scenario``, or of all of it.
 
+    The file of a map is read: its rows stand in its place.
+
     Raises:
-        ConfigError: the file cannot be read, is not TOML, or has both forms.
+        ConfigError: the file cannot be read, is not TOML, or has both forms, or its map is none.
     """
     table = toml_table(path)
     section = table.get(Scenario.place)
     if not isinstance(section, dict):
-        return table
+        return with_map_file(table, path)
     if both := [key for key in table if key in Scenario.model_fields]:
         raise ConfigError(f"{path}: {both[0]}: must stand in [scenario], as the others do")
-    return section
+    return with_map_file(section, path)
 
 
 def _default_team() -> tuple[Robot, ...]:
@@ -263,10 +268,15 @@ class Scenario(Model, Shown):
     obstacles: Annotated[tuple[Obstacle, ...], Told(0, 64)] = Field(
         (), description="fixed bodies in the way"
     )
+    map: Annotated[Map | None, ADDED_LATER] = Field(
+        None,
+        description="which cells of a grid over the arena are solid, such as "
+        '{ file = "office.yaml" }; None: none',
+    )
     occlusion: Annotated[bool, ADDED_LATER] = Field(
         False,
-        description="let obstacles hide what is behind them, from robots of the layers that they "
-        "block; true only where there are obstacles",
+        description="let obstacles and solid cells hide what is behind them, from robots of the "
+        "layers that they block; true only where there are such",
     )
     communication: Annotated[Communication | None, ADDED_LATER] = Field(
         None,
@@ -516,6 +526,26 @@ class Scenario(Model, Shown):
     def has_arrivals(self) -> bool:
         """Whether victims arrive whatever becomes of others, so that some may find no slot."""
         return self.situation in ("poisson", "listed")
+
+    @cached_property
+    def map_boxes(self) -> tuple[Obstacle, ...]:
+        """The solid cells of the map, as few boxes with a place; none without a map."""
+        if self.map is None:
+            return ()
+        return tuple(
+            Obstacle(
+                shape="box",
+                position_m=(x, y),
+                half_extents_m=(width, height),
+                layers=self.map.layers,
+            )
+            for x, y, width, height in self._rules.map_boxes()
+        )
+
+    @property
+    def blocks_ways(self) -> bool:
+        """Whether something stands in the way of some robots."""
+        return bool(self.obstacles) or self.map is not None
 
     @property
     def ends_early(self) -> bool:

@@ -120,6 +120,21 @@ def _paint_arena(axes: Axes, scenario: Scenario, obstacles: NDArray[np.float32])
         for stop in stops:
             axes.add_patch(Circle(stop.position_m, stop.radius_m, facecolor=colour, zorder=0))
     style: dict[str, Any] = {"edgecolor": "#444444", "zorder": 1}
+    for box in scenario.map_boxes:
+        (x, y), (width, height) = box.position_m or (0.0, 0.0), box.half_extents_m or (0.0, 0.0)
+        colour = "#999999" if all(map(box.blocks, scenario.layers)) else "#dddddd"
+        corner = (x - width, y - height)
+        axes.add_patch(
+            Rectangle(
+                corner,
+                2 * width,
+                2 * height,
+                facecolor=colour,
+                linewidth=0.0,
+                antialiased=False,
+                zorder=1,
+            )
+        )
     for shape, (x, y) in zip(scenario.obstacles, obstacles.tolist(), strict=True):
         if not all(map(shape.blocks, scenario.layers)):
             style |= {"facecolor": "#dddddd", "linestyle": "--"}

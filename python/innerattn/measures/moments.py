@@ -209,8 +209,10 @@ def _touching(
     gaps[..., layers[:, None] != layers] = np.inf
     gaps[..., np.arange(len(radius)), np.arange(len(radius))] = np.inf
     touching |= (gaps < 0.0).any(-1)
-    for number, shape in enumerate(scenario.obstacles):
-        away = positions - obstacles[..., number, None, :]
+    for number, shape in enumerate((*scenario.obstacles, *scenario.map_boxes)):
+        is_moved = number < len(scenario.obstacles)
+        centre = obstacles[..., number, None, :] if is_moved else np.array(shape.position_m)
+        away = positions - centre
         if shape.half_extents_m is not None:
             half = np.array(shape.half_extents_m)
             away = away - np.clip(away, -half, half)

@@ -25,7 +25,7 @@ class WorldState(NamedTuple):
         last_seen: (E, R, R + V) int64, see `BatchEnv.last_seen`; None where no sight is limited.
         headings: (E, R, 2) float32, angles [rad] and turn rates [rad/s] of robots on wheels; None
             where no robot has a heading.
-        obstacles: (E, O, 2) float32 [m]; None where there are none.
+        obstacles: (E, O, 2) float32 [m]; None where nothing stands in the way.
     """
 
     positions: NDArray[np.float32]
@@ -52,7 +52,7 @@ class WorldState(NamedTuple):
             env.load() if env.scenario.has_loads else None,
             env.last_seen() if env.scenario.has_limited_sight else None,
             pointing(env),
-            env.obstacles() if env.scenario.obstacles else None,
+            env.obstacles() if env.scenario.blocks_ways else None,
         )
 
 

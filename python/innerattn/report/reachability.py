@@ -1,4 +1,4 @@
-"""Where robots can drive between walls and obstacles that have a place of their own, on a grid."""
+"""Where robots can drive between walls and what stands at a place of its own, on a grid."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def closed_off(scenario: Scenario) -> Iterator[str]:
     place counts as closed only if it is so by more than a cell of the grid, a hundredth of
     ``arena_half_width_m``.
     """
-    if all(one.position_m is None for one in scenario.obstacles):
+    if scenario.map is None and all(one.position_m is None for one in scenario.obstacles):
         return
     needs = dict.fromkeys(need for task in scenario.tasks for need in task.needs)
     for need in needs:
@@ -52,7 +52,8 @@ def _near(scenario: Scenario, robot: Robot) -> Mask:
     radius = robot.radius_m - step
     half = scenario.arena_half_width_m
     inside = np.maximum(np.abs(x), np.abs(y)) <= half - radius
-    blocking = [one for one in scenario.obstacles if one.blocks(robot.layer)]
+    solids = (*scenario.obstacles, *scenario.map_boxes)
+    blocking = [one for one in solids if one.blocks(robot.layer)]
     free = inside & (_clearance(blocking, x, y) >= radius)
     if robot.start_m is not None:
         parts, _ = label(free, np.ones((3, 3)))
@@ -69,7 +70,7 @@ def _area(scenario: Scenario) -> Mask:
     half = scenario.arena_half_width_m - scenario.wall_clearance_m
     x_min, y_min, x_max, y_max = scenario.victim_area_m or (-half, -half, half, half)
     inside = (x_min <= x) & (x <= x_max) & (y_min <= y) & (y <= y_max)
-    return inside & (_clearance(scenario.obstacles, x, y) > 0.0)
+    return inside & (_clearance((*scenario.obstacles, *scenario.map_boxes), x, y) > 0.0)
 
 
 def _clearance(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
-from innerattn.config import Obstacle, Scenario
+from innerattn.config import Map, Obstacle, Scenario
 from innerattn.config.amounts import in_words
 
 _COLUMNS, _ROWS = 61, 31
@@ -33,7 +34,7 @@ def scenario_map(scenario: Scenario) -> str:
             x = half * (2.0 * (column + 0.5) / _COLUMNS - 1.0)
             if letter := starts.get((column, row)):
                 cells.append(letter)
-            elif over := [one for one in scenario.obstacles if _covers(one, x, y)]:
+            elif over := _over(scenario, column, row):
                 cells.append(_SOLID if any(_blocks_all(scenario, one) for one in over) else _PASSED)
             elif (column, row) in places:
                 cells.append(_PLACE)
@@ -54,9 +55,11 @@ def _legend(scenario: Scenario) -> Iterator[str]:
         yield f"{_PLACE}  a victim may appear here"
     else:
         yield f"{_AREA}  victims appear here"
-    drawn = [one for one in scenario.obstacles if one.position_m is not None]
+    drawn: list[Obstacle | Map] = [one for one in scenario.obstacles if one.position_m is not None]
+    if scenario.map is not None:
+        drawn.append(scenario.map)
     if any(_blocks_all(scenario, one) for one in drawn):
-        yield f"{_SOLID}  an obstacle"
+        yield f"{_SOLID}  an obstacle or a solid cell" if scenario.map else f"{_SOLID}  an obstacle"
     if not all(_blocks_all(scenario, one) for one in drawn):
         yield f"{_PASSED}  an obstacle that robots of some layers pass"
     robots = len(scenario.robots) - len(placed)
@@ -65,6 +68,26 @@ def _legend(scenario: Scenario) -> Iterator[str]:
     if robots or obstacles:
         shown = [f"{count} {what}{'s' * (count != 1)}" for count, what in anywhere if count]
         yield f"At new random places in each episode: {', '.join(shown)}"
+
+
+def _over(scenario: Scenario, column: int, row: int) -> list[Obstacle | Map]:
+    """What stands at the centre of a character, or the map if one of its cells there is solid."""
+    half = scenario.arena_half_width_m
+    x = half * (2.0 * (column + 0.5) / _COLUMNS - 1.0)
+    y = half * (1.0 - 2.0 * (row + 0.5) / _ROWS)
+    over: list[Obstacle | Map] = [one for one in scenario.obstacles if _covers(one, x, y)]
+    if scenario.map is not None:
+        side = len(scenario.map.rows)
+        rows, columns = _cells(row, _ROWS, side), _cells(column, _COLUMNS, side)
+        if scenario.map.solid[rows, columns].any():
+            over.append(scenario.map)
+    return over
+
+
+def _cells(index: int, count: int, side: int) -> slice:
+    """The cells of a map under one of ``count`` characters: those whose centre is there, or one."""
+    first = math.ceil(index / count * side - 0.5)
+    return slice(first, max(first + 1, math.ceil((index + 1) / count * side - 0.5)))
 
 
 def _letters() -> Iterator[str]:
@@ -86,7 +109,7 @@ def _row(y: float, half: float) -> int:
     return min(int((1.0 - y / half) / 2.0 * _ROWS), _ROWS - 1)
 
 
-def _blocks_all(scenario: Scenario, obstacle: Obstacle) -> bool:
+def _blocks_all(scenario: Scenario, obstacle: Obstacle | Map) -> bool:
     return all(map(obstacle.blocks, scenario.layers))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from innerattn import _core
-from innerattn.config import Scenario
+from innerattn.config import Map, Scenario
 
 
 def worlds_document(scenario: Scenario) -> dict[str, Any]:
@@ -56,4 +56,14 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
             }
             for one in scenario.obstacles
         ],
+        "map": None if scenario.map is None else _map(scenario, scenario.map),
+    }
+
+
+def _map(scenario: Scenario, found: Map) -> dict[str, Any]:
+    """Boxes over the solid cells: the centre of each and its half extents [m]."""
+    boxes = scenario.map_boxes
+    return {
+        "boxes": [[*(one.position_m or ()), *(one.half_extents_m or ())] for one in boxes],
+        "passed_by": [layer for layer in scenario.layers if not found.blocks(layer)],
     }

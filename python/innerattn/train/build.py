@@ -147,6 +147,8 @@ def _asymmetry(scenario: Scenario) -> tuple[str, str] | None:
         sides = obstacle.half_extents_m
         if obstacle.position_m is not None or (sides is not None and sides[0] != sides[1]):
             return f"obstacles[{index}]", "an obstacle has a fixed place or is an oblong box"
+    if scenario.map is not None:
+        return "map", "solid cells have fixed places"
     for index, robot in enumerate(scenario.robots):
         if robot.start_m is not None:
             return f"robots[{index}].start_m", "a robot has a fixed start"

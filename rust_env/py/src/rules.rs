@@ -33,6 +33,15 @@ impl Rules {
         self.0.scenario.max_helpers()
     }
 
+    /// The boxes over the map's solid cells: centre and half extents of each, m.
+    fn map_boxes(&self) -> Vec<[f32; 4]> {
+        let blocks = self.0.blocks.iter().flat_map(|blocks| blocks.all());
+        blocks
+            .map(|(solid, at)| (solid.half_extents(), at))
+            .map(|(half, at)| [at.x, at.y, half.x, half.y])
+            .collect()
+    }
+
     fn __eq__(&self, other: &Bound<PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|other| self.0.scenario == other.get().0.scenario)
     }

@@ -87,7 +87,7 @@ impl Discs {
                     add(index, Some(other), apart.try_normalize(0.0).unwrap_or_else(Vec2::x));
                 }
             }
-            for (solid, centre) in self.shapes.solids.iter().zip(obstacles) {
+            for (solid, centre) in self.shapes.solids_near(*at, radius + near, obstacles) {
                 let (depth, outward) = solid.nearest(at - centre);
                 if depth <= radius + near {
                     add(index, None, -outward);
@@ -148,7 +148,7 @@ impl Discs {
                 if is_in(absent, index) {
                     continue;
                 }
-                for (solid, centre) in self.shapes.solids.iter().zip(obstacles) {
+                for (solid, centre) in self.shapes.solids_near(*at, *radius, obstacles) {
                     let (distance, outward) = solid.nearest(*at - centre);
                     if distance < *radius {
                         overlapped = true;

@@ -6,8 +6,8 @@
 
 use rapier2d::prelude::{
     BroadPhaseBvh, CCDSolver, Collider, ColliderBuilder, ColliderHandle, ColliderSet, ImpulseJointSet,
-    IntegrationParameters, IslandManager, MultibodyJointSet, NarrowPhase, PhysicsPipeline, RigidBodyBuilder,
-    RigidBodyHandle, RigidBodySet, SoftBodySet, Vector,
+    IntegrationParameters, IslandManager, MultibodyJointSet, NarrowPhase, PhysicsPipeline, Pose,
+    RigidBodyBuilder, RigidBodyHandle, RigidBodySet, SharedShape, SoftBodySet, Vector,
 };
 
 use super::{Engine, Shapes, Workspace, fly, is_in};
@@ -106,6 +106,16 @@ impl Rapier {
         }
         let obstacles =
             solids.iter().map(|solid| world.colliders.insert(collider(solid, friction))).collect();
+        let shapes = Shapes::new(scenario, team, solids);
+        // One collider for the whole map: a copy of the world shares its shape.
+        let blocks = shapes.blocks.iter().flat_map(|blocks| blocks.all());
+        let parts: Vec<_> = blocks
+            .map(|(solid, at)| (Pose::from_translation(Vector::new(at.x, at.y)), shape(solid)))
+            .collect();
+        if !parts.is_empty() {
+            let map = ColliderBuilder::new(SharedShape::compound(parts)).friction(friction);
+            world.colliders.insert(map);
+        }
         for (side, half) in walls(arena) {
             let wall = ColliderBuilder::cuboid(half.x, half.y).friction(friction);
             world.colliders.insert(wall.translation(Vector::new(side.x, side.y)));
@@ -118,7 +128,7 @@ impl Rapier {
             robots,
             obstacles,
             parameters,
-            shapes: Shapes::new(scenario, team, solids),
+            shapes,
             dt: scenario.dt_s as f32,
             substeps: scenario.substeps,
         }
@@ -242,12 +252,14 @@ impl Scratch {
 }
 
 fn collider(solid: &Solid, friction: f32) -> Collider {
+    ColliderBuilder::new(shape(solid)).friction(friction).build()
+}
+
+fn shape(solid: &Solid) -> SharedShape {
     match solid {
-        Solid::Disc(radius) => ColliderBuilder::ball(*radius),
-        Solid::Box(half) => ColliderBuilder::cuboid(half.x, half.y),
+        Solid::Disc(radius) => SharedShape::ball(*radius),
+        Solid::Box(half) => SharedShape::cuboid(half.x, half.y),
     }
-    .friction(friction)
-    .build()
 }
 
 /// Centres and half extents of the four walls, each as thick as the arena is wide.

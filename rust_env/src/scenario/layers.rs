@@ -47,6 +47,7 @@ impl Scenario {
         let mut alone = self.clone();
         alone.robots.retain(|robot| robot.layer == layer);
         alone.obstacles.retain(|obstacle| obstacle.blocks(layer));
+        alone.map = alone.map.filter(|map| map.blocks(layer));
         alone
     }
 
@@ -55,19 +56,24 @@ impl Scenario {
         for (index, robot) in self.robots.iter().enumerate() {
             named(&format!("robots[{index}].layer"), &robot.layer)?;
         }
-        let known = self.layers();
         for (index, obstacle) in self.obstacles.iter().enumerate() {
             let Some(layers) = &obstacle.layers else { continue };
-            let key = format!("obstacles[{index}].layers");
-            counts(&format!("{key} (their number)"), layers.len(), 1, MAX_ROBOTS)?;
-            for (place, layer) in layers.iter().enumerate() {
-                if !known.contains(&layer.as_str()) {
-                    let rule = format!("no robot is in this layer; the layers are {}", known.join(", "));
-                    return broken(&key, &format!("{layer:?}"), &rule);
-                }
-                if layers[..place].contains(layer) {
-                    return broken(&key, &format!("{layer:?}"), "is named twice");
-                }
+            self.validate_blocked(&format!("obstacles[{index}].layers"), layers)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses layers (of this key) of which one has no robot or is named twice.
+    pub(super) fn validate_blocked(&self, key: &str, layers: &[String]) -> Result<()> {
+        let known = self.layers();
+        counts(&format!("{key} (their number)"), layers.len(), 1, MAX_ROBOTS)?;
+        for (place, layer) in layers.iter().enumerate() {
+            if !known.contains(&layer.as_str()) {
+                let rule = format!("no robot is in this layer; the layers are {}", known.join(", "));
+                return broken(key, &format!("{layer:?}"), &rule);
+            }
+            if layers[..place].contains(layer) {
+                return broken(key, &format!("{layer:?}"), "is named twice");
             }
         }
         Ok(())

@@ -26,7 +26,7 @@ impl Scenario {
                 return broken(&key, &sight, &rule);
             }
         }
-        if self.occlusion && self.obstacles.is_empty() {
+        if self.occlusion && self.obstacles.is_empty() && self.map.is_none() {
             return broken("occlusion", &true, "must be false where there are no obstacles to hide behind");
         }
         Ok(())

@@ -29,6 +29,9 @@ impl Scenario {
         let keeps_off = |one: &Obstacle| {
             self.robots.iter().filter(|robot| served(robot)).all(|robot| one.blocks(&robot.layer))
         };
+        let map_keeps_off = self.map.as_ref().filter(|map| {
+            self.robots.iter().filter(|robot| served(robot)).all(|robot| map.blocks(&robot.layer))
+        });
         let half = self.arena_half_width_m;
         let beyond = |at: f64| (at.abs() - (half - smallest)).max(0.0);
         for (index, (at, radius_m)) in spots.iter().enumerate() {
@@ -40,6 +43,9 @@ impl Scenario {
             let value = format!("{at:?}");
             if let Some(obstacle) = self.obstacles.iter().position(|one| holds(one, *at) && keeps_off(one)) {
                 return broken(&key("position_m"), &value, &format!("is inside obstacles[{obstacle}]"));
+            }
+            if map_keeps_off.is_some_and(|map| map.holds(*at, half)) {
+                return broken(&key("position_m"), &value, "is inside a solid cell of the map");
             }
             if beyond(at[0]).hypot(beyond(at[1])) > *radius_m {
                 let rule = format!(

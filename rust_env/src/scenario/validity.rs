@@ -22,6 +22,7 @@ impl Scenario {
         self.validate_tasks()?;
         self.validate_order()?;
         self.validate_obstacles()?;
+        self.validate_map()?;
         self.validate_sight()?;
         self.validate_communication()?;
         self.validate_faults()?;

@@ -4,13 +4,14 @@
 use innerattn_env::batch::{Autoreset, Batch, Options, StepBuffers};
 use innerattn_env::error::Result;
 use innerattn_env::fault::{Fault, KINDS, Kind};
+use innerattn_env::geometry::{Solid, Vec2};
 use innerattn_env::reward::{COMPONENTS, NUM_COMPONENTS};
 use innerattn_env::rng::{Purpose, Stream};
 use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
     Abilities, Actions, Arrival, Battery, Communication, Deadline, Depot, DriveMode, Engine, Interrupted,
-    Obstacle, Robot, Scenario, Shape, Share, Situation, Station, Unavailable,
+    Map, Obstacle, Robot, Scenario, Shape, Share, Situation, Station, Unavailable,
 };
 use innerattn_env::tasks::{Loss, Rescue};
 
@@ -287,6 +288,40 @@ pub fn with_radio(scenario: Scenario) -> Scenario {
     let range_m = Some(1.2 * scenario.arena_half_width_m);
     let told = Communication { range_m, delay_steps: 2, loss: 0.2, share: Share::Victims };
     Scenario { communication: Some(told), ..with_sight(scenario) }
+}
+
+/// The same with solid cells in a grid over the arena, which the first layer and every second other meet.
+pub fn with_map(scenario: Scenario) -> Scenario {
+    let rows = [
+        "...#......",
+        ".#.#.####.",
+        ".#........",
+        ".####.##..",
+        "......#...",
+        ".#.##.#.#.",
+        ".#..#...#.",
+        ".##.#.#.#.",
+        "......#...",
+        "..#.......",
+    ];
+    let layers = scenario.layers().into_iter().step_by(2).map(String::from).collect();
+    let map = Map { rows: rows.map(String::from).to_vec(), layers: Some(layers) };
+    Scenario { map: Some(map), arena_half_width_m: 2.0 * scenario.arena_half_width_m, ..scenario }
+}
+
+/// The solid cells of a scenario's map, one by one, and their centres, m.
+pub fn cells_of(scenario: &Scenario) -> Vec<(Solid, Vec2)> {
+    let Some(map) = &scenario.map else { return vec![] };
+    let half = scenario.arena_half_width_m as f32;
+    let width = 2.0 * half / map.rows.len() as f32;
+    let mut cells = vec![];
+    for (row, line) in map.rows.iter().enumerate() {
+        for (column, _) in line.chars().enumerate().filter(|(_, cell)| *cell == '#') {
+            let centre = Vec2::new((column as f32 + 0.5) * width - half, half - (row as f32 + 0.5) * width);
+            cells.push((Solid::Box(Vec2::repeat(0.5 * width)), centre));
+        }
+    }
+    cells
 }
 
 /// A disc at a random place, a box at a random place, and a box that stays.

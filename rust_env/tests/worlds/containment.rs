@@ -9,7 +9,10 @@ use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{Actions, Engine, Scenario};
 use innerattn_env::world::World;
 
-use crate::common::{ENGINES, Table, chance, mixed_team, options, random_drive, some_obstacles, with_layers};
+use crate::common::{
+    ENGINES, Table, cells_of, chance, mixed_team, options, random_drive, some_obstacles, with_layers,
+    with_map,
+};
 
 const ENVS: usize = 250;
 /// Largest overlap at a period's end as a share of the smaller radius: of all, and at the 99.9th percentile.
@@ -52,14 +55,18 @@ impl Play {
     }
 }
 
-/// The obstacles that block a layer (one bit), and their centres.
-fn solids_in<'a>(
-    rules: &'a Rules,
-    world: &'a World,
-    layer: u64,
-) -> impl Iterator<Item = (&'a Solid, &'a Vec2)> {
-    let each = rules.solids.iter().zip(&world.obstacles).zip(rules.scenario.blocked());
-    each.filter(move |(_, blocked)| blocked & layer != 0).map(|(placed, _)| placed)
+/// The obstacles and solid cells that block a layer (one bit), and their centres.
+fn solids_in(rules: &Rules, world: &World, layer: u64) -> Vec<(Solid, Vec2)> {
+    let each =
+        rules.solids.iter().copied().zip(world.obstacles.iter().copied()).zip(rules.scenario.blocked());
+    let mut solids: Vec<_> =
+        each.filter(|(_, blocked)| blocked & layer != 0).map(|(placed, _)| placed).collect();
+    let names = rules.scenario.layers();
+    let name = names[layer.trailing_zeros() as usize];
+    if rules.scenario.map.as_ref().is_some_and(|map| map.blocks(name)) {
+        solids.extend(cells_of(&rules.scenario));
+    }
+    solids
 }
 
 /// The deepest overlap of what can touch in a world, as a share of the smaller of the two; of a box that is half its shorter side.
@@ -171,6 +178,13 @@ fn the_default_team_stays_apart() {
 #[test]
 fn obstacles_hold() {
     play("obstacles", &ENGINES, &Scenario { obstacles: some_obstacles(), ..long_episodes() }, 40_000);
+}
+
+#[test]
+fn maps_hold() {
+    play("map", &ENGINES, &with_map(long_episodes()), 10_000);
+    let tight = Scenario { arena_half_width_m: 0.8, ..Scenario { robots: mixed_team(8), ..long_episodes() } };
+    play("map and layers", &ENGINES, &with_map(with_layers(tight)), 5_000);
 }
 
 #[test]

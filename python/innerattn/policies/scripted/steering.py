@@ -49,7 +49,7 @@ class Steering:
         self._rolls = np.array([robot.has_wheels for robot in robots])
         self.along_axes = not self._continuous and not self._rolls.all()
         self.speed, self.lag = self._speed_and_lag(self._push, self._limit)
-        self._routes = Routes(scenario) if scenario.obstacles else None
+        self._routes = Routes(scenario) if scenario.blocks_ways else None
         self._known: tuple[Array, Array, Array] | None = None
 
     def _speed_and_lag(self, push: Array, limit: Array) -> tuple[Array, Array]:

@@ -57,6 +57,7 @@ function drawGround(scene) {
     for (const stop of worlds[name] ?? []) drawStop(scene, stop, sign);
   }
   context.restore();
+  if (worlds.map) drawMap(scene, worlds.map);
   worlds.obstacles.forEach((shape, index) => drawObstacle(scene, shape, index));
   context.strokeStyle = paint.wall;
   context.lineWidth = 3;
@@ -71,6 +72,20 @@ function drawGround(scene) {
   context.fillStyle = paint.quiet;
   context.textAlign = "left";
   context.fillText("0.5 m", left + 10, top + side - 18);
+}
+
+/** All solid cells in one path, so that no lines stand between them. */
+function drawMap(scene, map) {
+  const { context, paint, scale } = scene;
+  context.beginPath();
+  for (const [x, y, width, height] of map.boxes) {
+    const [left, top] = scene.at(x - width, y + height);
+    context.rect(left, top, 2 * width * scale, 2 * height * scale);
+  }
+  context.fillStyle = paint.obstacle;
+  context.globalAlpha = map.passed_by.length ? 0.4 : 1;
+  context.fill();
+  context.globalAlpha = 1;
 }
 
 function drawObstacle(scene, shape, index) {

@@ -101,6 +101,11 @@ function fillLegend(list, worlds) {
     const robot = worlds.robots.find((one) => one.layer === layer);
     row(robotSymbol(worlds, robot), `such an outline: a robot of layer ${layer}, which touches no robot of another layer`);
   }
+  if (worlds.map) {
+    const passing = worlds.map.passed_by.join(" and ");
+    const cell = svg("rect", { x: -7, y: -7, width: 14, height: 14, fill: "var(--obstacle)", "fill-opacity": passing ? 0.4 : 1 });
+    row(symbol(cell), passing ? `solid; robots of ${passing} pass it` : "solid");
+  }
   for (const layers of new Set(worlds.obstacles.map((one) => one.passed_by.join(" and ")))) {
     const box = { x: -9, y: -6, width: 18, height: 12, fill: "var(--obstacle)", "fill-opacity": 0.4 };
     const edge = { stroke: "var(--obstacle-line)", "stroke-dasharray": EDGES[1].join(" ") };
