@@ -16,8 +16,15 @@ EPISODES = 60
 KEYS = {"--network.symmetry": "network.symmetry", "--warm-start": "train.warm_start"}
 
 
-def test_there_are_five() -> None:
-    assert [file.stem for file in FILES] == ["assembly", "fire", "flood", "search", "warehouse"]
+def test_there_are_six() -> None:
+    assert [file.stem for file in FILES] == [
+        "assembly",
+        "fire",
+        "flood",
+        "office",
+        "search",
+        "warehouse",
+    ]
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
