@@ -11,7 +11,6 @@ is vectors, which turn from the sender's frame into that of the robot that hears
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor, nn
@@ -22,9 +21,6 @@ from innerattn.nn.encoder import EntityColumns, observation_encoder
 from innerattn.nn.linear import PerRobotLinear
 from innerattn.nn.memory import RememberingActor, turned_memory
 from innerattn.nn.symmetry import between
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _YES = 0.5
 
@@ -120,10 +116,9 @@ class Messages(nn.Module):
         self.obs_width = obs_width
         self.encoder = observation_encoder(num_robots, obs_width, hidden_width, generator, entities)
         self.output = PerRobotLinear(num_robots, hidden_width, width, generator)
-        self.query = None
+        self.query, self._pooling = None, pooling
         if pooling == "attention":
             self.query = PerRobotLinear(num_robots, hidden_width, width, generator)
-        self._pool = _POOLINGS.get(pooling)
         robots = torch.arange(num_robots)
         # Which of its teammates robot i knows robot j as; itself as one behind the last.
         place = torch.where(robots < robots.unsqueeze(1), robots, robots - 1)
@@ -143,16 +138,29 @@ class Messages(nn.Module):
         if self._turns:
             arriving = _turned_for(arriving, frame.long(), element.long())
         hears = self._hears(obs, said)
-        if self._pool is not None:
-            return self._pool(arriving, hears, self._distances(obs))
-        if self._hearing.delay:
-            encoded = functional.leaky_relu_(self.encoder(obs))
+        if self._pooling == "max":
+            return _largest(arriving, hears)
+        if self._pooling == "attention":
+            if self._hearing.delay:
+                encoded = functional.leaky_relu_(self.encoder(obs))
+            weights = self._attention(encoded, arriving, hears)
+        else:
+            if self._pooling == "nearest":
+                hears = _nearest(hears, self._distances(obs))
+            count = hears.sum(dim=1, keepdim=True).clamp_min(1)
+            weights = hears.to(rows.dtype) / count
+        pooled: Tensor = (weights.unsqueeze(3) * arriving).sum(dim=1)
+        return pooled
+
+    def _attention(self, encoded: Tensor, messages: Tensor, hears: Tensor) -> Tensor:
+        """(R, R, B) weights of messages (R, R, B, K), from encodings (R, B, W) of who hears."""
         assert self.query is not None  # the pooling is "attention"
-        asked = self.query(encoded).to(rows.dtype).unsqueeze(1)
-        scores = (asked * arriving).sum(dim=3) * self.width**-0.5
+        asked = self.query(encoded).to(messages.dtype).unsqueeze(1)
+        scores = (asked * messages).sum(dim=3) * self.width**-0.5
         # The lowest finite number instead of -inf avoids NaN where nobody is heard.
-        weights = scores.masked_fill(~hears, torch.finfo(scores.dtype).min).softmax(dim=1)
-        return _weighted(arriving, weights * hears)
+        scores = scores.masked_fill(~hears, torch.finfo(scores.dtype).min)
+        weights: Tensor = scores.softmax(dim=1) * hears
+        return weights
 
     def _hears(self, obs: Tensor, said: Tensor) -> Tensor:
         """(R, R, B) bool: whether robot i hears what robot j said."""
@@ -188,38 +196,17 @@ def _turned_for(messages: Tensor, sender: Tensor, receiver: Tensor) -> Tensor:
     return turned.view(messages.shape)
 
 
-def _weighted(messages: Tensor, weights: Tensor) -> Tensor:
-    """(R, B, K) from messages (R, R, B, K) and weights (R, R, B)."""
-    return (weights.unsqueeze(3) * messages).sum(dim=1)
-
-
-def _mean(messages: Tensor, hears: Tensor, distances: Tensor) -> Tensor:
-    """The mean of what is heard; arguments are (R, R, B, K), and twice (R, R, B)."""
-    del distances
-    weights = hears.to(messages.dtype)
-    return _weighted(messages, weights / weights.sum(dim=1, keepdim=True).clamp_min(1.0))
-
-
-def _largest(messages: Tensor, hears: Tensor, distances: Tensor) -> Tensor:
-    """The largest of what is heard, number by number; arguments as in `_mean`."""
-    del distances
+def _largest(messages: Tensor, hears: Tensor) -> Tensor:
+    """(R, B, K) the largest of the messages (R, R, B, K) that are heard (R, R, B)."""
     lowest = torch.finfo(messages.dtype).min
     largest = messages.masked_fill(~hears.unsqueeze(3), lowest).amax(dim=1)
     return largest.masked_fill(~hears.any(dim=1).unsqueeze(2), 0.0)
 
 
-def _nearest(messages: Tensor, hears: Tensor, distances: Tensor) -> Tensor:
-    """What the nearest robot that is heard said; arguments as in `_mean`."""
+def _nearest(hears: Tensor, distances: Tensor) -> Tensor:
+    """(R, R, B) bool: those of the robots that are heard that have the least distance."""
     distances = distances.masked_fill(~hears, torch.inf)
-    nearest = hears & (distances == distances.amin(dim=1, keepdim=True))
-    return _mean(messages, nearest, distances)
-
-
-_POOLINGS: dict[str, Callable[[Tensor, Tensor, Tensor], Tensor]] = {
-    "mean": _mean,
-    "max": _largest,
-    "nearest": _nearest,
-}
+    return hears & (distances == distances.amin(dim=1, keepdim=True))
 
 
 class ListeningActor(nn.Module):
