@@ -19,9 +19,11 @@ from innerattn.learn.messages import MessageRows
 from innerattn.learn.types import RememberingLearner
 from innerattn.nn import ListeningActor
 from innerattn.policies import PolicyInput
+from innerattn.records.run_folder import newest_weights, read_info
 from innerattn.train import load_policy, train
 from innerattn.train.build import build_learner
 from innerattn.train.columns import hearing
+from innerattn.train.weights import digest_of
 
 Configure = Callable[..., RunConfig]
 FAULTS = tuple(
@@ -149,6 +151,21 @@ def test_it_acts_where_messages_arrive_in_time_alone(run: Path) -> None:
 def test_bounds_are_not_known(run: Path) -> None:
     with pytest.raises(RunError, match="and robots without memory and messages"):
         bounds_of_run(run, states=2)
+
+
+def test_threads_do_not_matter(small_config: Configure, run: Path, tmp_path: Path) -> None:
+    for threads in (1, 2):
+        values = {**RADIO, "network.parameter_sharing": "kind", "train.threads": threads}
+        train(small_config(**values), tmp_path / str(threads))
+    one, two = (digest_of(newest_weights(tmp_path / str(threads))) for threads in (1, 2))
+    assert one == two != digest_of(newest_weights(run))
+
+
+def test_rough_products_do_not_break_them(small_config: Configure, tmp_path: Path) -> None:
+    for pooling in ("attention", "max", "nearest"):
+        values = {"network.precision": "bfloat16", "network.message_pooling": pooling}
+        found = train(small_config(**RADIO, **values), tmp_path / pooling)
+        assert read_info(found).state == "done"
 
 
 LOOKOUT: dict[str, Any] = {
