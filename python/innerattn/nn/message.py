@@ -75,10 +75,9 @@ class Messages(nn.Module):
         attention: sum_j alpha_ij m_ij, alpha_i = softmax over j of (W_q e_i) . m_ij / sqrt(K)
         mean:      their mean
         max:       the largest of them, number by number
-        nearest:   that of the nearest; those whose place it does not see are farther than others,
-                   and of several equally near ones the mean
+        nearest:   that of the nearest robot, or the mean of several that are equally near
 
-    Who hears nobody has zeros.
+    Robots whose place it does not see are farther than others. Who hears nobody has zeros.
 
     Attributes:
         width: K, numbers of a message, each in -1 to 1.
