@@ -256,7 +256,10 @@ ADDED_SINCE = {
         "occlusion",
         "communication",
     ),
-    "network": ("swapped_robots", "shared_gradients", "joint_critic", "symmetry", "memory_width"),
+    "network": (
+        *("swapped_robots", "shared_gradients", "joint_critic", "symmetry", "memory_width"),
+        *("message_width", "message_pooling"),
+    ),
     "train": (
         *("episode_steps", "engine", "stagger_starts", "schedule"),
         *("potential", "potential_discount", "potential_env_steps"),

@@ -11,7 +11,7 @@ from torch.fx import GraphModule
 from innerattn.config import NetworkConfig, PPOConfig, TDConfig
 from innerattn.learn import PPO, TD, Team, Transitions
 from innerattn.learn.actor_critic import ActorCritic
-from innerattn.nn import EntityColumns
+from innerattn.nn import EntityColumns, Hearing
 
 NETWORK = {"hidden_width": 8, "attention_heads": 2}
 AVAILABLE = 4  # column of the observation
@@ -37,6 +37,7 @@ def make(algorithm: str, robots: int, network: dict, numbers: dict) -> ActorCrit
         kinds=("one", *["another"] * (robots - 1)),
         availability_column=AVAILABLE,
         entities=columns(robots),
+        hearing=Hearing(AVAILABLE, (), tuple((5 + 2 * k, 6 + 2 * k) for k in range(robots - 1))),
     )
     given = NetworkConfig(**NETWORK, **network)
     common = {"critic_weight_decay": 0.01, "attention_logit_penalty": 0.1, **numbers}
@@ -131,6 +132,19 @@ def test_the_traced_update_agrees_without_attention() -> None:
 @pytest.mark.long
 def test_the_traced_update_agrees_by_entities() -> None:
     agree("ppo", 4, "aot_eager", ENTITIES, {})
+
+
+@pytest.mark.parametrize(
+    "network",
+    [
+        pytest.param({"symmetry": "canonical"}, marks=pytest.mark.long),
+        pytest.param({"message_pooling": "mean"}, marks=pytest.mark.slow),
+        pytest.param({"message_pooling": "max"}, marks=pytest.mark.slow),
+        pytest.param({"message_pooling": "nearest", **BY_KIND}, marks=pytest.mark.slow),
+    ],
+)
+def test_the_traced_update_agrees_with_messages(network: dict) -> None:
+    agree("ppo", 4, "aot_eager", {"attention": "inner", "message_width": 4, **network}, {})
 
 
 @pytest.mark.long

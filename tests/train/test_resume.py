@@ -105,6 +105,29 @@ CASES: dict[str, dict[str, Any]] = {
         "network.parameter_sharing": "kind",
         **MEMORY,
     },
+    "ppo-inner messages": {
+        "train.method": "ppo-inner",
+        "network.message_width": 8,
+        "scenario.communication": {"range_m": 1.2, "loss": 0.1},
+    },
+    "mappo messages memory canonical": {
+        "train.method": "mappo",
+        "network.message_width": 4,
+        "network.message_pooling": "nearest",
+        "network.memory_width": 4,
+        "network.symmetry": "canonical",
+        "network.parameter_sharing": "kind",
+        "scenario.communication": {"delay_steps": 2},
+        **MEMORY,
+    },
+    "ppo-uniform messages augmented": {
+        "train.method": "ppo-uniform",
+        "network.message_width": 8,
+        "network.message_pooling": "max",
+        "network.symmetry": "augmented",
+        "train.stagger_starts": True,
+        "scenario.communication": {"delay_steps": 1},
+    },
     "two threads": {"train.method": "td-inner", "train.threads": 2},
 }
 

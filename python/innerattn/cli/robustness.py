@@ -78,10 +78,8 @@ class Robustness(LongCommand):
             print(f"innerattn: {why}", file=sys.stderr)
         elif without := found.methods.keys() - found.bounds.keys():
             names = ", ".join(sorted(without))
-            print(
-                f"innerattn: left out: bounds on attention of {names}: its critic has a memory",
-                file=sys.stderr,
-            )
+            why = f"left out: bounds on attention of {names}: its robots have a memory or messages"
+            print(f"innerattn: {why}", file=sys.stderr)
         if self.json != Path("-"):
             print_robustness(
                 self.console(), found.grid, found.retention, found.bounds, found.attention

@@ -21,9 +21,11 @@ class AlgorithmConfig(Model, ABC):
 
     Attributes:
         remembers: Whether the learner's networks may have a memory (`network.memory_width`).
+        speaks: Whether its policies may have messages (`network.message_width`).
     """
 
     remembers: ClassVar[bool] = False
+    speaks: ClassVar[bool] = False
     gamma: float = Field(0.95, ge=0.0, le=1.0, description="discount per control step")
 
     @property

@@ -17,6 +17,7 @@ class PPOConfig(AlgorithmConfig):
 
     place: ClassVar[str] = "ppo"
     remembers: ClassVar[bool] = True
+    speaks: ClassVar[bool] = True
     removed: ClassVar[Mapping[str, object]] = {"value_clip": None}
 
     gae_lambda: float = Field(

@@ -170,6 +170,7 @@ class RunConfig(Model):
         self._check_workers()
         self._check_any_team()
         self._check_memory()
+        self._check_messages()
         gamma, world = self.algorithm.gamma, self.scenario
         if world.shaping == "potential" and self.train.schedule.gamma is not None:
             raise ValueError(
@@ -269,6 +270,23 @@ class RunConfig(Model):
                     f"ppo.sequence_steps = {sequence}: must divide ppo.rollout_steps = {rollout}, "
                     f"because {key}"
                 )
+
+    def _check_messages(self) -> None:
+        """Refuse messages for what cannot train them."""
+        train, width = self.train, self.network.message_width
+        if not width:
+            return
+        if not self.algorithm.speaks:
+            able = ", ".join(n for n, one in methods().items() if one.algorithm.config.speaks)
+            raise ValueError(
+                f"network.message_width = {width}: train.method = {train.method!r} has no "
+                f"messages; must be 0, or a method of {able}"
+            )
+        if train.warm_start != "none":
+            raise ValueError(
+                f"network.message_width = {width}: train.warm_start = {train.warm_start!r} "
+                "imitates robots that say nothing; must be 'none'"
+            )
 
     def _check_potential(self) -> None:
         """Refuse keys of a potential that do not go together."""

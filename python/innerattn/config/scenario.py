@@ -497,6 +497,11 @@ class Scenario(Model, Shown):
         return self.communication is not None and self.communication.limits
 
     @property
+    def message_delay_steps(self) -> int:
+        """Control steps from sending to hearing."""
+        return self.communication.delay_steps if self.communication else 0
+
+    @property
     def has_wheels(self) -> bool:
         """Whether some robot has a heading."""
         return any(robot.has_wheels for robot in self.robots)

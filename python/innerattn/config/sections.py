@@ -74,6 +74,19 @@ class NetworkConfig(Model):
         description="numbers that a robot remembers from step to step of an episode, in a gated "
         "recurrent unit before actor and critic; 0: no memory; PPO methods only",
     )
+    message_width: Annotated[int, ADDED_LATER] = Field(
+        0,
+        ge=0,
+        le=1_024,
+        multiple_of=4,
+        description="numbers of the message that each robot's policy learns to send in each step "
+        "to those who hear it; 0: no messages; PPO methods only",
+    )
+    message_pooling: Annotated[Literal["attention", "mean", "max", "nearest"], ADDED_LATER] = Field(
+        "attention",
+        description="what a robot makes of the messages it hears: their sum with learnt weights, "
+        "their mean, the largest of each number, or that of the nearest robot",
+    )
     precision: Literal["float32", "bfloat16"] = Field(
         "float32", description="of matrix products in an update; weights are always float32"
     )

@@ -45,7 +45,8 @@ class Robustness:
         grid: the faults.
         retention: of each policy by name, first the runs in their order, then the scripts.
         methods: method of training of each run, by name.
-        bounds: of each run's critic without a memory, by name; none for teams of one robot.
+        bounds: of each run's critic, by name; none for teams of one robot, and of robots with a
+            memory or messages.
         attention: of each run with learnt attention, by name; none for teams of less than three.
     """
 
@@ -112,7 +113,8 @@ def measure_robustness(
     bounds: dict[str, Bounds] = {}
     if scenario.num_robots > 1:
         for name, run in zip(names, runs, strict=True):
-            if networks[name].memory_width:  # bounds are of attention to one observation
+            # Bounds are of what one robot decides by one observation.
+            if networks[name].memory_width or networks[name].message_width:
                 continue
             bounds[name] = bounds_of_run(run, seed=seed, progress=on("checking bounds"))
     attention: dict[str, FaultAttention] = {}

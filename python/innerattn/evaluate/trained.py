@@ -63,7 +63,7 @@ def load_trained(
 
     Raises:
         RunError: there is no readable run at ``run``, or its robots do not see in ``scenario`` what
-            they saw in training.
+            they saw in training, or have messages that would arrive at another time.
         ConfigError: its configuration is not valid.
     """
     config, learner = load_policy(run, scenario=scenario)
@@ -74,6 +74,13 @@ def load_trained(
             f"(another team, other tasks or another number of victims; "
             f"situation {config.scenario.situation!r} there, {scenario.situation!r} here)"
         )
+    if config.network.message_width and scenario is not None:
+        there, here = (one.message_delay_steps for one in (config.scenario, scenario))
+        if there != here:
+            raise RunError(
+                f"{run}: was trained with communication.delay_steps = {there}: must be {there} "
+                f"here, not {here}, because its robots have messages"
+            )
     greedy = config.evaluate.greedy_actions if greedy is None else greedy
     return config, TrainedPolicy(learner, config.train.method, greedy=greedy)
 

@@ -22,13 +22,15 @@ from innerattn.learn.divergence import DivergenceError, not_finite, refuse_not_f
 from innerattn.learn.gradients import average_over_robots
 from innerattn.learn.interruptions import Interruptions, NoInterruptions
 from innerattn.learn.memories import Memories, parts_of
+from innerattn.learn.messages import MessageRows
 from innerattn.learn.networks import DrawNetworks, draw_networks
 from innerattn.learn.resume import State, take, take_generator, take_whole, whole
 from innerattn.learn.types import Team
 from innerattn.learn.undo import Undo
 from innerattn.nn import (
+    Actor,
     CriticOutput,
-    RememberingActor,
+    ListeningActor,
     RememberingCritic,
     action_noise,
     robots_of_each_kind,
@@ -127,9 +129,14 @@ class ActorCritic:
             self._robots_of_each_kind = robots_of_each_kind(team.kinds).to(device, dtype)
         self._acted: tuple[Tensor, Tensor] | None = None
         self._memories: Memories | None = None
-        if isinstance(self.actor, RememberingActor):
-            assert isinstance(self.critic, RememberingCritic)  # as they are drawn
-            self._memories = Memories(self.actor, self.critic, self._number(0.0))
+        if isinstance(self.critic, RememberingCritic):
+            assert not isinstance(self.actor, Actor)  # as they are drawn
+            self._memories = Memories(self.actor, self.critic, team.obs_width, self._number(0.0))
+        self._messages: MessageRows | None = None
+        if isinstance(self.actor, ListeningActor):
+            assert team.hearing is not None  # as it was drawn
+            sizes = team.num_robots, team.obs_width
+            self._messages = MessageRows(*sizes, team.hearing, self._number(0.0))
         self._team, self._actions = team, team.actions
         self._updates = 0
         self.interruptions: Interruptions = NoInterruptions()
@@ -163,17 +170,26 @@ class ActorCritic:
     @torch.no_grad()
     def act(self, obs: Tensor, greedy: bool = False, elements: Tensor | None = None) -> Tensor:
         """Choose actions (E, R, ...) for observations (E, R, D); see `RememberingLearner.act`."""
-        seen = self._robots_first(obs)
-        if self._memories is None:
-            outputs = self.actor(seen)
-        else:
-            outputs = self._memories.act(seen, self._turned_by(elements))
+        outputs = self._outputs(obs, elements)
         self._acted = (obs, outputs)
         if greedy:
             actions = self._actions.likeliest(outputs)
         else:
             actions = self._actions.draw(outputs, self._noise)
         return actions.transpose(0, 1).contiguous().to(obs.device)
+
+    def _outputs(self, obs: Tensor, elements: Tensor | None) -> Tensor:
+        """Outputs of the policies for one more step of the worlds, which robots remember from now.
+
+        Arguments as in `act`.
+        """
+        rows, turned_by = self._robots_first(obs), self._turned_by(elements)
+        if self._messages is not None:
+            rows = self._messages.of_step(rows, turned_by)
+        if self._memories is not None:
+            return self._memories.act(rows, turned_by)
+        outputs: Tensor = self.actor(rows)
+        return outputs
 
     @torch.no_grad()
     def imitate(self, obs: Tensor, actions: Tensor, learning_rate: float) -> float:
@@ -199,6 +215,8 @@ class ActorCritic:
         """Begin new episodes in all worlds; see `RememberingLearner`."""
         if self._memories is not None:
             self._memories.forget()
+        if self._messages is not None:
+            self._messages.forget()
 
     def remembered(self) -> Tensor | None:
         """What robots remembered before they acted last; see `RememberingLearner`."""
@@ -417,6 +435,10 @@ class ActorCritic:
     def _number(self, value: float) -> Tensor:
         """() of the networks' type. A compiled graph would be compiled anew for a plain number."""
         return torch.tensor(value, dtype=self._dtype, device=self._device)
+
+    def _seen_in(self, rows: Tensor) -> Tensor:
+        """The observations (R, B, D) in rows, behind which is what messages need, if anything."""
+        return rows[..., : self._team.obs_width]
 
     def _draw(self, shape: tuple[int, ...]) -> Tensor:
         """Noise for `sample_actions`, of the shape of the logits."""

@@ -95,7 +95,7 @@ class ClippedUpdate(ActorCritic):
         config = self._config
 
         def loss_of(critic: Forward) -> tuple[Tensor, tuple[Tensor, Tensor]]:
-            output = critic(obs, actions, self._available(obs), *recall)
+            output = critic(self._seen_in(obs), actions, self._available(obs), *recall)
             value = self._fitted(output.q, actions)
             loss = losses.critic_loss(value, target)
             loss = loss + losses.attention_logit_regularisation(

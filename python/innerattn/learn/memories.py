@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from innerattn.learn.resume import State, take
-from innerattn.nn import RememberingActor, RememberingCritic
+from innerattn.nn import ListeningActor, RememberingActor, RememberingCritic
 
 
 class Memories:
@@ -20,24 +20,38 @@ class Memories:
         now: (R, E, 2 W) after it.
     """
 
-    def __init__(self, actor: RememberingActor, critic: RememberingCritic, like: Tensor) -> None:
-        """Remember nothing yet, of no world; ``like`` has the dtype and the device."""
-        self._actor, self._critic = actor, critic
-        self._width = actor.memory.width + critic.memory.width
+    def __init__(
+        self,
+        actor: RememberingActor | ListeningActor,
+        critic: RememberingCritic,
+        obs_width: int,
+        like: Tensor,
+    ) -> None:
+        """Remember nothing yet, of no world.
+
+        Args:
+            actor: Has a memory, perhaps behind messages.
+            critic: Its memory is as wide.
+            obs_width: D.
+            like: Has the dtype and the device.
+        """
+        self._actor, self._critic, self._obs_width = actor, critic, obs_width
+        self._width = 2 * critic.memory.width
         self.before = like.new_zeros(actor.num_robots, 0, self._width)
         self.now = self.before
 
-    def act(self, obs: Tensor, elements: Tensor | None = None) -> Tensor:
-        """Outputs of the policies for observations (R, E, D), which are remembered from now on.
+    def act(self, rows: Tensor, elements: Tensor | None = None) -> Tensor:
+        """Outputs of the policies for rows (R, E, D or more), which are remembered from now on.
 
-        Frames are turned by ``elements`` (R, E), if there are any.
+        Rows are what the actor takes: observations, and what messages need behind them. Frames are
+        turned by ``elements`` (R, E), if there are any.
         """
-        if obs.shape[1] != self.now.shape[1]:
-            self.now = self.now.new_zeros(len(obs), obs.shape[1], self._width)
+        if rows.shape[1] != self.now.shape[1]:
+            self.now = self.now.new_zeros(len(rows), rows.shape[1], self._width)
         self.before = self.now
         of_actor, of_critic = parts_of(self.before)
-        outputs, of_actor = self._actor.act(obs, of_actor, elements)
-        of_critic = self._critic.remember(obs, of_critic, elements)
+        outputs, of_actor = self._actor.act(rows, of_actor, elements)
+        of_critic = self._critic.remember(rows[..., : self._obs_width], of_critic, elements)
         self.now = torch.cat([of_actor, of_critic], dim=2)
         return outputs
 

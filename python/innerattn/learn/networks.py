@@ -16,8 +16,11 @@ from innerattn.nn import (
     CentralCritic,
     Critic,
     EntityColumns,
+    Hearing,
     JointCritic,
+    ListeningActor,
     Memory,
+    Messages,
     OracleAttention,
     PartnerColumns,
     RememberingActor,
@@ -28,9 +31,9 @@ from innerattn.nn import (
     swap_robots,
 )
 
-DrawNetworks = Callable[
-    [Team, NetworkConfig, torch.Generator], tuple[Actor | RememberingActor, nn.Module]
-]
+AnyActor = Actor | RememberingActor | ListeningActor
+"""The policies of all robots, with or without a memory and messages."""
+DrawNetworks = Callable[[Team, NetworkConfig, torch.Generator], tuple[AnyActor, nn.Module]]
 """Makes an actor and a critic, which gives a `CriticOutput` as `Critic.forward` does."""
 
 
@@ -39,8 +42,10 @@ def draw_networks(
     network: NetworkConfig,
     generator: torch.Generator,
     critic_outputs: int | None = None,
-) -> tuple[Actor | RememberingActor, nn.Module]:
-    """Actors and critics with initial parameters, float32 on the CPU; with a memory, if asked for.
+) -> tuple[AnyActor, nn.Module]:
+    """Actors and critics with initial parameters, float32 on the CPU.
+
+    They have a memory, and actors have messages, if that is asked for.
 
     A critic without attention takes whole observations and shares nothing between robots: its input
     is the same for all.
@@ -55,16 +60,17 @@ def draw_networks(
     Raises:
         ValueError: `network.encoder` is "entities" and `team.entities` are not the columns of an
             observation, or `network.parameter_sharing` is "kind" and `team.kinds` are not those of
-            the team, or `network.attention` is "oracle" and `team.partners` is missing.
+            the team, or `network.attention` is "oracle" and `team.partners` is missing, or
+            `network.message_width` is not 0 and `team.hearing` is missing.
     """
     entities = _entities(team) if network.encoder == "entities" else None
     kinds = _kinds(team) if network.parameter_sharing == "kind" else None
     robots, obs_width, num_actions, *_ = team
-    width, remembered = network.hidden_width, network.memory_width
+    width, remembered, heard = network.hidden_width, network.memory_width, network.message_width
     sizes = robots, obs_width, team.actions.outputs, width
-    actor: Actor | RememberingActor
+    actor: AnyActor
     if network.attention == "none":
-        actor = Actor(*sizes, generator, entities, remembered)
+        actor = Actor(*sizes, generator, entities, heard + remembered)
         outputs = critic_outputs or num_actions
         joint = CentralCritic if network.joint_critic == "central" else JointCritic
         critic: nn.Module = joint(robots, obs_width + remembered, outputs, width, generator)
@@ -73,7 +79,7 @@ def draw_networks(
         attention = kind(width, network.attention_heads, generator)
         if isinstance(attention, OracleAttention):
             attention.partners = _partners(team)
-        actor = Actor(*sizes, generator, entities, remembered)
+        actor = Actor(*sizes, generator, entities, heard + remembered)
         form = VectorCritic if team.action_width else Critic
         inputs = team.action_width or num_actions
         critic = form(
@@ -84,12 +90,28 @@ def draw_networks(
     if kinds is not None:
         share_by_kind(actor, kinds)
     if remembered:
-        memories = [Memory(robots, obs_width, remembered, generator) for _ in range(2)]
+        read = obs_width + heard, obs_width  # actors remember what they heard, too
+        memories = [Memory(robots, seen, remembered, generator) for seen in read]
         if kinds is not None:
             for memory in memories:
                 share_by_kind(memory, kinds)
         actor = RememberingActor(memories[0], actor)
         critic = RememberingCritic(memories[1], critic)
+    if heard:
+        messages = Messages(
+            robots,
+            obs_width,
+            width,
+            heard,
+            network.message_pooling,
+            _hearing(team),
+            generator,
+            turns=network.symmetry != "none",
+            entities=entities,
+        )
+        if kinds is not None:
+            share_by_kind(messages, kinds)
+        actor = ListeningActor(messages, actor)
     if team.swapped is not None:
         for net in (actor, critic):
             swap_robots(net, *team.swapped)
@@ -111,6 +133,14 @@ def _partners(team: Team) -> PartnerColumns:
             "partners = None: network.attention = 'oracle' needs the columns that tell who can help"
         )
     return team.partners
+
+
+def _hearing(team: Team) -> Hearing:
+    if team.hearing is None:
+        raise ValueError(
+            "hearing = None: network.message_width needs the columns that tell whom a robot hears"
+        )
+    return team.hearing
 
 
 def _kinds(team: Team) -> tuple[str, ...]:

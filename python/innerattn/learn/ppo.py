@@ -109,7 +109,12 @@ class PPO(ClippedUpdate):
         self._config = ppo
         self._shuffle = torch.Generator().manual_seed(self._data_seed)
         self._memory_width = 2 * network.memory_width  # of actor and critic
-        self._buffer = RolloutBuffer(ppo.rollout_steps, team, device, dtype, self._memory_width)
+        self._team_of_rows = team
+        if self._messages is not None:  # which are made of more than an observation
+            self._team_of_rows = team._replace(obs_width=self._messages.width)
+        self._buffer = RolloutBuffer(
+            ppo.rollout_steps, self._team_of_rows, device, dtype, self._memory_width
+        )
         self._steps_of_frozen = False
         self._afterstates: AfterstateCritic | None = None
         if ppo.bootstrap == "afterstate":
@@ -130,18 +135,29 @@ class PPO(ClippedUpdate):
             self.scale.forget_open_returns()
             self._steps_of_frozen = self.actor_frozen
         log_probs = self._log_probs_of(batch.obs)
-        self._buffer.add(batch, truncated, log_probs, self._memories_of(batch.obs))
-        if self._memories is not None:
-            self._memories.forget(batch.terminated | truncated)
+        self._see(batch)
+        memories = self._memories
+        remembered = None if memories is None else (memories.before, memories.now)
+        self._buffer.add(self._in_rows(batch), truncated, log_probs, remembered)
+        if memories is not None:
+            memories.forget(batch.terminated | truncated)
 
-    def _memories_of(self, obs: Tensor) -> tuple[Tensor, Tensor] | None:
-        """(R, E, M) what robots remembered before these observations, and after; None: nothing."""
-        if self._memories is None:
-            return None
-        if self._acted is None or self._acted[0] is not obs:
-            with torch.no_grad():
-                self._memories.act(self._robots_first(obs))
-        return self._memories.before, self._memories.now
+    @torch.no_grad()
+    def _see(self, batch: Transitions) -> None:
+        """Let robots remember, and say, what they saw where others acted for them."""
+        if self._memories is None and self._messages is None:
+            return
+        if self._acted is None or self._acted[0] is not batch.obs:
+            self._outputs(batch.obs, batch.elements)
+
+    def _in_rows(self, batch: Transitions) -> Transitions:
+        """The same with the rows of policies with messages in the place of observations."""
+        if self._messages is None:
+            return batch
+        after = self._robots_first(batch.next_obs), self._turned_by(batch.next_elements)
+        rows = self._messages.now, self._messages.after_step(*after)
+        obs, next_obs = (one.transpose(0, 1) for one in rows)
+        return batch._replace(obs=obs, next_obs=next_obs)
 
     def follow(self, scheduled: Scheduled) -> None:
         """Take over discount and entropy weight; see `ScheduledLearner.follow`."""
@@ -254,7 +270,8 @@ class PPO(ClippedUpdate):
             chunk = slice(first, first + _CHUNK)
             some_obs, some_actions = obs[:, chunk], actions[:, chunk]
             of_actor, of_critic = recalls(None if recall is None else recall.steps(chunk))
-            q = self.critic(some_obs, some_actions, self._available(some_obs), *of_critic).q
+            seen, available = self._seen_in(some_obs), self._available(some_obs)
+            q = self.critic(seen, some_actions, available, *of_critic).q
             if self._team.action_width:
                 taken = self._actions.log_prob(self.actor(some_obs, *of_actor), some_actions)
                 baseline = q.squeeze(1)
@@ -288,6 +305,8 @@ class PPO(ClippedUpdate):
             state |= under("afterstates", self._afterstates.resume_state())
         if self._memories is not None:
             state |= under("memories", self._memories.resume_state())
+        if self._messages is not None:
+            state |= under("messages", self._messages.resume_state())
         if self._passes is not None:
             passes = self._passes
             state |= under("rollout", passes.rollout.resume_state())
@@ -307,10 +326,12 @@ class PPO(ClippedUpdate):
             self._afterstates.load_resume_state(inside("afterstates", state))
         if self._memories is not None:
             self._memories.load_resume_state(inside("memories", state))
+        if self._messages is not None:
+            self._messages.load_resume_state(inside("messages", state))
         self._passes = None
         if "epoch" in state:
             found, like = inside("rollout", state), self._number(0.0)
-            rollout = Rollout.taken_from(found, self._team, like, self._memory_width)
+            rollout = Rollout.taken_from(found, self._team_of_rows, like, self._memory_width)
             size = rollout.units
             self._passes = _Passes(rollout, take_whole(state, "epoch", 0, self._config.epochs))
             if "order" in state:

@@ -15,6 +15,7 @@ from innerattn.nn import (
     Actions,
     DiscreteActions,
     EntityColumns,
+    Hearing,
     PartnerColumns,
     SquashedActions,
 )
@@ -39,6 +40,8 @@ class Team(NamedTuple):
             "afterstate".
         swapped: Two robots that swap their initial weights; None: none do.
         terminates: Whether an episode may terminate, so that a policy decides how long it lasts.
+        hearing: How observations say whom a robot hears; needed only where `network.message_width`
+            is not 0.
     """
 
     num_robots: int
@@ -52,6 +55,7 @@ class Team(NamedTuple):
     state_width: int = 0
     swapped: tuple[int, int] | None = None
     terminates: bool = False
+    hearing: Hearing | None = None
 
     @property
     def actions(self) -> Actions:

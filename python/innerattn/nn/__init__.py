@@ -18,6 +18,7 @@ from innerattn.nn.encoder import EntityColumns, EntityEncoder
 from innerattn.nn.joint_critic import CentralCritic, JointCritic
 from innerattn.nn.linear import PerRobotLinear, swap_robots
 from innerattn.nn.memory import Memory, Remembering, RememberingActor, RememberingCritic
+from innerattn.nn.message import Hearing, ListeningActor, Messages
 from innerattn.nn.partner import OracleAttention, PartnerColumns
 from innerattn.nn.sharing import is_shared_by_kind, robots_of_each_kind, share_by_kind
 from innerattn.nn.symmetry import NUM_ELEMENTS, SquareSymmetry, VectorColumns
@@ -34,9 +35,12 @@ __all__ = [
     "EntityColumns",
     "EntityEncoder",
     "FrozenAttention",
+    "Hearing",
     "InnerAttention",
     "JointCritic",
+    "ListeningActor",
     "Memory",
+    "Messages",
     "OracleAttention",
     "PartnerColumns",
     "PerRobotLinear",

@@ -24,6 +24,7 @@ from innerattn.learn.types import Learner, LearnerClass, Team
 from innerattn.nn import SquareSymmetry, VectorColumns
 from innerattn.train.columns import (
     entity_columns,
+    hearing,
     partner_columns,
     state_columns,
     vector_columns,
@@ -92,7 +93,7 @@ def refuse_larger_networks(
 
 def team_of(config: RunConfig, env: BatchEnv) -> Team:
     """What learners know of the team in ``env``."""
-    names = env.observation_names()
+    names, delay = env.observation_names(), env.scenario.message_delay_steps
     return Team(
         env.num_robots,
         env.obs_width,
@@ -105,6 +106,7 @@ def team_of(config: RunConfig, env: BatchEnv) -> Team:
         state_width=len(env.state_names()) if config.algorithm.needs_afterstates else 0,
         swapped=_swapped(config),
         terminates=env.scenario.ends_early,
+        hearing=hearing(names, delay) if config.network.message_width else None,
     )
 
 

@@ -1,4 +1,4 @@
-"""Finds out from names what columns of an observation are: whose, turning, or of who can help."""
+"""Finds out from names what columns of an observation are: whose, or turning, or of what."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import zip_longest
 
 from innerattn.errors import ConfigError
-from innerattn.nn import EntityColumns, PartnerColumns, VectorColumns
+from innerattn.nn import EntityColumns, Hearing, PartnerColumns, VectorColumns
 
 _HANDED = (".fault.heading_bias", ".turn_rate", ".left")
 """Ends of names of columns that change their sign in a mirrored world."""
@@ -112,9 +112,7 @@ def partner_columns(names: Sequence[str]) -> PartnerColumns:
     abilities = [
         name.removeprefix("own.ability.") for name in names if name.startswith("own.ability.")
     ]
-    teammates = dict.fromkeys(
-        name.partition(".")[0] for name in names if name.startswith("teammate_")
-    )
+    teammates = _teammates(names)
 
     def at(who: str) -> tuple[int, int]:
         return place[f"{who}.relative_position.x"], place[f"{who}.relative_position.y"]
@@ -129,6 +127,39 @@ def partner_columns(names: Sequence[str]) -> PartnerColumns:
         victim_needs=tuple(place[f"victim_0.need.{one}"] for one in abilities),
         victim_place=at("victim_0"),
     )
+
+
+def hearing(names: Sequence[str], delay: int) -> Hearing:
+    """How an observation says whom a robot hears.
+
+    It hears those whose ``teammate_k.heard`` says so. Where nothing limits that, there is no such
+    column: it hears all whom it sees to be available, or, where its sight is limited, all.
+
+    Args:
+        names: Of all columns, as the worlds name them.
+        delay: Control steps from saying to hearing.
+    """
+    place = {name: column for column, name in enumerate(names)}
+    teammates = _teammates(names)
+
+    def columns(quantity: str) -> tuple[int, ...]:
+        found = (f"{who}.{quantity}" for who in teammates)
+        return tuple(place[name] for name in found if name in place)
+
+    seen, heard = columns("seen"), columns("heard")
+    places = zip(columns("relative_position.x"), columns("relative_position.y"), strict=True)
+    return Hearing(
+        sends=place["own.available"],
+        heard=heard or (() if seen else columns("available")),
+        places=tuple(places),
+        seen=seen,
+        delay=delay,
+    )
+
+
+def _teammates(names: Sequence[str]) -> list[str]:
+    owners = (name.partition(".")[0] for name in names)
+    return list(dict.fromkeys(owner for owner in owners if owner.startswith("teammate_")))
 
 
 def _count(owners: dict[str, list[str]], prefix: str) -> int:

@@ -258,6 +258,13 @@ def test_a_team_whose_velocity_is_set_is_trained_and_not_exported(tmp_path: Path
     assert not (tmp_path / "export").exists()
 
 
+def test_a_team_with_messages_is_trained_and_not_exported(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", run_config("ppo-inner", **{"network.message_width": 8}))
+    with pytest.raises(ExportError, match=r"network.message_width = 8: must be 0; exported polic"):
+        export_run(run, tmp_path / "export")
+    assert not (tmp_path / "export").exists()
+
+
 def test_a_team_that_remembers_is_trained_and_not_exported(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", run_config("ppo-inner", **{"network.memory_width": 8}))
     with pytest.raises(ExportError, match=r"network.memory_width = 8: exported policies have no m"):

@@ -55,6 +55,12 @@ CASES: dict[str, dict[str, Any]] = {
         "network.symmetry": "canonical",
         "ppo.sequence_steps": 7,
     },
+    "ppo-inner, messages": {
+        "train.method": "ppo-inner",
+        "network.message_width": 4,
+        "network.symmetry": "canonical",
+        "scenario.communication": {"range_m": 1.2, "delay_steps": 1},
+    },
     "ppo-inner, warm start, afterstates": {
         "train.method": "ppo-inner",
         "ppo.bootstrap": "afterstate",

@@ -138,7 +138,7 @@ def bounds_of_run(
 
     Raises:
         RunError: there is no readable run at ``run``, its team is one robot, its actions are
-            continuous, or its critic has a memory or is of an extension.
+            continuous, its robots have a memory or messages, or its critic is of an extension.
         ConfigError: its configuration is not valid.
     """
     config, learner = load_policy(run)
@@ -158,7 +158,7 @@ def bounds_of_run(
     ):
         raise RunError(
             f"{run}: train.method = {config.train.method!r}: bounds are known only for built-in "
-            "critics with inner, uniform or no attention, and no memory"
+            "critics with inner, uniform or no attention, and robots without memory and messages"
         )
     seed = config.evaluate.seed if seed is None else seed
     with torch_threads(thread_count(config)):

@@ -108,6 +108,11 @@ def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: 
             f"{run}: network.memory_width = {config.network.memory_width}: exported policies have "
             "no memory"
         )
+    if config.network.message_width:
+        raise ExportError(
+            f"{run}: network.message_width = {config.network.message_width}: must be 0; exported "
+            "policies send no messages"
+        )
     entities = entity_columns(names) if config.network.encoder == "entities" else None
     actor = inner_actor(learner, run)
     team = team_actors(config, actor, entities)
