@@ -12,7 +12,7 @@ type Block = (Solid, Vec2);
 /// Boxes over all solid cells of a map. None overlaps another.
 #[derive(Debug, Clone)]
 pub struct Blocks {
-    blocks: Vec<Block>,
+    boxes: Vec<Block>,
     /// The buckets along x and y in which each box is: the first and the last of both.
     spans: Vec<[[usize; 2]; 2]>,
     /// Layers that they block, as bits.
@@ -36,7 +36,7 @@ impl Blocks {
     /// The boxes of a valid map over an arena of half width `half`, m, which block these layers (as bits).
     #[must_use]
     pub fn new(map: &Map, half: f64, layers: u64) -> Self {
-        let blocks: Vec<Block> = rectangles(map).map(|cells| placed(cells, map.rows.len(), half)).collect();
+        let boxes: Vec<Block> = rectangles(map).map(|cells| placed(cells, map.rows.len(), half)).collect();
         let side = map.rows.len().min(MOST_BUCKETS);
         let mut found = Self {
             layers,
@@ -44,9 +44,9 @@ impl Blocks {
             side,
             buckets: vec![vec![]; side * side],
             spans: vec![],
-            blocks,
+            boxes,
         };
-        for (index, (solid, centre)) in found.blocks.iter().enumerate() {
+        for (index, (solid, centre)) in found.boxes.iter().enumerate() {
             let span = found.span(*centre, solid.half_extents());
             for bucket in cells_of(span, side) {
                 found.buckets[bucket].push(index);
@@ -59,7 +59,7 @@ impl Blocks {
     /// All boxes and their centres, m.
     #[must_use]
     pub fn all(&self) -> &[Block] {
-        &self.blocks
+        &self.boxes
     }
 
     /// Whether they block a layer (one bit).
@@ -74,7 +74,7 @@ impl Blocks {
         cells_of(span, self.side).flat_map(move |bucket| {
             let own = self.buckets[bucket].iter();
             let own = own.filter(move |index| self.first_of_both(**index, span) == bucket);
-            own.map(|index| (&self.blocks[*index].0, self.blocks[*index].1))
+            own.map(|index| (&self.boxes[*index].0, self.boxes[*index].1))
         })
     }
 
@@ -106,7 +106,7 @@ impl Blocks {
             let columns = along[0].max(columns[0])..=along[1].min(columns[1]);
             let mut found = columns.flat_map(|column| &self.buckets[row * self.side + column]);
             found.any(|index| {
-                let (solid, centre) = &self.blocks[*index];
+                let (solid, centre) = &self.boxes[*index];
                 solid.is_crossed(from - centre, way)
             })
         })
@@ -159,7 +159,7 @@ fn rectangles(map: &Map) -> impl Iterator<Item = Cells> {
 fn placed([left, top, right, bottom]: Cells, side: usize, half: f64) -> Block {
     let x = |column: usize| column as f64 / side as f64 * 2.0 * half - half;
     let y = |row: usize| -x(row);
-    let centre = |low: f64, high: f64| ((low + high) / 2.0) as f32;
+    let centre = |low: f64, high: f64| f64::midpoint(low, high) as f32;
     let extent = |low: f64, high: f64| ((high - low) / 2.0) as f32;
     let (left, right, bottom, top) = (x(left), x(right), y(bottom), y(top));
     let solid = Solid::Box(Vec2::new(extent(left, right), extent(bottom, top)));

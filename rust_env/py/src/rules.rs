@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use innerattn_env::blocks::Blocks;
 use innerattn_env::rules::Rules as Shared;
 use pyo3::prelude::*;
 
@@ -35,7 +36,7 @@ impl Rules {
 
     /// The boxes over the map's solid cells: centre and half extents of each, m.
     fn map_boxes(&self) -> Vec<[f32; 4]> {
-        let blocks = self.0.blocks.iter().flat_map(|blocks| blocks.all());
+        let blocks = self.0.blocks.iter().flat_map(Blocks::all);
         blocks
             .map(|(solid, at)| (solid.half_extents(), at))
             .map(|(half, at)| [at.x, at.y, half.x, half.y])

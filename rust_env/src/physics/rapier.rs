@@ -11,6 +11,7 @@ use rapier2d::prelude::{
 };
 
 use super::{Engine, Shapes, Workspace, fly, is_in};
+use crate::blocks::Blocks;
 use crate::geometry::{Solid, Touch, Vec2};
 use crate::robot::Body;
 use crate::scenario::Scenario;
@@ -108,7 +109,7 @@ impl Rapier {
             solids.iter().map(|solid| world.colliders.insert(collider(solid, friction))).collect();
         let shapes = Shapes::new(scenario, team, solids);
         // One collider for the whole map: a copy of the world shares its shape.
-        let blocks = shapes.blocks.iter().flat_map(|blocks| blocks.all());
+        let blocks = shapes.blocks.iter().flat_map(Blocks::all);
         let parts: Vec<_> = blocks
             .map(|(solid, at)| (Pose::from_translation(Vector::new(at.x, at.y)), shape(solid)))
             .collect();
