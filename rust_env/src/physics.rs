@@ -160,10 +160,24 @@ impl Shapes {
         }
     }
 
-    /// The obstacles, and those of the map's boxes that may be within `reach` of a place, with their centres.
-    fn solids_near(&self, at: Vec2, reach: f32, obstacles: &[Vec2]) -> impl Iterator<Item = (&Solid, Vec2)> {
-        let blocks = self.blocks.iter().flat_map(move |blocks| blocks.near(at, reach));
-        self.solids.iter().zip(obstacles.iter().copied()).chain(blocks)
+    /// Visits the obstacles, and those of the map's boxes that may be within `reach` of a place, with their
+    /// centres.
+    #[inline]
+    fn each_solid(
+        &self,
+        at: Vec2,
+        reach: impl FnOnce() -> f32,
+        obstacles: &[Vec2],
+        mut visit: impl FnMut(&Solid, Vec2),
+    ) {
+        for (solid, centre) in self.solids.iter().zip(obstacles) {
+            visit(solid, *centre);
+        }
+        if let Some(blocks) = &self.blocks {
+            for (solid, centre) in blocks.near(at, reach()) {
+                visit(solid, centre);
+            }
+        }
     }
 
     /// Time until anything would touch if all moved straight on, s; infinite if nothing would in a control
@@ -188,9 +202,14 @@ impl Shapes {
                 let reach = radius + self.radii[other];
                 first = first.min(touch.discs(positions[other] - at, velocities[other] - velocity, reach));
             }
-            for (solid, centre) in self.solids_near(*at, radius + velocity.norm() * self.dt, obstacles) {
-                first = first.min(touch.solid(solid, at - centre, *velocity, radius));
-            }
+            self.each_solid(
+                *at,
+                || radius + velocity.norm() * self.dt,
+                obstacles,
+                |solid, centre| {
+                    first = first.min(touch.solid(solid, at - centre, *velocity, radius));
+                },
+            );
         }
         first
     }
@@ -235,12 +254,17 @@ impl Shapes {
                     sunk |= 1 << index | 1 << other;
                 }
             }
-            for (solid, centre) in self.solids_near(*at, radius, obstacles) {
-                let reach = radius - most * radius.min(solid.half_breadth());
-                if solid.nearest(at - centre).0 < reach {
-                    sunk |= 1 << index;
-                }
-            }
+            self.each_solid(
+                *at,
+                || radius,
+                obstacles,
+                |solid, centre| {
+                    let reach = radius - most * radius.min(solid.half_breadth());
+                    if solid.nearest(at - centre).0 < reach {
+                        sunk |= 1 << index;
+                    }
+                },
+            );
         }
         sunk
     }

@@ -87,12 +87,17 @@ impl Discs {
                     add(index, Some(other), apart.try_normalize(0.0).unwrap_or_else(Vec2::x));
                 }
             }
-            for (solid, centre) in self.shapes.solids_near(*at, radius + near, obstacles) {
-                let (depth, outward) = solid.nearest(at - centre);
-                if depth <= radius + near {
-                    add(index, None, -outward);
-                }
-            }
+            self.shapes.each_solid(
+                *at,
+                || radius + near,
+                obstacles,
+                |solid, centre| {
+                    let (depth, outward) = solid.nearest(at - centre);
+                    if depth <= radius + near {
+                        add(index, None, -outward);
+                    }
+                },
+            );
         }
     }
 
@@ -148,13 +153,18 @@ impl Discs {
                 if is_in(absent, index) {
                     continue;
                 }
-                for (solid, centre) in self.shapes.solids_near(*at, *radius, obstacles) {
-                    let (distance, outward) = solid.nearest(*at - centre);
-                    if distance < *radius {
-                        overlapped = true;
-                        *at += outward * (radius - distance);
-                    }
-                }
+                self.shapes.each_solid(
+                    *at,
+                    || *radius,
+                    obstacles,
+                    |solid, centre| {
+                        let (distance, outward) = solid.nearest(*at - centre);
+                        if distance < *radius {
+                            overlapped = true;
+                            *at += outward * (radius - distance);
+                        }
+                    },
+                );
                 let limit = self.shapes.arena - radius;
                 *at = at.map(|place| place.clamp(-limit, limit));
             }
