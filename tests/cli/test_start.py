@@ -113,15 +113,15 @@ def test_worlds_scripts_records_and_statistics_need_no_extra() -> None:
 def test_every_extra_brings_what_its_message_promises() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     extras = project["optional-dependencies"]
-    asked = {"deploy", "gym", "log", "ray", "report", "search", "torchrl", "train"}
+    asked = {"deploy", "gym", "log", "maps", "ray", "report", "search", "torchrl", "train"}
     assert asked | {"all", "dev"} <= extras.keys()
     for library, extra in EXTRA_OF.items():
-        brought = " ".join(extras[extra]).replace("-", "_")
+        brought = " ".join(extras[extra]).replace("-", "_").replace("pillow", "PIL")
         assert library in brought or library == "tensordict", library  # TorchRL brings that
     assert set(extras["all"][0].removeprefix("innerattn[").removesuffix("]").split(",")) == asked
     everything = {
         one
-        for name in ("gym", "report", "search", "torchrl", "train")
+        for name in ("gym", "maps", "report", "search", "torchrl", "train")
         for one in extras[name]
         if not one.startswith("innerattn")
     }

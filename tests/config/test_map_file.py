@@ -202,6 +202,17 @@ def test_wrong_files_are_refused_in_one_line(tmp_path: Path, text: str, expected
     assert str(raised.value).startswith(f"{tmp_path / 'world.toml'}: scenario.map")
 
 
+def test_a_value_that_unfolds_to_a_huge_one_is_not_written_out(tmp_path: Path) -> None:
+    """Each line names the one before ten times: written out, the last would fill any memory."""
+    lines = [
+        f"a{depth}: &a{depth} [{', '.join([f'*a{depth - 1}'] * 10)}]" for depth in range(1, 20)
+    ]
+    text = "\n".join(["a0: &a0 [1]", *lines, "image: room.png", "mode: *a19"])
+    (tmp_path / "bomb.yaml").write_text(text)
+    with pytest.raises(ConfigError, match="mode = list: must be 'trinary'"):
+        Scenario.from_toml(scenario_file(tmp_path, 'map = { file = "bomb.yaml" }\n'))
+
+
 def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ros(tmp_path)
     monkeypatch.setitem(sys.modules, "yaml", None)

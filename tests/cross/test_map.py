@@ -13,6 +13,7 @@ from innerattn.policies import scripted_policy
 from innerattn.policies.scripted.routes import Routes
 from innerattn.report.reachability import closed_off
 from innerattn.report.scenario_map import scenario_map
+from innerattn.report.scenario_words import scenario_words
 from innerattn.report.worlds import worlds_document
 
 
@@ -144,3 +145,5 @@ def test_pages_and_drawings_show_solid_cells() -> None:
     drawing = scenario_map(thin)
     assert drawing.splitlines()[16][1] == "#", "a cell is seen even if no character has its centre"
     assert "#  an obstacle or a solid cell" in drawing
+    assert "Solid cells hide what is behind them." in scenario_words(scenario)
+    assert "Obstacles hide what is behind them." in scenario_words(with_obstacles(scenario))

@@ -143,10 +143,10 @@ def _picture_or_ros(path: Path) -> Grid:
     if not isinstance(table, dict) or not isinstance(table.get("image"), str):
         raise ConfigError(f"map.file: {path}: image: must name the picture of the map")
     if table.get("mode", "trinary") != "trinary":
-        raise ConfigError(f"map.file: {path}: mode = {table['mode']!r}: must be 'trinary'")
+        raise ConfigError(f"map.file: {path}: mode = {_shown(table['mode'])}: must be 'trinary'")
     negate = table.get("negate", 0)
     if negate not in (0, 1):
-        raise ConfigError(f"map.file: {path}: negate = {negate!r}: must be 0 or 1")
+        raise ConfigError(f"map.file: {path}: negate = {_shown(negate)}: must be 0 or 1")
     occupied = _number(table, "occupied_thresh", _OCCUPIED, path, most=1.0)
     free = _number(table, "free_thresh", _FREE, path, most=1.0)
     resolution = _number(table, "resolution", None, path, most=100.0)
@@ -160,9 +160,14 @@ def _number(
     value = table.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value <= most:
         raise ConfigError(
-            f"map.file: {path}: {key} = {value!r}: must be a number above 0, at most {most:g}"
+            f"map.file: {path}: {key} = {_shown(value)}: must be a number above 0, at most {most:g}"
         )
     return float(value)
+
+
+def _shown(value: object) -> str:
+    """A plain value as Python writes it; YAML may hide a huge one behind a short text."""
+    return repr(value)[:80] if isinstance(value, str | int | float) else type(value).__name__
 
 
 def _solid(path: Path, *, negate: bool, occupied: float, free: float) -> Mask:

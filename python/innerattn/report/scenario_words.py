@@ -113,7 +113,8 @@ def _sight(scenario: Scenario) -> Iterator[str]:
         robots = ", ".join(one.name for one in scenario.robots if one.sight_m == sight_m)
         yield f"{robots}: sees teammates and victims up to {sight_m:g} m away"
     if scenario.occlusion:
-        yield "Obstacles hide what is behind them."
+        hiding = ["obstacles"] * bool(scenario.obstacles) + ["solid cells"] * bool(scenario.map)
+        yield f"{' and '.join(hiding).capitalize()} hide what is behind them."
 
 
 def _communication(scenario: Scenario) -> Iterator[str]:
