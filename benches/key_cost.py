@@ -11,7 +11,7 @@ from typing import Any
 from fault_cost import MIXED, shares
 from page import machine, publish
 
-from innerattn.config import Communication, Scenario
+from innerattn.config import Communication, Map, Scenario
 
 
 def changed(**keys: Any) -> Scenario:
@@ -25,6 +25,12 @@ def layered() -> Scenario:
     return MIXED.replace(robots=(*(robot.replace(layer="air") for robot in food), *others))
 
 
+def walled() -> Scenario:
+    """The mixed team between walls of a map, with a gap of 0.4 m in each."""
+    rows = ["#" * 8 + "." * 4 + "#" * 8 if row in (6, 13) else "." * 20 for row in range(20)]
+    return MIXED.replace(map=Map(rows=tuple(rows)))
+
+
 WORLDS = {
     "none": MIXED,
     "two layers": layered(),
@@ -32,6 +38,7 @@ WORLDS = {
     'drive = "unicycle"': changed(drive="unicycle"),
     'drive = "differential"': changed(drive="differential"),
     "sight_m = 0.8": changed(sight_m=0.8),
+    "a map of 20 x 20 cells": walled(),
     "a radio": MIXED.replace(communication=Communication(range_m=0.8, delay_steps=2, loss=0.1)),
     "victims are shared": changed(sight_m=0.8).replace(
         communication=Communication(share="victims")
