@@ -94,12 +94,8 @@ impl Blocks {
         (rows[0]..=rows[1]).any(|row| {
             // The part of the way in this row of buckets, and a little more.
             let edge = |row: usize| row as f32 * width - self.half;
-            let part = |y: f32| if way.y == 0.0 { 0.5 } else { ((y - from.y) / way.y).clamp(0.0, 1.0) };
-            let (begins, ends) = if rows[0] == rows[1] || way.y == 0.0 {
-                (0.0, 1.0)
-            } else {
-                (part(edge(row)), part(edge(row + 1)))
-            };
+            let part = |row: usize| ((edge(row) - from.y) / way.y).clamp(0.0, 1.0);
+            let (begins, ends) = if rows[0] == rows[1] { (0.0, 1.0) } else { (part(row), part(row + 1)) };
             let (one, other) = (from.x + way.x * begins, from.x + way.x * ends);
             let along =
                 [self.index(one.min(other) - 0.01 * width), self.index(one.max(other) + 0.01 * width)];

@@ -3,10 +3,9 @@
 //! A shortest way turns only at corners of what is in the way, so a graph of those that are in sight of each other
 //! has it. On a grid it may miss one through the narrowest gaps: then there is no answer here.
 
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use crate::free_space::{FreeSpace, Way};
+use crate::free_space::{FreeSpace, Next, Way};
 use crate::geometry::Vec2;
 
 /// Most corners of a space: looking from each to each must not take long.
@@ -44,27 +43,6 @@ impl Corners {
     }
 }
 
-/// A corner, or a way by one, and its length: the shortest comes first.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Next {
-    length: f32,
-    corner: usize,
-}
-
-impl Eq for Next {}
-
-impl Ord for Next {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.length.total_cmp(&self.length).then(other.corner.cmp(&self.corner))
-    }
-}
-
-impl PartialOrd for Next {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
 /// How long the ways from all corners to one goal are, and where they turn.
 #[derive(Debug, Clone)]
 pub struct CornerWays {
@@ -84,15 +62,15 @@ impl CornerWays {
         let mut turns = vec![GOAL; lengths.len()];
         let first = lengths.iter().enumerate().filter(|(_, length)| length.is_finite());
         let mut next: BinaryHeap<Next> =
-            first.map(|(corner, length)| Next { length: *length, corner }).collect();
-        while let Some(Next { length, corner }) = next.pop() {
+            first.map(|(corner, length)| Next { length: *length, index: corner }).collect();
+        while let Some(Next { length, index: corner }) = next.pop() {
             if length > lengths[corner] {
                 continue;
             }
             for (other, apart) in &corners.links[corner] {
                 if length + apart < lengths[*other] {
                     (lengths[*other], turns[*other]) = (length + apart, corner);
-                    next.push(Next { length: length + apart, corner: *other });
+                    next.push(Next { length: length + apart, index: *other });
                 }
             }
         }
@@ -119,11 +97,11 @@ impl CornerWays {
         }
         let by = |(corner, length): (usize, &f32)| Next {
             length: length + (corners.at[corner] - from).norm(),
-            corner,
+            index: corner,
         };
         let finite = self.lengths.iter().enumerate().filter(|(_, length)| length.is_finite());
         let mut ways: BinaryHeap<Next> = finite.map(by).collect();
-        while let Some(Next { length, corner }) = ways.pop() {
+        while let Some(Next { length, index: corner }) = ways.pop() {
             let at = corners.at[corner];
             if space.is_clear(from, at, 0.0) {
                 let turn = self.turns[corner];

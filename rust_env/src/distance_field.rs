@@ -4,35 +4,13 @@
 //! The field is Lazy Theta* (Nash, Koenig and Tovey, AAAI 2010) from the goal outwards. Ways turn at the
 //! centres of cells only, and go straight in between. A field grows no farther than it is asked for.
 
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use crate::free_space::{FreeSpace, Way};
+use crate::free_space::{FreeSpace, Next, Way};
 use crate::geometry::Vec2;
 
 /// The turn of cells from which the way leads straight to the goal.
 const GOAL: u32 = u32::MAX;
-
-/// A cell whose length may be settled next: the one with the shortest first.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Next {
-    length: f32,
-    cell: u32,
-}
-
-impl Eq for Next {}
-
-impl Ord for Next {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.length.total_cmp(&self.length).then(other.cell.cmp(&self.cell))
-    }
-}
-
-impl PartialOrd for Next {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
 
 /// Lengths of shortest ways to one goal, and their first turns. Empty until a way is asked for that is not
 /// straight.
@@ -76,8 +54,7 @@ impl DistanceField {
     fn settle(&mut self, space: &FreeSpace, wanted: usize) -> bool {
         self.look(space, wanted);
         while !self.settled[wanted] {
-            let Some(Next { length, cell }) = self.next.pop() else { return false };
-            let cell = cell as usize;
+            let Some(Next { length, index: cell }) = self.next.pop() else { return false };
             if self.settled[cell] || length > self.lengths[cell] {
                 continue;
             }
@@ -155,7 +132,7 @@ impl DistanceField {
         if length < self.lengths[cell] {
             self.lengths[cell] = length;
             self.turns[cell] = turn;
-            self.next.push(Next { length, cell: cell as u32 });
+            self.next.push(Next { length, index: cell });
         }
     }
 

@@ -1,5 +1,7 @@
 //! Where a disc has room among solids, on a grid of cells.
 
+use std::cmp::Ordering;
+
 use crate::blocks::Blocks;
 use crate::geometry::Vec2;
 use crate::place::Placed;
@@ -20,6 +22,27 @@ pub struct Way {
     pub length: f32,
     /// Where it turns first, or the goal, m.
     pub next: Vec2,
+}
+
+/// What a search may settle next, by its number: what is nearest to the goal comes first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Next {
+    pub length: f32,
+    pub index: usize,
+}
+
+impl Eq for Next {}
+
+impl Ord for Next {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.length.total_cmp(&self.length).then(other.index.cmp(&self.index))
+    }
+}
+
+impl PartialOrd for Next {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
 }
 
 /// Which cells of an arena have room for a disc.

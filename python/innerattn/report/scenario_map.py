@@ -34,7 +34,7 @@ def scenario_map(scenario: Scenario) -> str:
             x = half * (2.0 * (column + 0.5) / _COLUMNS - 1.0)
             if letter := starts.get((column, row)):
                 cells.append(letter)
-            elif over := _over(scenario, column, row):
+            elif over := _over(scenario, column, row, x, y):
                 cells.append(_SOLID if any(_blocks_all(scenario, one) for one in over) else _PASSED)
             elif (column, row) in places:
                 cells.append(_PLACE)
@@ -70,11 +70,8 @@ def _legend(scenario: Scenario) -> Iterator[str]:
         yield f"At new random places in each episode: {', '.join(shown)}"
 
 
-def _over(scenario: Scenario, column: int, row: int) -> list[Obstacle | Map]:
+def _over(scenario: Scenario, column: int, row: int, x: float, y: float) -> list[Obstacle | Map]:
     """What stands at the centre of a character, or the map if one of its cells there is solid."""
-    half = scenario.arena_half_width_m
-    x = half * (2.0 * (column + 0.5) / _COLUMNS - 1.0)
-    y = half * (1.0 - 2.0 * (row + 0.5) / _ROWS)
     over: list[Obstacle | Map] = [one for one in scenario.obstacles if _covers(one, x, y)]
     if scenario.map is not None:
         side = len(scenario.map.rows)
