@@ -11,7 +11,7 @@ from typing import Any
 from fault_cost import MIXED, shares
 from page import machine, publish
 
-from innerattn.config import Communication, Map, Scenario
+from innerattn.config import Communication, Map, RangeSensor, Scenario
 
 
 def changed(**keys: Any) -> Scenario:
@@ -38,6 +38,7 @@ WORLDS = {
     'drive = "unicycle"': changed(drive="unicycle"),
     'drive = "differential"': changed(drive="differential"),
     "sight_m = 0.8": changed(sight_m=0.8),
+    "16 rays up to 1 m": changed(range_sensor=RangeSensor(rays=16, range_m=1.0)),
     "a map of 20 x 20 cells": walled(),
     "a radio": MIXED.replace(communication=Communication(range_m=0.8, delay_steps=2, loss=0.1)),
     "victims are shared": changed(sight_m=0.8).replace(

@@ -87,6 +87,42 @@ impl Solid {
         }
     }
 
+    /// How far a ray goes until it meets the solid, whose centre is `way` on from where the ray begins, m:
+    /// 0 if it begins inside, infinite if it never does. `direction` is a unit vector.
+    #[must_use]
+    pub fn met_after(&self, way: Vec2, direction: Vec2) -> f32 {
+        match self {
+            Self::Disc(radius) => {
+                let (along, across) = (way.dot(&direction), way.perp(&direction));
+                let square = radius * radius;
+                let depth = square - across * across;
+                if way.norm_squared() <= square {
+                    0.0
+                } else if along <= 0.0 || depth < 0.0 {
+                    f32::INFINITY
+                } else {
+                    (along - depth.sqrt()).max(0.0)
+                }
+            }
+            Self::Box(half) => {
+                let (mut enters, mut leaves) = (0.0_f32, f32::INFINITY);
+                for axis in 0..2 {
+                    let speed = direction[axis];
+                    if speed == 0.0 {
+                        if way[axis].abs() > half[axis] {
+                            return f32::INFINITY;
+                        }
+                        continue;
+                    }
+                    let (one, other) = ((way[axis] - half[axis]) / speed, (way[axis] + half[axis]) / speed);
+                    enters = enters.max(one.min(other));
+                    leaves = leaves.min(one.max(other));
+                }
+                if enters <= leaves { enters } else { f32::INFINITY }
+            }
+        }
+    }
+
     /// Half width and half height of the smallest upright box that holds it, m.
     #[must_use]
     pub fn half_extents(&self) -> Vec2 {

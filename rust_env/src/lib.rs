@@ -28,6 +28,7 @@ pub mod meeting;
 pub mod sight;
 
 pub mod radio;
+pub mod rays;
 pub mod supply;
 
 pub mod spawn;

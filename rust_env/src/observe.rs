@@ -2,12 +2,14 @@
 
 mod headings;
 mod radio;
+mod rays;
 mod sight;
 mod stores;
 
 use crate::fault::{HEALTHY, KINDS, Kind, Levels};
 use crate::geometry::Vec2;
 use crate::radio::Radio;
+use crate::rays::Rays;
 use crate::robot::Body;
 use crate::scenario::{MAX_VICTIMS, Scenario, VictimOrder};
 use crate::sight::Sight;
@@ -35,6 +37,8 @@ pub struct Scene<'a> {
     pub charges: &'a [f64],
     /// Loads of the robots; none where no robot has one.
     pub loads: &'a [u32],
+    /// Places of the obstacles, m.
+    pub obstacles: &'a [Vec2],
     /// Victims by slot.
     pub victims: &'a [Option<Victim>],
     /// When robots last saw each other and the victims, see [`Sight::look`]; none where all see everything.
@@ -83,6 +87,7 @@ pub struct Layout {
     wheels: Option<Wheels>,
     sight: Option<Sight>,
     radio: Option<Radio>,
+    rays: Option<Rays>,
     /// Whether each teammate's block says whether it is heard.
     hears: bool,
     widths: Widths,
@@ -95,8 +100,10 @@ pub struct Layout {
 struct Widths {
     /// Of one robot.
     robot: usize,
-    /// Of the ways to the nearest station and depot and of the turn rate, behind a robot's own block.
+    /// Of the ways to the nearest station and depot, of the turn rate and of the rays, behind a robot's own block.
     ways: usize,
+    /// Of the rays.
+    rays: usize,
     /// Of one teammate: those of a robot, whether it is seen, for how long it was not, and whether it is heard.
     mate: usize,
     /// Before those of victims.
@@ -117,6 +124,7 @@ impl Layout {
         tasks: &[Needs],
         sight: Option<Sight>,
         radio: Option<Radio>,
+        rays: Option<Rays>,
     ) -> Self {
         let abilities: Vec<String> = scenario.abilities().iter().map(ToString::to_string).collect();
         let amounts =
@@ -134,6 +142,7 @@ impl Layout {
             wheels: Wheels::new(scenario),
             sight,
             radio,
+            rays,
             hears: scenario.communication.is_some_and(|one| one.limits()),
             widths: Widths::default(),
             abilities,
@@ -191,11 +200,12 @@ impl Layout {
             + usize::from(self.order.is_some())
             + limited
             + heading;
-        let ways = stores.map_or(0, Stores::ways_width) + usize::from(self.wheels.is_some());
+        let rays = self.rays.as_ref().map_or(0, Rays::width);
+        let ways = stores.map_or(0, Stores::ways_width) + usize::from(self.wheels.is_some()) + rays;
         let mate = robot + 2 * limited + usize::from(self.hears);
         let victims_from = robot + ways + (self.robots - 1) * mate;
         let row = victims_from + self.victims * victim;
-        Widths { robot, ways, mate, victims_from, victim, heading, row }
+        Widths { robot, ways, rays, mate, victims_from, victim, heading, row }
     }
 
     /// The blocks of the robot itself and of its teammates.
@@ -213,8 +223,8 @@ impl Layout {
     }
 
     /// The name of every column; units are m, m/s and rad/s, flags are 0 or 1, abilities are 0 or 1 or
-    /// amounts, needs are counts or amounts, `charge`, `load`, `served`, `time_left` and `since_seen` are shares,
-    /// and `heading` is a vector of length 1.
+    /// amounts, needs are counts or amounts, `charge`, `load`, `served`, `time_left`, `since_seen` and `ray` are
+    /// shares, and `heading` is a vector of length 1.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let mut names = Vec::with_capacity(self.width());
@@ -242,6 +252,7 @@ impl Layout {
             if robot == 0 {
                 names.extend(stores.into_iter().flat_map(Stores::names_of_ways));
                 names.extend(self.wheels.iter().map(|_| format!("{who}.turn_rate")));
+                names.extend((0..self.widths.rays).map(|ray| format!("{who}.ray.{ray}")));
                 continue;
             }
             if self.sight.is_some() {
@@ -276,6 +287,9 @@ impl Layout {
             if self.hears {
                 self.write_heard(scene, own, row);
             }
+            if let Some(rays) = &self.rays {
+                self.write_rays(rays, scene, own, 0, row);
+            }
         }
     }
 
@@ -300,6 +314,9 @@ impl Layout {
         }
         if self.hears {
             self.write_heard(scene, own, row);
+        }
+        if let Some(rays) = &self.rays {
+            self.write_rays(rays, scene, own, senses.absent, row);
         }
     }
 
@@ -420,7 +437,7 @@ mod tests {
         scenario.robots = vec![scenario.robots[0].clone(), scenario.robots[3].clone()];
         scenario.tasks[1].needs = vec!["food".into()].into();
         let (team, tasks) = (bodies(&scenario), Needs::of_tasks(&scenario));
-        let layout = Layout::new(&scenario, &tasks, None, None);
+        let layout = Layout::new(&scenario, &tasks, None, None, None);
         let victim = |task, x| Some(Victim::new(0, task, 0, Vec2::new(x, 0.0)));
         // The near one needs food alone; the far one food and medicine.
         let victims = [victim(1, 0.5), victim(0, -0.5)];
@@ -435,6 +452,7 @@ mod tests {
             headings: &[],
             charges: &[],
             loads: &[],
+            obstacles: &[],
             victims: &victims,
             sightings: &[],
             heard: &[],

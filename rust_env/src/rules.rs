@@ -10,6 +10,7 @@ use crate::meeting::{can_reach, least_rescue_radius};
 use crate::observe::Layout;
 use crate::physics::Physics;
 use crate::radio::Radio;
+use crate::rays::Rays;
 use crate::reward::Weights;
 use crate::robot::{Body, bodies};
 use crate::scenario::{Arrival, Engine, Scenario};
@@ -115,7 +116,13 @@ impl Rules {
         let (sight, radio) = (Sight::new(&scenario, &team, &solids), Radio::new(&scenario));
         Ok(Self {
             physics: Physics::new(&scenario),
-            layout: Layout::new(&scenario, &tasks, sight.clone(), radio.clone()),
+            layout: Layout::new(
+                &scenario,
+                &tasks,
+                sight.clone(),
+                radio.clone(),
+                Rays::new(&scenario, &solids),
+            ),
             services: Service::of_tasks(&scenario),
             deadlines: Deadlines::new(&scenario),
             arrivals: Arrivals::new(&scenario),

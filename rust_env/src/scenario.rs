@@ -10,6 +10,7 @@ mod depot;
 mod layers;
 mod map;
 mod order;
+mod range_sensor;
 mod sight;
 mod spot;
 mod task;
@@ -27,6 +28,7 @@ pub use battery::{Battery, Station};
 pub use communication::{Communication, Share};
 pub use depot::Depot;
 pub use map::Map;
+pub use range_sensor::{MAX_RAYS, RangeSensor};
 pub(crate) use task::steps_of;
 pub use task::{Deadline, Interrupted, Task};
 
@@ -224,6 +226,9 @@ pub struct Robot {
     /// How far it sees from its centre, m; everything if absent.
     #[serde(default)]
     pub sight_m: Option<f64>,
+    /// What measures how far things are around it; nothing if absent.
+    #[serde(default)]
+    pub range_sensor: Option<RangeSensor>,
 }
 
 fn default_radius_m() -> f64 {
@@ -357,6 +362,7 @@ impl Default for Scenario {
             battery: None,
             load: None,
             sight_m: None,
+            range_sensor: None,
         };
         let task = |name: &str, needs: [&str; 2]| Task::new(name, needs.map(String::from).to_vec());
         Self {

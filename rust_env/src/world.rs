@@ -463,6 +463,7 @@ impl World {
             headings: &self.headings,
             charges: &self.charges,
             loads: &self.loads,
+            obstacles: &self.obstacles,
             victims: &self.victims,
             sightings: &self.sightings,
             heard: &self.traffic.heard,

@@ -276,7 +276,16 @@ def test_a_digest_is_that_of_the_values_in_use() -> None:
         for name in names:
             del values[section][name]  # at its default
     for robot in values["scenario"]["robots"]:
-        for name in ("start_m", "battery", "load", "sight_m", "drive", "layer", "max_turn_rad_s"):
+        for name in (
+            "start_m",
+            "battery",
+            "load",
+            "sight_m",
+            "range_sensor",
+            "drive",
+            "layer",
+            "max_turn_rad_s",
+        ):
             del robot[name]
         for name in ("acceleration_m_s2", "turn_acceleration_rad_s2", "wheel_base_m"):
             del robot[name]

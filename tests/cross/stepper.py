@@ -347,7 +347,7 @@ class Stepper:
         }
 
     def observations(self, state: State) -> tuple[Array, Bools]:
-        """Rows of all robots, (E, R, D); where rounding might order victims otherwise, (E, R)."""
+        """Rows of all robots without rays, (E, R, D); where rounding may order victims, (E, R)."""
         envs, robots = state.positions.shape[:2]
         given = np.broadcast_to(self.given, (envs, *self.given.shape)).astype(np.float64)
         flags = [given, state.available[..., None]]

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from innerattn.config import Arrival, Battery, Depot, Obstacle, Robot, Scenario, Station, Task
+from innerattn.config import (
+    Arrival,
+    Battery,
+    Depot,
+    Obstacle,
+    RangeSensor,
+    Robot,
+    Scenario,
+    Station,
+    Task,
+)
 
 SIZES = (1, 2, 3, 4, 4, 5, 8, 12, 20, 64)
 
@@ -242,3 +252,24 @@ def with_sight(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     ]
     occlusion = bool(scenario.obstacles) and rng.random() < 0.8
     return scenario.replace(robots=tuple(robots), occlusion=occlusion)
+
+
+def with_rays(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, most of whose robots have range sensors; those on wheels may look ahead alone, and
+    some look into all layers."""
+    layers = tuple(sorted({robot.layer for robot in scenario.robots}))
+
+    def sensor(robot: Robot) -> RangeSensor:
+        ahead = robot.has_wheels and rng.random() < 0.6
+        return RangeSensor(
+            rays=int(rng.choice((1, 2, 8, 33))),
+            range_m=float(rng.uniform(0.1, 3.0)),
+            field_of_view_deg=float(rng.uniform(5.0, 359.0)) if ahead else 360.0,
+            layers=layers if rng.random() < 0.3 else None,
+        )
+
+    robots = [
+        robot.replace(range_sensor=sensor(robot)) if index == 0 or rng.random() < 0.7 else robot
+        for index, robot in enumerate(scenario.robots)
+    ]
+    return scenario.replace(robots=tuple(robots))

@@ -32,6 +32,7 @@ ARRIVAL = {"at_s": 1.5, "task": "task_1", "position_m": [0.25, -0.5]}
 STATION = {"position_m": [0.25, -0.5], "recharge_w": 5.0}
 DEPOT = {"position_m": [0.25, -0.5]}
 BATTERY = {"capacity_j": 10.0, "per_m_j": 2.0}
+SENSOR = {"rays": 7, "range_m": 0.6, "field_of_view_deg": 90.0, "layers": ["ground", "air"]}
 TEAM = Scenario().model_dump(mode="json")["robots"]
 NESTED = {
     "robots": (Robot, ROBOT),
@@ -209,6 +210,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
                 **{**TEAM[0], "name": "rover", "drive": "differential", "wheel_base_m": 0.07},
                 **{"max_turn_rad_s": 3.0, "acceleration_m_s2": 2.0},
                 "turn_acceleration_rad_s2": 9.0,
+                "range_sensor": SENSOR,
             },
         ],
         "tasks": [

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from casting import check_rays, ray_columns
 from seeing import check_sight
 from stepper import State, Stepper
 from teams import (
@@ -16,6 +17,7 @@ from teams import (
     with_list,
     with_loads,
     with_order,
+    with_rays,
     with_sight,
     with_times,
     with_wheels,
@@ -212,13 +214,17 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
             seen.update(check_sight(plain, before, after))
         ended = result.terminated | result.truncated
         assert (after.faults[~ended] == before.faults[~ended]).all()
+        rays = ray_columns(env.observation_names())
+        if rays:
+            seen.update(check_rays(plain, after, result.obs[..., rays]))
+        found_rows = np.delete(result.obs, rays, axis=-1)
         rows, tied = plain.observations(after)
         times = scenario.has_services + scenario.has_deadlines + scenario.has_order
         times += scenario.has_limited_sight + 2 * scenario.has_wheels
         block = rows.shape[-1] - before.victims.shape[1] * (3 + len(plain.abilities) + times)
         scale = scenario.arena_half_width_m
-        assert_close(result.obs[..., :block], rows[..., :block], "observation", scale)
-        assert_close(result.obs[~tied], rows[~tied], "observation of victims", scale)
+        assert_close(found_rows[..., :block], rows[..., :block], "observation", scale)
+        assert_close(found_rows[~tied], rows[~tied], "observation of victims", scale)
 
         seen["transitions"] += num_envs
         seen["free"] += int(free.sum())
@@ -403,6 +409,22 @@ def test_worlds_with_wheels_are_as_the_plain_stepper_says(chunk: int) -> None:
     total = compare_some(rng, changed)
     for what in ("free", "touched", "rescues", "appeared", "turned"):
         assert total[what] > 50, (what, total)
+
+
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_with_range_sensors_are_as_the_plain_stepper_says(chunk: int) -> None:
+    rng = np.random.default_rng(1200 + chunk)
+
+    def changed(scenario: Scenario) -> Scenario:
+        for other in (with_layers, with_wheels):
+            scenario = other(scenario, rng) if rng.random() < 0.5 else scenario
+        leaves = ("stay", "leave")[rng.integers(2)]
+        return with_rays(scenario, rng).replace(unavailable_robots=leaves)
+
+    total = compare_some(rng, changed)
+    assert total["met"] > 10_000
+    assert total["rays"] - total["met"] > 10_000
+    assert total["unsure of rays"] < 0.02 * total["rays"]
 
 
 @pytest.mark.parametrize("situation", ["single", "double", "mixed"])

@@ -8,7 +8,7 @@ import pytest
 from framed_rows import check_frames_keep
 
 from innerattn.config import Communication, Scenario
-from innerattn.config.communication import refuse_communication
+from innerattn.config.refusals import refuse_stores_drives_and_senses
 from innerattn.envs import BatchEnv, parallel_env
 from innerattn.envs.bounds import observation_bounds
 from innerattn.errors import ConfigError
@@ -149,12 +149,12 @@ def test_info_says_who_hears_whom() -> None:
 
 
 def test_who_does_not_know_who_hears_whom_refuses_limits() -> None:
-    for free in (Scenario(), told(), told(0.5, share="victims")):
-        refuse_communication(free, "they")
+    for free in (Scenario(), told()):
+        refuse_stores_drives_and_senses(free, "they")
     with pytest.raises(
         ConfigError, match=r"^scenario.communication = { range_m = 0.5 }: must be left out; they"
     ):
-        refuse_communication(told(range_m=0.5), "they")
+        refuse_stores_drives_and_senses(told(range_m=0.5), "they")
 
 
 def test_bad_values_are_refused() -> None:

@@ -7,7 +7,7 @@ import pytest
 from framed_rows import check_frames_keep
 
 from innerattn.config import Fault, Obstacle, Scenario
-from innerattn.config.battery import refuse_stores_velocities_and_sights
+from innerattn.config.refusals import refuse_stores_drives_and_senses
 from innerattn.envs import BatchEnv, parallel_env
 from innerattn.envs.bounds import observation_bounds
 from innerattn.errors import ConfigError
@@ -132,9 +132,9 @@ def test_info_says_who_sees_how_far() -> None:
     ],
 )
 def test_who_sees_everything_refuses_limited_sight(scenario: Scenario, message: str) -> None:
-    refuse_stores_velocities_and_sights(Scenario(), "they")
+    refuse_stores_drives_and_senses(Scenario(), "they")
     with pytest.raises(ConfigError, match=message):
-        refuse_stores_velocities_and_sights(scenario, "they")
+        refuse_stores_drives_and_senses(scenario, "they")
 
 
 def test_worlds_that_are_limited_to_nothing_are_refused() -> None:

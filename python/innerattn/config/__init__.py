@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from innerattn.config.load import load_run_config, read_toml, write_toml
     from innerattn.config.map import Map
     from innerattn.config.ppo import PPOConfig
+    from innerattn.config.range_sensor import RangeSensor
     from innerattn.config.registry import register_algorithm, register_attention
     from innerattn.config.run import BUDGETS, RunConfig, refuse_late_faults
     from innerattn.config.scenario import SCENARIOS, Fault, Obstacle, Robot, Scenario
@@ -43,6 +44,7 @@ __all__ = [
     "NetworkConfig",
     "Obstacle",
     "PPOConfig",
+    "RangeSensor",
     "Robot",
     "RunConfig",
     "Scenario",
@@ -75,6 +77,7 @@ __getattr__ = lazy_names(
         "Map": "map",
         "Obstacle": "scenario",
         "PPOConfig": "ppo",
+        "RangeSensor": "range_sensor",
         "Robot": "scenario",
         "RunConfig": "run",
         "SCENARIOS": "scenario",

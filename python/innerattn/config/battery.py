@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pydantic import Field
 
 from innerattn.config.model import Model, Told
-from innerattn.errors import ConfigError
-
-if TYPE_CHECKING:
-    from innerattn.config.scenario import Scenario
 
 
 class Battery(Model):
@@ -44,29 +40,3 @@ class Depot(Model):
     radius_m: Annotated[float, Told(0.001, 10.0)] = Field(
         0.15, description="how near to it the centre of a robot must be [m]"
     )
-
-
-def refuse_stores_velocities_and_sights(scenario: Scenario, who: str) -> None:
-    """Refuse a team with batteries or loads, for policies (``who``) that know neither.
-
-    Robots whose actions set a velocity, and limited sight, are refused, too: such policies know
-    forces alone, and see everything.
-
-    Raises:
-        ConfigError: a robot has a battery, a load or a limited sight, or actions set its velocity.
-    """
-    for index, robot in enumerate(scenario.robots):
-        key = f"scenario.robots[{index}]"
-        if robot.battery is not None:
-            found = f"{key}.battery.capacity_j = {robot.battery.capacity_j:g}"
-            raise ConfigError(f"{found}: there must be no battery; {who} see no charges")
-        if robot.load is not None:
-            found = f"{key}.load = {robot.load}"
-            raise ConfigError(f"{found}: there must be no load; {who} see no loads")
-        if robot.drive != "force":
-            raise ConfigError(f"{key}.drive = {robot.drive!r}: must be 'force'; {who} set forces")
-        if robot.sight_m is not None:
-            found = f"{key}.sight_m = {robot.sight_m:g}"
-            raise ConfigError(f"{found}: must be left out; {who} see everything")
-    if scenario.occlusion:
-        raise ConfigError(f"scenario.occlusion = true: must be false; {who} see everything")

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import json
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from innerattn.config.model import Model, Told
-from innerattn.errors import ConfigError
-
-if TYPE_CHECKING:
-    from innerattn.config.scenario import Scenario
 
 
 class Communication(Model):
@@ -40,19 +35,3 @@ class Communication(Model):
     def limits(self) -> bool:
         """Whether some robots do not hear others, or not at once."""
         return self.range_m is not None or self.delay_steps > 0 or self.loss > 0.0
-
-
-def refuse_communication(scenario: Scenario, who: str) -> None:
-    """Refuse a team whose robots do not hear all others at once, for policies (``who``).
-
-    Raises:
-        ConfigError: something limits who hears whom.
-    """
-    if scenario.limits_communication:
-        found = scenario.communication
-        limits = found.model_dump(exclude_defaults=True) if found else {}
-        shown = ", ".join(f"{key} = {json.dumps(value)}" for key, value in limits.items())
-        raise ConfigError(
-            f"scenario.communication = {{ {shown} }}: must be left out; "
-            f"{who} do not know who hears whom"
-        )

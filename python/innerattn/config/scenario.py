@@ -23,6 +23,7 @@ from innerattn.config.map import Map
 from innerattn.config.map_file import with_map_file
 from innerattn.config.model import ADDED_LATER, Model, Told, config_error
 from innerattn.config.near import did_you_mean
+from innerattn.config.range_sensor import RangeSensor
 from innerattn.config.task import Arrival, Task
 from innerattn.errors import ConfigError
 from innerattn.shown import Shown
@@ -96,6 +97,11 @@ class Robot(Model):
         None,
         description="how far it sees teammates and victims, from its centre to theirs, above "
         "radius_m [m]; None: it sees all",
+    )
+    range_sensor: Annotated[RangeSensor | None, ADDED_LATER] = Field(
+        None,
+        description="measures how far walls, obstacles and robots are, such as "
+        "{ rays = 16, range_m = 1.0 }; None: it has none",
     )
 
     _check_abilities = field_validator("abilities", mode="before")(list_or_table)
@@ -490,6 +496,11 @@ class Scenario(Model, Shown):
     def has_limited_sight(self) -> bool:
         """Whether there is something in an arena that some robot does not see."""
         return self.occlusion or any(robot.sight_m is not None for robot in self.robots)
+
+    @property
+    def max_rays(self) -> int:
+        """Most rays of a robot's range sensor, 0 where no robot has one."""
+        return max(one.range_sensor.rays if one.range_sensor else 0 for one in self.robots)
 
     @property
     def limits_communication(self) -> bool:

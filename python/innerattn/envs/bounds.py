@@ -76,6 +76,7 @@ def _observation_columns(scenario: Scenario, own: int, speeds: list[float]) -> I
             yield from [_both_ways(2 * half + far)] * (2 * spots)
             if scenario.has_wheels:
                 yield _both_ways(_most_turn(scenario))
+            yield from [_FLAG] * scenario.max_rays
             continue
         if scenario.has_limited_sight:
             yield from (_FLAG, _FLAG)  # whether it is seen, and the time since then

@@ -26,7 +26,7 @@ def scenario_words(scenario: Scenario) -> str:
     faults = map(_fault, scenario.faults)
     gone = ["Robots that are out are not in the arena."] if scenario.robots_leave else []
     who = [*_tasks(scenario), *_end(scenario), *_stores(scenario), *_motion(scenario)]
-    who += [*_sight(scenario), *_communication(scenario)]
+    who += [*_sight(scenario), *_rays(scenario), *_communication(scenario)]
     return "\n".join([*who, *_doubts(scenario), *faults, *gone])
 
 
@@ -115,6 +115,18 @@ def _sight(scenario: Scenario) -> Iterator[str]:
     if scenario.occlusion:
         hiding = ["obstacles"] * bool(scenario.obstacles) + ["solid cells"] * bool(scenario.map)
         yield f"{' and '.join(hiding).capitalize()} hide what is behind them."
+
+
+def _rays(scenario: Scenario) -> Iterator[str]:
+    """Who measures distances, how far, and of what."""
+    for sensor in dict.fromkeys(one.range_sensor for one in scenario.robots if one.range_sensor):
+        robots = ", ".join(one.name for one in scenario.robots if one.range_sensor == sensor)
+        one = sensor.rays == 1
+        rays, measure = ("1 ray", "measures") if one else (f"{sensor.rays} rays", "measure")
+        if sensor.field_of_view_deg < 360.0:
+            rays += f" over {sensor.field_of_view_deg:g} degrees"
+        met = f" in {' and '.join(sensor.layers)}" if sensor.layers else ""
+        yield f"{robots}: {rays} {measure} how far things{met} are, up to {sensor.range_m:g} m"
 
 
 def _communication(scenario: Scenario) -> Iterator[str]:

@@ -128,8 +128,8 @@ def _turning_columns(scenario: Scenario, names: Sequence[str]) -> VectorColumns:
     if asymmetry is not None:
         key, what = asymmetry
         raise ConfigError(
-            f"scenario.{key}: network.symmetry must be 'none' where {what}, because a turned world "
-            "would be another one; --network.symmetry none sets it, or take another budget"
+            f"scenario.{key}: network.symmetry must be 'none' where {what}; "
+            "--network.symmetry none sets it, or take another budget"
         )
     return vector_columns(names)
 
@@ -144,7 +144,19 @@ def square_symmetry(
 
 
 def _asymmetry(scenario: Scenario) -> tuple[str, str] | None:
-    """The first key that makes a turned world another one, and what it says."""
+    """The first key because of which frames cannot turn worlds, and what it says."""
+    for index, robot in enumerate(scenario.robots):
+        if robot.range_sensor is not None:
+            return f"robots[{index}].range_sensor", "robots have rays, which frames do not turn"
+    place = _place(scenario)
+    if place is None:
+        return None
+    key, what = place
+    return key, f"{what}, because a turned world would be another one"
+
+
+def _place(scenario: Scenario) -> tuple[str, str] | None:
+    """The first key that gives something a place, and what it says."""
     for index, obstacle in enumerate(scenario.obstacles):
         sides = obstacle.half_extents_m
         if obstacle.position_m is not None or (sides is not None and sides[0] != sides[1]):

@@ -16,7 +16,7 @@ impl Layout {
             block[from..from + 2].copy_from_slice(&[ahead.x, ahead.y]);
         }
         let ahead = Vec2::new(row[from], row[from + 1]);
-        row[self.widths.robot + self.widths.ways - 1] = scene.headings[own].turn_rate;
+        row[self.widths.robot + self.widths.ways - self.widths.rays - 1] = scene.headings[own].turn_rate;
         let (width, place) = (self.widths.victim, 1 + self.abilities.len());
         for victim in row[self.widths.victims_from..].chunks_exact_mut(width) {
             let way = Vec2::new(victim[place], victim[place + 1]);

@@ -24,6 +24,7 @@ impl Scenario {
         self.validate_obstacles()?;
         self.validate_map()?;
         self.validate_sight()?;
+        self.validate_range_sensors()?;
         self.validate_communication()?;
         self.validate_faults()?;
         self.validate_sizes()?;

@@ -11,7 +11,7 @@ use innerattn_env::robot::Commands;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
     Abilities, Actions, Arrival, Battery, Communication, Deadline, Depot, DriveMode, Engine, Interrupted,
-    Map, Obstacle, Robot, Scenario, Shape, Share, Situation, Station, Unavailable,
+    Map, Obstacle, RangeSensor, Robot, Scenario, Shape, Share, Situation, Station, Unavailable,
 };
 use innerattn_env::tasks::{Loss, Rescue};
 
@@ -288,6 +288,22 @@ pub fn with_radio(scenario: Scenario) -> Scenario {
     let range_m = Some(1.2 * scenario.arena_half_width_m);
     let told = Communication { range_m, delay_steps: 2, loss: 0.2, share: Share::Victims };
     Scenario { communication: Some(told), ..with_sight(scenario) }
+}
+
+/// The same with range sensors of unlike numbers of rays and ranges; every fifth robot has none, those on wheels
+/// look ahead, and some look into every layer.
+pub fn with_rays(mut scenario: Scenario) -> Scenario {
+    let half = scenario.arena_half_width_m;
+    let layers: Vec<String> = scenario.layers().into_iter().map(String::from).collect();
+    for (index, robot) in scenario.robots.iter_mut().enumerate().filter(|(index, _)| index % 5 < 4) {
+        robot.range_sensor = Some(RangeSensor {
+            rays: [16, 9, 1, 45][index % 4],
+            range_m: half * [0.5, 4.0, 1.5][index % 3],
+            field_of_view_deg: if robot.has_wheels() { [120.0, 360.0, 350.0][index % 3] } else { 360.0 },
+            layers: (index % 2 == 1).then(|| layers.clone()),
+        });
+    }
+    scenario
 }
 
 /// The same with solid cells in a grid over the arena, which the first layer and every second other meet.

@@ -7,7 +7,7 @@ use innerattn_env::scenario::{Actions, Scenario, Shaping, Situation};
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
     with_amounts, with_an_end, with_arrivals, with_batteries, with_layers, with_leaving, with_list,
-    with_loads, with_map, with_order, with_radio, with_sight, with_times, with_wheels,
+    with_loads, with_map, with_order, with_radio, with_rays, with_sight, with_times, with_wheels,
 };
 
 const STEPS: usize = 150;
@@ -52,6 +52,7 @@ fn scenarios() -> Vec<Scenario> {
         })),
         with_sight(Scenario { faults: coming_and_going(&tight.robots), ..tight.clone() }),
         with_map(with_sight(with_layers(tight.clone()))),
+        with_rays(with_wheels(with_layers(tight.clone()))),
         with_radio(Scenario { faults: coming_and_going(&tight.robots), ..tight.clone() }),
         with_wheels(with_leaving(Scenario { robots: mixed_team(12), ..tight.clone() })),
         with_wheels(Scenario {

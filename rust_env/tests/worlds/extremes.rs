@@ -95,6 +95,7 @@ fn extreme(source: &mut Stream) -> Scenario {
             battery: None,
             load: None,
             sight_m: None,
+            range_sensor: None,
         })
         .collect();
     if engine == Engine::Rapier {

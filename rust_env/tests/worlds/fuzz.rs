@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
     with_amounts, with_an_end, with_arrivals, with_batteries, with_layers, with_leaving, with_list,
-    with_loads, with_map, with_order, with_radio, with_sight, with_times, with_wheels,
+    with_loads, with_map, with_order, with_radio, with_rays, with_sight, with_times, with_wheels,
 };
 
 const ENVS: usize = 2;
@@ -65,6 +65,11 @@ fn scenarios() -> Vec<Scenario> {
             with_sight(with_leaving(Scenario { engine, ..tight.clone() })),
             with_map(with_sight(Scenario { engine, obstacles: some_obstacles(), ..Scenario::default() })),
             with_radio(with_leaving(Scenario { engine, ..tight.clone() })),
+            with_rays(with_map(with_wheels(Scenario {
+                engine,
+                obstacles: some_obstacles(),
+                ..Scenario::default()
+            }))),
             with_wheels(with_leaving(Scenario { engine, ..tight.clone() })),
             with_wheels(Scenario { engine, actions: Actions::Continuous, ..tight.clone() }),
         ]

@@ -20,6 +20,7 @@ mod loads;
 mod map;
 mod order;
 mod radio;
+mod rays;
 mod routes;
 mod sight;
 mod snapshot;

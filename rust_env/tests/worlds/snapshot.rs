@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use crate::common::{
     Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles, with_amounts,
     with_an_end, with_arrivals, with_batteries, with_layers, with_leaving, with_list, with_loads, with_order,
-    with_radio, with_sight, with_times, with_wheels,
+    with_radio, with_rays, with_sight, with_times, with_wheels,
 };
 
 const ENVS: usize = 6;
@@ -41,6 +41,7 @@ fn scenarios() -> Vec<Scenario> {
         with_sight(Scenario { faults: coming_and_going(&tight.robots), ..tight.clone() }),
         with_sight(with_leaving(Scenario { obstacles: some_obstacles(), ..Scenario::default() })),
         with_radio(Scenario { faults: coming_and_going(&tight.robots), ..tight.clone() }),
+        with_rays(Scenario { faults: coming_and_going(&tight.robots), ..tight.clone() }),
         with_radio(with_leaving(Scenario { obstacles: some_obstacles(), ..Scenario::default() })),
         with_wheels(with_leaving(tight.clone())),
         with_sight(with_wheels(Scenario { faults: coming_and_going(&tight.robots), ..tight.clone() })),

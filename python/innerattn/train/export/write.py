@@ -11,9 +11,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from innerattn.config import RunConfig
-from innerattn.config.battery import refuse_stores_velocities_and_sights
-from innerattn.config.communication import refuse_communication
 from innerattn.config.files import sync_folder, write_whole
+from innerattn.config.refusals import refuse_stores_drives_and_senses
 from innerattn.envs import BatchEnv
 from innerattn.errors import ExportError, MissingLibraryError, missing_library
 from innerattn.learn.types import Learner
@@ -101,8 +100,7 @@ def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: 
     """Fill a folder, and check what is in it."""
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         names = env.observation_names()
-    refuse_stores_velocities_and_sights(config.scenario, "exported policies")
-    refuse_communication(config.scenario, "exported policies")
+    refuse_stores_drives_and_senses(config.scenario, "exported policies")
     if config.network.memory_width:
         raise ExportError(
             f"{run}: network.memory_width = {config.network.memory_width}: exported policies have "

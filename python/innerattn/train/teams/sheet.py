@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from innerattn.config import Scenario
-from innerattn.config.battery import refuse_stores_velocities_and_sights
-from innerattn.config.communication import refuse_communication
+from innerattn.config.refusals import refuse_stores_drives_and_senses
 from innerattn.errors import ConfigError
 from innerattn.nn.teams import TeamTables
 from innerattn.policies.scripted.steering import Steering
@@ -44,8 +43,7 @@ class TeamSheet:
         """
         if scenario.actions != "discrete":
             raise ConfigError("scenario.actions = 'continuous': must be 'discrete' for any team")
-        refuse_stores_velocities_and_sights(scenario, "policies for any team")
-        refuse_communication(scenario, "policies for any team")
+        refuse_stores_drives_and_senses(scenario, "policies for any team")
         self.num_robots = len(scenario.robots)
         self.each_sees = any(fault.kind in SENSES for fault in scenario.faults)
         self._leave = scenario.robots_leave

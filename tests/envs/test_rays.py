@@ -1,0 +1,124 @@
+"""Range sensors as Python sees them: columns, bounds, words, networks, and what is refused."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from innerattn.config import RangeSensor, RunConfig, Scenario
+from innerattn.config.refusals import refuse_stores_drives_and_senses
+from innerattn.envs import BatchEnv, parallel_env
+from innerattn.envs.bounds import observation_bounds
+from innerattn.errors import ConfigError
+from innerattn.report.scenario_words import scenario_words
+from innerattn.train.build import build_learner
+
+ENVS = 4
+FAN = RangeSensor(rays=5, range_m=0.7, field_of_view_deg=90.0)
+
+
+def sensing(*sensors: RangeSensor | None, **values: Any) -> Scenario:
+    """The usual team with these sensors, one for each robot or one for all."""
+    scenario = Scenario()
+    each = sensors * 4 if len(sensors) == 1 else sensors
+    drive = "unicycle" if FAN in each else "force"
+    robots = tuple(
+        robot.replace(range_sensor=sensor, drive=drive)
+        for robot, sensor in zip(scenario.robots, each, strict=True)
+    )
+    return scenario.replace(robots=robots, **values)
+
+
+def test_rays_follow_a_robots_own_columns_and_stay_within_bounds() -> None:
+    scenario = sensing(FAN, RangeSensor(rays=2, range_m=3.0), None, FAN)
+    low, high = observation_bounds(scenario)
+    with BatchEnv(scenario, ENVS, seed=3, num_threads=1) as env:
+        names = env.observation_names()
+        rng, rows = np.random.default_rng(0), [env.reset()]
+        for _ in range(60):
+            rows.append(env.step(rng.integers(0, 5, (ENVS, 4))).obs)
+    rays = [column for column, name in enumerate(names) if name.startswith("own.ray.")]
+    assert [names[column] for column in rays] == [f"own.ray.{ray}" for ray in range(5)]
+    assert names[rays[0] - 1] == "own.turn_rate"
+    assert names[rays[-1] + 1].startswith("teammate_0.")
+    found = np.stack(rows)
+    assert ((low <= found) & (found <= high)).all()
+    assert (low[rays] == 0).all()
+    assert (high[rays] == 1).all()
+    values = found[..., rays]
+    assert (values[:, :, 2] == 0).all()  # it has no sensor
+    assert (values[:, :, 1, 2:] == 0).all()  # it has two rays
+    assert (values[:, :, 1, :2] > 0).all()  # a wall is nearer than 3 m on all sides
+    assert (values[:, :, [0, 3]] == 0).any()
+    assert (values[:, :, [0, 3]] > 0).any()
+    view = parallel_env(scenario)
+    seen, _ = view.reset(seed=1)
+    for robot, row in seen.items():
+        assert view.observation_space(robot).contains(row)
+
+
+def test_info_says_who_measures_what() -> None:
+    words = scenario_words(sensing(FAN, RangeSensor(rays=1, range_m=2.0), None, FAN))
+    assert "food_0, medical_0: 5 rays over 90 degrees measure how far things are, up to 0.7 m" in (
+        words
+    )
+    assert "food_1: 1 ray measure how far things are, up to 2 m" not in words
+    assert "food_1: 1 ray measures how far things are, up to 2 m" in words
+    upward = RangeSensor(rays=8, range_m=0.5, layers=("ground",))
+    assert "8 rays measure how far things in ground are, up to 0.5 m" in scenario_words(
+        sensing(upward)
+    )
+    assert "ray" not in scenario_words(Scenario())
+
+
+@pytest.mark.parametrize("encoder", ["flat", "entities"])
+def test_networks_take_rays(encoder: str) -> None:
+    scenario = sensing(RangeSensor(rays=8, range_m=0.5))
+    config = RunConfig.model_validate(
+        {"scenario": scenario, "network": {"encoder": encoder, "symmetry": "none"}}
+    )
+    with BatchEnv(scenario, ENVS, num_threads=1) as env:
+        build_learner(config, env)
+
+
+@pytest.mark.parametrize("symmetry", ["canonical", "augmented"])
+def test_frames_refuse_rays(symmetry: str) -> None:
+    scenario = sensing(None, RangeSensor(rays=8, range_m=0.5), None, None)
+    config = RunConfig.model_validate({"scenario": scenario, "network": {"symmetry": symmetry}})
+    with (
+        BatchEnv(scenario, ENVS, num_threads=1) as env,
+        pytest.raises(
+            ConfigError,
+            match=r"robots\[1\].range_sensor: network.symmetry must be 'none' where robots have "
+            "rays, which frames do not turn; --network.symmetry none",
+        ),
+    ):
+        build_learner(config, env)
+
+
+def test_who_measures_nothing_refuses_rays() -> None:
+    scenario = sensing(None, RangeSensor(rays=8, range_m=0.5), None, None)
+    with pytest.raises(
+        ConfigError, match=r"robots\[1\].range_sensor.rays = 8: there must be no range sensor; they"
+    ):
+        refuse_stores_drives_and_senses(scenario, "they")
+
+
+@pytest.mark.parametrize(
+    ("sensor", "message"),
+    [
+        ({"rays": 0, "range_m": 1.0}, r"range_sensor.rays = 0: must be in 1..=360"),
+        ({"rays": 4, "range_m": 0.05}, "range_m = 0.05: must be above radius_m = 0.05 m"),
+        ({"rays": 4, "range_m": 1.0, "field_of_view_deg": 90.0}, "must be 360 of a robot without"),
+        ({"rays": 4, "range_m": 1.0, "layers": ["air"]}, 'layers = "air": no robot is in this'),
+        ({"rays": 4}, "range_sensor.range_m\n  Field required"),
+        ({"rays": 4, "range_m": 1.0, "angle": 1.0}, "range_sensor.angle\n  Extra inputs"),
+    ],
+)
+def test_sensors_that_make_no_sense_are_refused_by_name(
+    sensor: dict[str, Any], message: str
+) -> None:
+    team = [one.model_dump(exclude_defaults=True) for one in Scenario().robots]
+    team[0]["range_sensor"] = sensor
+    with pytest.raises(ValueError, match=message):
+        Scenario.model_validate({"robots": team})
