@@ -2,7 +2,8 @@
 //!
 //! Each thing within range is tried only on the rays that may meet it, which its direction and its width tell.
 
-use std::f32::consts::{FRAC_PI_2, TAU};
+use std::cmp::Ordering;
+use std::f32::consts::{FRAC_1_SQRT_2, FRAC_PI_2, TAU};
 use std::iter::zip;
 
 use crate::blocks::Blocks;
@@ -64,9 +65,13 @@ impl Rays {
         let sensor = |own: &str, sensor: &RangeSensor| {
             let met = layers.iter().enumerate().filter(|(_, layer)| sensor.meets(own, layer));
             let angles: Vec<f32> = sensor.angles().into_iter().map(|angle| angle as f32).collect();
-            let direction = |angle: &f32| libm::sincosf(*angle);
+            let directions = if sensor.is_all_around() {
+                (0..sensor.rays).map(|ray| part_of_a_turn(ray, sensor.rays)).collect()
+            } else {
+                angles.iter().map(|angle| direction(*angle)).collect()
+            };
             Sensor {
-                directions: angles.iter().map(direction).map(|(sin, cos)| Vec2::new(cos, sin)).collect(),
+                directions,
                 first: angles[0],
                 per_rad: angles.get(1).map_or(1.0 / TAU, |second| 1.0 / (second - angles[0])),
                 range: sensor.range_m as f32,
@@ -184,6 +189,29 @@ impl Sweep<'_> {
             let met = solid.met_after(way, self.directions[ray]);
             self.nearest[ray] = self.nearest[ray].min(met);
         }
+    }
+}
+
+fn direction(angle: f32) -> Vec2 {
+    let (sin, cos) = libm::sincosf(angle);
+    Vec2::new(cos, sin)
+}
+
+/// The direction after `ray` of `rays` equal parts of a turn. Quarter turns and mirrors of it are exact.
+fn part_of_a_turn(ray: usize, rays: usize) -> Vec2 {
+    let (quarter, rest) = (4 * ray / rays, 4 * ray % rays);
+    let within = |rest: usize| direction(FRAC_PI_2 * rest as f32 / rays as f32);
+    let first = match (2 * rest).cmp(&rays) {
+        Ordering::Less => within(rest),
+        Ordering::Equal => Vec2::repeat(FRAC_1_SQRT_2),
+        Ordering::Greater => within(rays - rest).yx(),
+    };
+    let (x, y) = (first.x, first.y);
+    match quarter {
+        0 => Vec2::new(x, y),
+        1 => Vec2::new(-y, x),
+        2 => Vec2::new(-x, -y),
+        _ => Vec2::new(y, -x),
     }
 }
 

@@ -4,14 +4,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
 from innerattn.config import RangeSensor, RunConfig, Scenario
 from innerattn.config.refusals import refuse_stores_drives_and_senses
 from innerattn.envs import BatchEnv, parallel_env
 from innerattn.envs.bounds import observation_bounds
 from innerattn.errors import ConfigError
+from innerattn.nn.symmetry import NUM_ELEMENTS, SquareSymmetry
 from innerattn.report.scenario_words import scenario_words
 from innerattn.train.build import build_learner
+from innerattn.train.frames import square_symmetry, turning_columns
 
 ENVS = 4
 FAN = RangeSensor(rays=5, range_m=0.7, field_of_view_deg=90.0)
@@ -81,19 +84,82 @@ def test_networks_take_rays(encoder: str) -> None:
         build_learner(config, env)
 
 
+def turned_by_hand(values: np.ndarray, element: int, wheels: bool) -> np.ndarray:
+    """Readings of rays in a world whose x, then y, is mirrored, and whose axes then change."""
+    angles = 2 * np.pi * np.arange(values.shape[-1]) / values.shape[-1]
+    directions = np.stack([np.cos(angles), np.sin(angles)], -1)
+    if wheels:  # a mirror changes left and right of a robot
+        directions = directions * [1, -1 if element.bit_count() % 2 else 1]
+    else:
+        directions = directions * [-1 if element & 1 else 1, -1 if element & 2 else 1]
+        directions = directions[:, ::-1] if element & 4 else directions
+    new = np.arctan2(directions[:, 1], directions[:, 0]) * values.shape[-1] / (2 * np.pi)
+    found = np.empty_like(values)
+    found[..., np.rint(new).astype(int) % values.shape[-1]] = values
+    return found
+
+
+@pytest.mark.parametrize("drive", ["force", "unicycle"])
+def test_rays_turn_with_the_world_in_frames(drive: Any) -> None:
+    sensor = RangeSensor(rays=12, range_m=0.9)
+    scenario = sensing(sensor, None, sensor, sensor)
+    robots = tuple(robot.replace(drive=drive) for robot in scenario.robots)
+    scenario = scenario.replace(robots=robots)
+    with BatchEnv(scenario, 50, seed=2, num_threads=1) as env:
+        names, rows = env.observation_names(), env.reset()
+    columns = turning_columns(scenario, names)
+    rays = list(columns.rays)
+    assert [names[column] for column in rays] == [f"own.ray.{ray}" for ray in range(12)]
+    symmetry = SquareSymmetry(columns, torch.device("cpu"), [drive] * 4)
+    obs = torch.from_numpy(rows.reshape(-1, rows.shape[-1]).copy())
+    form = symmetry.turn(obs, symmetry.frame(obs))
+    for element in range(NUM_ELEMENTS):
+        turned = symmetry.turn(obs, torch.full((len(obs),), element))
+        wanted = turned_by_hand(obs[:, rays].numpy(), element, drive == "unicycle")
+        np.testing.assert_array_equal(turned[:, rays], wanted)
+        assert torch.equal(symmetry.turn(turned, symmetry.frame(turned)), form)
+
+
+def test_a_fan_changes_sides_in_a_mirrored_world() -> None:
+    scenario = sensing(FAN, FAN, None, FAN)
+    with BatchEnv(scenario, 2, num_threads=1) as env:
+        columns = turning_columns(scenario, env.observation_names())
+    mirrored, same = (4, 3, 2, 1, 0), (0, 1, 2, 3, 4)
+    wanted = [same, mirrored, mirrored, same, mirrored, same, same, mirrored]
+    assert list(columns.ray_turns) == wanted
+
+
 @pytest.mark.parametrize("symmetry", ["canonical", "augmented"])
-def test_frames_refuse_rays(symmetry: str) -> None:
-    scenario = sensing(None, RangeSensor(rays=8, range_m=0.5), None, None)
+def test_networks_learn_in_frames_with_rays(symmetry: str) -> None:
+    scenario = sensing(RangeSensor(rays=8, range_m=0.5))
     config = RunConfig.model_validate({"scenario": scenario, "network": {"symmetry": symmetry}})
-    with (
-        BatchEnv(scenario, ENVS, num_threads=1) as env,
-        pytest.raises(
-            ConfigError,
-            match=r"robots\[1\].range_sensor: network.symmetry must be 'none' where robots have "
-            "rays, which frames do not turn; --network.symmetry none",
+    with BatchEnv(scenario, ENVS, num_threads=1) as env:
+        build_learner(config, env, training=True)
+
+
+@pytest.mark.parametrize(
+    ("sensors", "message"),
+    [
+        (
+            (None, RangeSensor(rays=9, range_m=0.5), None, None),
+            r"robots\[1\].range_sensor.rays: network.symmetry must be 'none' where rays of robots "
+            "without a heading are no multiple of 4; --network.symmetry none",
         ),
-    ):
-        build_learner(config, env)
+        (
+            (RangeSensor(rays=8, range_m=0.5), None, None, RangeSensor(rays=4, range_m=0.5)),
+            r"robots\[3\].range_sensor: network.symmetry must be 'none' where range sensors differ",
+        ),
+    ],
+)
+def test_frames_refuse_rays_that_they_cannot_turn(
+    sensors: tuple[RangeSensor | None, ...], message: str
+) -> None:
+    scenario = sensing(*sensors)
+    with BatchEnv(scenario, ENVS, num_threads=1) as env:
+        names = env.observation_names()
+    with pytest.raises(ConfigError, match=message):
+        turning_columns(scenario, names)
+    assert square_symmetry(scenario, names, torch.device("cpu")) is None
 
 
 def test_who_measures_nothing_refuses_rays() -> None:

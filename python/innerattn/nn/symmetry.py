@@ -30,12 +30,17 @@ class VectorColumns:
         vectors: Columns (x, y) of every vector.
         handed: Columns that change their sign in a mirrored world, such as angles.
         anchors: Those of `vectors` that choose the frame, the most important first.
+        rays: Columns of rays, K of them, which change places.
+        ray_turns: For each element of the group, the K rays whose readings take the places of
+            the rays in the turned world.
     """
 
     width: int
     vectors: tuple[tuple[int, int], ...]
     handed: tuple[int, ...]
     anchors: tuple[tuple[int, int], ...]
+    rays: tuple[int, ...] = ()
+    ray_turns: tuple[tuple[int, ...], ...] = ()
 
 
 class SquareSymmetry:
@@ -58,13 +63,19 @@ class SquareSymmetry:
                 plane. With them, the last axis of actions is that of the robots.
 
         Raises:
-            ValueError: There is no anchor, or a column is not one of the observation.
+            ValueError: There is no anchor, a column is not one of the observation, or it is not
+                said how rays turn.
         """
-        named = [column for vector in columns.vectors for column in vector] + [*columns.handed]
+        named = [column for vector in columns.vectors for column in vector]
+        named += [*columns.handed, *columns.rays]
         if not columns.anchors or not all(0 <= column < columns.width for column in named):
             raise ValueError(
                 f"columns = {columns}: needs an anchor, and columns in 0..{columns.width - 1}"
             )
+        if [len(turn) for turn in columns.ray_turns] != [len(columns.rays)] * (
+            NUM_ELEMENTS if columns.rays else 0
+        ):
+            raise ValueError(f"columns = {columns}: needs a turn of all rays for each element")
         signs = torch.ones(NUM_ELEMENTS, columns.width)
         swapped = torch.arange(columns.width)
         for x, y in columns.vectors:
@@ -82,6 +93,8 @@ class SquareSymmetry:
         self._has_wheels = bool((self._unicycle | self._differential).any())
         self._left_right = torch.tensor([range(5), _MIRRORED], device=device)
         self._signs, self._swapped = signs.to(device), swapped.to(device)
+        self._rays = torch.tensor(columns.rays, dtype=torch.int64, device=device)
+        self._ray_turns = torch.tensor(columns.ray_turns, dtype=torch.int64, device=device)
         self._anchors = columns.anchors
         powers = range(len(columns.anchors) - 1, -1, -1)
         self._importance = torch.tensor([2.0**k for k in powers], dtype=torch.float64).to(device)
@@ -118,6 +131,9 @@ class SquareSymmetry:
         swapped = (elements >= 4).nonzero().squeeze(1)
         # Row by row: to choose between two copies of everything takes four times as long.
         rows.index_copy_(0, swapped, rows[swapped].index_select(1, self._swapped))
+        if len(self._rays):
+            readings = rows.index_select(1, self._rays).gather(1, self._ray_turns[elements])
+            rows.index_copy_(1, self._rays, readings)
         return rows.view(obs.shape)
 
     def turn_actions(self, actions: Tensor, element: Tensor) -> Tensor:

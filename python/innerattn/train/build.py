@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from pkgutil import resolve_name
@@ -12,7 +12,7 @@ from pkgutil import resolve_name
 import torch
 from torch import Tensor
 
-from innerattn.config import RunConfig, Scenario
+from innerattn.config import RunConfig
 from innerattn.config.registry import methods
 from innerattn.config.team import TeamConfig
 from innerattn.cores import usable_cores
@@ -21,14 +21,9 @@ from innerattn.errors import ConfigError, RunError
 from innerattn.learn.framed import FramedLearner
 from innerattn.learn.networks import draw_networks
 from innerattn.learn.types import Learner, LearnerClass, Team
-from innerattn.nn import SquareSymmetry, VectorColumns
-from innerattn.train.columns import (
-    entity_columns,
-    hearing,
-    partner_columns,
-    state_columns,
-    vector_columns,
-)
+from innerattn.nn import SquareSymmetry
+from innerattn.train.columns import entity_columns, hearing, partner_columns, state_columns
+from innerattn.train.frames import turning_columns
 from innerattn.train.teams.learner import team_networks
 from innerattn.train.teams.policy import TeamPolicy
 
@@ -54,7 +49,7 @@ def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -
     if config.network.symmetry == "none":
         return learner
     drives = [robot.drive for robot in config.scenario.robots]
-    symmetry = SquareSymmetry(_turning_columns(config.scenario, names), device, drives)
+    symmetry = SquareSymmetry(turning_columns(config.scenario, names), device, drives)
     if config.network.symmetry == "canonical":
         states = None
         if config.algorithm.needs_afterstates:
@@ -116,62 +111,6 @@ def _swapped(config: RunConfig) -> tuple[int, int] | None:
         return None
     order = [robot.name for robot in config.scenario.robots]
     return order.index(names[0]), order.index(names[1])
-
-
-def _turning_columns(scenario: Scenario, names: Sequence[str]) -> VectorColumns:
-    """The columns that turn with worlds of a scenario.
-
-    Raises:
-        ConfigError: What has a place makes a turned world another one, which no robot could see.
-    """
-    asymmetry = _asymmetry(scenario)
-    if asymmetry is not None:
-        key, what = asymmetry
-        raise ConfigError(
-            f"scenario.{key}: network.symmetry must be 'none' where {what}; "
-            "--network.symmetry none sets it, or take another budget"
-        )
-    return vector_columns(names)
-
-
-def square_symmetry(
-    scenario: Scenario, names: Sequence[str], device: torch.device
-) -> SquareSymmetry | None:
-    """The group for observations of these columns; None where worlds do not have its symmetry."""
-    if _asymmetry(scenario) is not None:
-        return None
-    return SquareSymmetry(vector_columns(names), device)
-
-
-def _asymmetry(scenario: Scenario) -> tuple[str, str] | None:
-    """The first key because of which frames cannot turn worlds, and what it says."""
-    for index, robot in enumerate(scenario.robots):
-        if robot.range_sensor is not None:
-            return f"robots[{index}].range_sensor", "robots have rays, which frames do not turn"
-    place = _place(scenario)
-    if place is None:
-        return None
-    key, what = place
-    return key, f"{what}, because a turned world would be another one"
-
-
-def _place(scenario: Scenario) -> tuple[str, str] | None:
-    """The first key that gives something a place, and what it says."""
-    for index, obstacle in enumerate(scenario.obstacles):
-        sides = obstacle.half_extents_m
-        if obstacle.position_m is not None or (sides is not None and sides[0] != sides[1]):
-            return f"obstacles[{index}]", "an obstacle has a fixed place or is an oblong box"
-    if scenario.map is not None:
-        return "map", "solid cells have fixed places"
-    for index, robot in enumerate(scenario.robots):
-        if robot.start_m is not None:
-            return f"robots[{index}].start_m", "a robot has a fixed start"
-    if scenario.victim_places_m:
-        return "victim_places_m", "victims have fixed places"
-    area = scenario.victim_area_m
-    if area is not None and len({-area[0], -area[1], area[2], area[3]}) > 1:
-        return "victim_area_m", "the area is no square around the centre"
-    return None
 
 
 _ROWS_PER_THREAD = 512

@@ -50,13 +50,16 @@ def entity_columns(names: Sequence[str]) -> EntityColumns:
     )
 
 
-def vector_columns(names: Sequence[str]) -> VectorColumns:
+def vector_columns(
+    names: Sequence[str], ray_turns: tuple[tuple[int, ...], ...] = ()
+) -> VectorColumns:
     """Columns that turn with the world: pairs ``*.x`` and ``*.y``, angles, and ways to the left.
 
     Victims choose the frame, in the order of their slots; then the robot's own place and velocity.
 
     Args:
         names: Of all columns.
+        ray_turns: How rays ``own.ray.*`` turn, as `VectorColumns` has it.
 
     Raises:
         ConfigError: A column ``*.x`` has no ``*.y`` beside it, or there is no ``own.position``.
@@ -77,6 +80,8 @@ def vector_columns(names: Sequence[str]) -> VectorColumns:
         vectors=tuple(pairs.values()),
         handed=tuple(place[name] for name in names if name.endswith(_HANDED)),
         anchors=tuple(anchors),
+        rays=tuple(place[name] for name in names if name.startswith("own.ray.")),
+        ray_turns=ray_turns,
     )
 
 

@@ -20,7 +20,7 @@ from innerattn.learn.adam import AdamStepper, Forward
 from innerattn.learn.advantage import generalised_advantage
 from innerattn.learn.resume import State, inside, take, under
 from innerattn.nn import CentralCritic, SquareSymmetry
-from innerattn.train.build import square_symmetry
+from innerattn.train.frames import square_symmetry
 from innerattn.train.script_play import Play, play_script
 
 _HELD_OUT = 8

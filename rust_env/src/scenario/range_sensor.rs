@@ -38,16 +38,18 @@ impl RangeSensor {
     /// over a narrower field of view, the first is its right edge and the last its left one.
     #[must_use]
     pub fn angles(&self) -> Vec<f64> {
-        let (rays, field) = (self.rays, self.field_of_view_deg.to_radians());
-        let (first, step) = match rays {
-            1 => (0.0, 0.0),
-            _ if self.is_all_around() => (0.0, field / rays as f64),
-            _ => (-0.5 * field, field / (rays - 1) as f64),
+        let (rays, field) = (self.rays as f64, self.field_of_view_deg.to_radians());
+        let angle = |ray: f64| match self.rays {
+            1 => 0.0,
+            _ if self.is_all_around() => field * ray / rays,
+            _ => 0.5 * field * (2.0 * ray + 1.0 - rays) / (rays - 1.0), // the same on both sides
         };
-        (0..rays).map(|ray| first + ray as f64 * step).collect()
+        (0..self.rays).map(|ray| angle(ray as f64)).collect()
     }
 
-    fn is_all_around(&self) -> bool {
+    /// Whether the rays go all around.
+    #[must_use]
+    pub fn is_all_around(&self) -> bool {
         self.field_of_view_deg >= FULL_TURN_DEG
     }
 

@@ -5,7 +5,7 @@ use innerattn_env::fault::Kind;
 use innerattn_env::geometry::{Solid, Vec2};
 use innerattn_env::rng::Stream;
 use innerattn_env::rules::Rules;
-use innerattn_env::scenario::{DriveMode, Engine, Map, Obstacle, RangeSensor, Scenario};
+use innerattn_env::scenario::{DriveMode, Engine, Map, Obstacle, RangeSensor, Scenario, Shape};
 use innerattn_env::world::World;
 use proptest::prelude::*;
 
@@ -374,5 +374,47 @@ fn obstacles_of_both_forms_are_met_from_everywhere() {
         let met = rays.map(|angle| solid.met_after(way, Vec2::new(angle.cos(), angle.sin())));
         let nearest = met.fold(f32::INFINITY, f32::min);
         assert!(nearest >= distance - 1e-5 && nearest <= distance + 0.02, "{solid:?} {way} {nearest}");
+    }
+}
+
+#[test]
+fn rays_of_a_turned_world_change_places_to_the_bit() {
+    let box_of = |half| Obstacle {
+        shape: Shape::Box,
+        radius_m: None,
+        half_extents_m: Some([half, half]),
+        position_m: None,
+        layers: None,
+    };
+    let mut scenario = Scenario { obstacles: vec![box_of(0.1), box_of(0.04)], ..Scenario::default() };
+    scenario.obstacles.push(some_obstacles().remove(0));
+    for robot in &mut scenario.robots {
+        let sensor = RangeSensor { rays: 24, range_m: 1.2, field_of_view_deg: 360.0, layers: None };
+        robot.range_sensor = Some(sensor);
+    }
+    let rules = Rules::new(scenario).expect("a valid scenario");
+    let rays: Vec<usize> =
+        (0..rules.layout.width()).filter(|at| rules.layout.names()[*at].starts_with("own.ray.")).collect();
+    let read = |world: &World| {
+        let mut rows = vec![0.0; 4 * rules.layout.width()];
+        world.observe(&rules, &mut rows);
+        let rows = rows.chunks_exact(rules.layout.width());
+        rows.map(|row| rays.iter().map(|at| row[*at]).collect::<Vec<_>>()).collect::<Vec<_>>()
+    };
+    for stream in 0..200 {
+        let world = World::new(&rules, 1, stream);
+        let plain = read(&world);
+        let turned = |turn: fn(Vec2) -> Vec2| {
+            let mut world = world.clone();
+            world.positions.iter_mut().chain(&mut world.obstacles).for_each(|at| *at = turn(*at));
+            read(&world)
+        };
+        let (mirrored, swapped) = (turned(|at| Vec2::new(-at.x, at.y)), turned(|at| at.yx()));
+        for robot in 0..4 {
+            for ray in 0..24 {
+                assert_eq!(mirrored[robot][(12 + 24 - ray) % 24], plain[robot][ray]);
+                assert_eq!(swapped[robot][(6 + 24 - ray) % 24], plain[robot][ray]);
+            }
+        }
     }
 }
