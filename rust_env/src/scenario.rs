@@ -226,6 +226,9 @@ pub struct Robot {
     /// How far it sees from its centre, m; everything if absent.
     #[serde(default)]
     pub sight_m: Option<f64>,
+    /// The angle within which it sees, the middle straight ahead, degrees.
+    #[serde(default = "sight::default_field_of_view_deg")]
+    pub field_of_view_deg: f64,
     /// What measures how far things are around it; nothing if absent.
     #[serde(default)]
     pub range_sensor: Option<RangeSensor>,
@@ -362,6 +365,7 @@ impl Default for Scenario {
             battery: None,
             load: None,
             sight_m: None,
+            field_of_view_deg: sight::default_field_of_view_deg(),
             range_sensor: None,
         };
         let task = |name: &str, needs: [&str; 2]| Task::new(name, needs.map(String::from).to_vec());

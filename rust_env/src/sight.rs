@@ -1,18 +1,22 @@
 //! Sight: which teammates and victims a robot sees, and how long ago it last saw the others.
 //!
-//! What is seen is decided by true places, from centre to centre: within the robot's `sight_m`, and where the
-//! scenario has occlusion, with no obstacle between that blocks the robot's own layer. It looks over the others.
+//! What is seen is decided by true places, from centre to centre: within the robot's `sight_m` and its field of view,
+//! and where the scenario has occlusion, with no obstacle between that blocks the robot's own layer. It looks over the others.
 
 use std::iter::zip;
 
 use crate::blocks::Blocks;
 use crate::geometry::{Solid, Vec2};
 use crate::robot::Body;
-use crate::scenario::{MAX_VICTIMS, Scenario};
+use crate::scenario::{MAX_VICTIMS, Robot, Scenario};
 use crate::tasks::Victim;
+use crate::wheels::Heading;
 
 /// The step of what was never seen in an episode.
 pub const NEVER: u32 = u32::MAX;
+
+/// Below every cosine.
+const AROUND: f32 = -2.0;
 
 /// The time since something was seen whose share is one half, s.
 const HALF_S: f32 = 1.0;
@@ -22,6 +26,8 @@ const HALF_S: f32 = 1.0;
 pub struct Sight {
     /// Squares of how far each robot sees, m²; infinite for one that sees everything.
     reach: Vec<f32>,
+    /// Cosines of half the angle within which each robot sees; [`AROUND`] for one that looks all around.
+    edges: Vec<f32>,
     /// The layer of each robot, one bit.
     layers: Vec<u64>,
     /// Obstacles that hide what is behind them, and the layers they block; none without occlusion.
@@ -39,6 +45,8 @@ pub struct Sight {
 pub struct View<'a> {
     /// Places of the robots, m.
     pub positions: &'a [Vec2],
+    /// Where robots on wheels point; none where no robot has any.
+    pub headings: &'a [Heading],
     /// Places of the obstacles, m.
     pub obstacles: &'a [Vec2],
     /// Victims by slot.
@@ -63,6 +71,7 @@ impl Sight {
         let hiding = zip(solids.iter().copied(), scenario.blocked());
         scenario.has_limited_sight().then(|| Self {
             reach: scenario.robots.iter().map(|one| one.sight_m.map_or(f32::INFINITY, square)).collect(),
+            edges: scenario.robots.iter().map(edge).collect(),
             layers: team.iter().map(|body| body.layer).collect(),
             hiding: hiding.filter(|_| scenario.occlusion).collect(),
             blocks: Blocks::of(scenario).filter(|_| scenario.occlusion),
@@ -124,8 +133,15 @@ impl Sight {
         };
         let blocks = self.blocks.iter().filter(|blocks| blocks.block(self.layers[own]));
         way.norm_squared() <= self.reach[own]
+            && self.is_in_front(own, view, way)
             && !zip(&self.hiding, view.obstacles).any(hides)
             && !blocks.into_iter().any(|blocks| blocks.is_crossed(from, way))
+    }
+
+    /// Whether what is `way` on from a robot is in its field of view.
+    fn is_in_front(&self, own: usize, view: &View, way: Vec2) -> bool {
+        let edge = self.edges[own];
+        edge <= AROUND || view.headings[own].ahead().dot(&way) >= edge * way.norm()
     }
 
     /// The time since something was last seen as a share, t / (t + 1 s): 0 now, 1 if never in the episode.
@@ -188,6 +204,13 @@ impl Sight {
     }
 }
 
+fn edge(robot: &Robot) -> f32 {
+    if robot.field_of_view_deg >= 360.0 {
+        return AROUND;
+    }
+    (0.5 * robot.field_of_view_deg).to_radians().cos() as f32
+}
+
 /// The later of two steps at which something was seen.
 #[must_use]
 pub(crate) fn later(one: u32, other: u32) -> u32 {
@@ -220,7 +243,17 @@ mod tests {
 
     fn view(step: u32, victims: &[Option<Victim>]) -> View<'_> {
         let positions = &START;
-        View { positions, obstacles: &[], victims, step, absent: 0, blind: 0, deaf: 0, held: 0 }
+        View {
+            positions,
+            headings: &[],
+            obstacles: &[],
+            victims,
+            step,
+            absent: 0,
+            blind: 0,
+            deaf: 0,
+            held: 0,
+        }
     }
 
     #[test]

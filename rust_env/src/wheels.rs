@@ -22,6 +22,14 @@ pub struct Heading {
     pub turn_rate: f32,
 }
 
+impl Heading {
+    /// The unit vector along it.
+    #[must_use]
+    pub fn ahead(self) -> Vec2 {
+        direction(self.angle)
+    }
+}
+
 /// What moves a robot on wheels.
 #[derive(Debug, Clone, Copy)]
 enum Base {
@@ -143,7 +151,7 @@ impl Wheels {
     /// The unit vector along a robot's heading; zeros for one without wheels.
     #[must_use]
     pub fn ahead(&self, robot: usize, headings: &[Heading]) -> Vec2 {
-        self.axles[robot].map_or_else(Vec2::zeros, |_| direction(headings[robot].angle))
+        self.axles[robot].map_or_else(Vec2::zeros, |_| headings[robot].ahead())
     }
 
     /// Whether robots may have these headings.

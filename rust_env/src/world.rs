@@ -383,6 +383,7 @@ impl World {
     fn view(&self, rules: &Rules) -> View<'_> {
         View {
             positions: &self.positions,
+            headings: &self.headings,
             obstacles: &self.obstacles,
             victims: &self.victims,
             step: self.step,

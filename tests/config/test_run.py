@@ -281,6 +281,7 @@ def test_a_digest_is_that_of_the_values_in_use() -> None:
             "battery",
             "load",
             "sight_m",
+            "field_of_view_deg",
             "range_sensor",
             "drive",
             "layer",

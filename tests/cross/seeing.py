@@ -45,13 +45,25 @@ def in_sight(plain: Stepper, state: State) -> tuple[Bools, Bools, Bools]:
     could = looks[:, :, None] & np.concatenate([there, state.present], 1)[:, None]
     could[:, :, :robots] &= ~np.eye(robots, dtype=bool)
     could[:, :, :robots] &= (state.faults["lost_communication"] == 0)[..., None]
-    near = distance <= limit
+    ahead = _angle_from_ahead(state, places)
+    fields = np.radians([robot.field_of_view_deg for robot in plain.scenario.robots])[:, None]
+    edge = np.where(fields < 2.0 * np.pi - 1e-9, 0.5 * fields, 4.0)  # beyond all angles
+    near = (distance <= limit) & (ahead <= edge)
     hidden = _hidden(plain, state, places, 0.0)
     far, close = (
-        (distance <= limit - gap) & ~_hidden(plain, state, places, gap)
+        (distance <= limit - gap)
+        & ((ahead - edge) * distance <= -gap)
+        & ~_hidden(plain, state, places, gap)
         for gap in (-_SLACK_M, _SLACK_M)
     )
     return could & near & ~hidden, could & (far != close), could & near & hidden
+
+
+def _angle_from_ahead(state: State, places: Array) -> Array:
+    """How far from its heading each robot has places (E, P, 2), (E, R, P)."""
+    way = places[:, None] - state.positions[:, :, None]
+    off = np.arctan2(way[..., 1], way[..., 0]) - state.headings[..., None]
+    return np.abs(np.angle(np.exp(1j * off)))
 
 
 def _hidden(plain: Stepper, state: State, places: Array, gap: float) -> Bools:

@@ -244,10 +244,16 @@ def with_wheels(scenario: Scenario, rng: np.random.Generator) -> Scenario:
 def with_sight(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     """The same, most of whose robots see only so far, and where obstacles may hide things."""
     half = scenario.arena_half_width_m
+
+    def sighted(robot: Robot) -> Robot:
+        fan = robot.has_wheels and rng.random() < 0.5
+        return robot.replace(
+            sight_m=float(rng.uniform(0.1, 1.2)) * half,
+            field_of_view_deg=float(rng.uniform(30.0, 330.0)) if fan else 360.0,
+        )
+
     robots = [
-        robot.replace(sight_m=float(rng.uniform(0.1, 1.2)) * half)
-        if index == 0 or rng.random() < 0.7
-        else robot
+        sighted(robot) if index == 0 or rng.random() < 0.7 else robot
         for index, robot in enumerate(scenario.robots)
     ]
     occlusion = bool(scenario.obstacles) and rng.random() < 0.8

@@ -211,6 +211,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
                 **{"max_turn_rad_s": 3.0, "acceleration_m_s2": 2.0},
                 "turn_acceleration_rad_s2": 9.0,
                 "range_sensor": SENSOR,
+                "field_of_view_deg": 200.0,
             },
         ],
         "tasks": [

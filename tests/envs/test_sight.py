@@ -14,6 +14,7 @@ from innerattn.errors import ConfigError
 from innerattn.report.scenario_words import scenario_words
 
 ENVS = 4
+FAN = Scenario().robots[0].replace(drive="unicycle", field_of_view_deg=120.0)
 DISC = Obstacle(shape="disc", radius_m=0.2, position_m=(0.0, 0.0))
 
 
@@ -119,6 +120,8 @@ def test_info_says_who_sees_how_far() -> None:
     assert "navigation_0: sees" not in words
     assert "Obstacles hide what is behind them." in words
     assert "sees" not in scenario_words(Scenario())
+    words = scenario_words(Scenario(robots=(FAN, *Scenario().robots[1:])))
+    assert "food_0: sees teammates and victims within 120 degrees ahead" in words
 
 
 @pytest.mark.parametrize(
@@ -127,6 +130,10 @@ def test_info_says_who_sees_how_far() -> None:
         (
             sighted(None, None, 0.5, None, None),
             r"robots\[1\].sight_m = 0.5: must be left out; they",
+        ),
+        (
+            Scenario(robots=(FAN, *Scenario().robots[1:])),
+            r"robots\[0\].field_of_view_deg = 120: must be 360; they see everything",
         ),
         (Scenario(obstacles=(DISC,), occlusion=True), "occlusion = true: must be false; they see"),
     ],

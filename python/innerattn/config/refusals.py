@@ -38,6 +38,9 @@ def _refuse_robot(robot: Robot, key: str, who: str) -> None:
         raise ConfigError(f"{found}: there must be no battery; {who} see no charges")
     if robot.load is not None:
         raise ConfigError(f"{key}.load = {robot.load}: there must be no load; {who} see no loads")
+    if robot.field_of_view_deg < 360.0:
+        found = f"{key}.field_of_view_deg = {robot.field_of_view_deg:g}"
+        raise ConfigError(f"{found}: must be 360; {who} see everything")
     if robot.drive != "force":
         raise ConfigError(f"{key}.drive = {robot.drive!r}: must be 'force'; {who} set forces")
     if robot.sight_m is not None:

@@ -98,6 +98,11 @@ class Robot(Model):
         description="how far it sees teammates and victims, from its centre to theirs, above "
         "radius_m [m]; None: it sees all",
     )
+    field_of_view_deg: Annotated[float, ADDED_LATER, Told(1.0, 360.0)] = Field(
+        360.0,
+        description="angle within which it sees, its middle straight ahead; below 360 only of "
+        "robots with a heading [degrees]",
+    )
     range_sensor: Annotated[RangeSensor | None, ADDED_LATER] = Field(
         None,
         description="measures how far walls, obstacles and robots are, such as "
@@ -130,6 +135,11 @@ class Robot(Model):
     def has_wheels(self) -> bool:
         """Whether it drives along a heading."""
         return self.drive in ("unicycle", "differential")
+
+    @property
+    def has_limited_sight(self) -> bool:
+        """Whether it sees less than everything that nothing hides."""
+        return self.sight_m is not None or self.field_of_view_deg < 360.0
 
     @property
     def track_m(self) -> float:
@@ -495,7 +505,7 @@ class Scenario(Model, Shown):
     @property
     def has_limited_sight(self) -> bool:
         """Whether there is something in an arena that some robot does not see."""
-        return self.occlusion or any(robot.sight_m is not None for robot in self.robots)
+        return self.occlusion or any(robot.has_limited_sight for robot in self.robots)
 
     @property
     def max_rays(self) -> int:

@@ -108,13 +108,21 @@ def _motion(scenario: Scenario) -> Iterator[str]:
 
 def _sight(scenario: Scenario) -> Iterator[str]:
     """Who sees how far, and what is in the way."""
-    limits = dict.fromkeys(robot.sight_m for robot in scenario.robots if robot.sight_m is not None)
-    for sight_m in limits:
-        robots = ", ".join(one.name for one in scenario.robots if one.sight_m == sight_m)
-        yield f"{robots}: sees teammates and victims up to {sight_m:g} m away"
+    limits = dict.fromkeys(map(_limits, filter(lambda one: one.has_limited_sight, scenario.robots)))
+    for limit in limits:
+        robots = ", ".join(one.name for one in scenario.robots if _limits(one) == limit)
+        sight_m, degrees = limit
+        far = "" if sight_m is None else f" up to {sight_m:g} m away"
+        wide = f" within {degrees:g} degrees ahead" if degrees < 360.0 else ""
+        yield f"{robots}: sees teammates and victims{far}{wide}"
     if scenario.occlusion:
         hiding = ["obstacles"] * bool(scenario.obstacles) + ["solid cells"] * bool(scenario.map)
         yield f"{' and '.join(hiding).capitalize()} hide what is behind them."
+
+
+def _limits(robot: Robot) -> tuple[float | None, float]:
+    """How far it sees, and within which angle [m, degrees]."""
+    return robot.sight_m, robot.field_of_view_deg
 
 
 def _rays(scenario: Scenario) -> Iterator[str]:

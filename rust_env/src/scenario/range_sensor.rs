@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::check::{broken, counts, within};
+use super::sight::{self, FULL_TURN_DEG};
 use super::{Robot, Scenario};
 use crate::error::Result;
 
@@ -10,8 +11,6 @@ use crate::error::Result;
 pub const MAX_RAYS: usize = 360;
 /// Shortest and farthest range, m: those of sight.
 const RANGES_M: (f64, f64) = (0.005, 1000.0);
-/// All around, degrees.
-const FULL_TURN_DEG: f64 = 360.0;
 
 /// A sensor that measures how far things are along rays from a robot's centre.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,15 +21,11 @@ pub struct RangeSensor {
     /// How far each reaches from the robot's centre, m.
     pub range_m: f64,
     /// The angle over which the rays spread, its middle straight ahead, degrees.
-    #[serde(default = "default_field_of_view_deg")]
+    #[serde(default = "sight::default_field_of_view_deg")]
     pub field_of_view_deg: f64,
     /// The layers whose robots and obstacles the rays meet; the robot's own if absent.
     #[serde(default)]
     pub layers: Option<Vec<String>>,
-}
-
-fn default_field_of_view_deg() -> f64 {
-    FULL_TURN_DEG
 }
 
 impl RangeSensor {
@@ -92,11 +87,7 @@ impl Scenario {
             let rule = format!("must be above radius_m = {} m: it counts from its centre", robot.radius_m);
             return broken(&key("range_m"), &sensor.range_m, &rule);
         }
-        within(&key("field_of_view_deg"), sensor.field_of_view_deg, 1.0, FULL_TURN_DEG, "degrees")?;
-        if !sensor.is_all_around() && !robot.has_wheels() {
-            let rule = "must be 360 of a robot without a heading; drive = \"unicycle\" and \"differential\" have one";
-            return broken(&key("field_of_view_deg"), &sensor.field_of_view_deg, rule);
-        }
+        robot.validate_field_of_view(&key("field_of_view_deg"), sensor.field_of_view_deg)?;
         match &sensor.layers {
             Some(layers) => self.validate_blocked(&key("layers"), layers),
             None => Ok(()),

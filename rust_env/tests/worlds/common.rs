@@ -273,11 +273,14 @@ pub fn with_wheels(mut scenario: Scenario) -> Scenario {
 }
 
 /// The same with robots that see from a quarter of the arena's half width to all of it, and every fourth
-/// everything that no obstacle hides.
+/// everything that no obstacle hides; those on wheels look ahead.
 pub fn with_sight(mut scenario: Scenario) -> Scenario {
     let half = scenario.arena_half_width_m;
     for (index, robot) in scenario.robots.iter_mut().enumerate().filter(|(index, _)| index % 4 < 3) {
         robot.sight_m = Some(half * [0.5, 1.0, 0.25][index % 4]);
+        if robot.has_wheels() {
+            robot.field_of_view_deg = [90.0, 300.0, 180.0][index % 4];
+        }
     }
     let occlusion = !scenario.obstacles.is_empty();
     Scenario { occlusion, rescue_radius_m: 0.4, ..scenario }

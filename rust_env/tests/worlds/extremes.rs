@@ -95,6 +95,7 @@ fn extreme(source: &mut Stream) -> Scenario {
             battery: None,
             load: None,
             sight_m: None,
+            field_of_view_deg: 360.0,
             range_sensor: None,
         })
         .collect();

@@ -7,13 +7,13 @@ use std::iter::zip;
 use innerattn_env::fault::Kind;
 use innerattn_env::rng::Stream;
 use innerattn_env::rules::Rules;
-use innerattn_env::scenario::{Engine, Obstacle, Scenario, Shape, Situation, VictimOrder};
+use innerattn_env::scenario::{DriveMode, Engine, Obstacle, Scenario, Shape, Situation, VictimOrder};
 use innerattn_env::world::World;
 use proptest::prelude::*;
 
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, fault, mixed_team, options, random_drive, some_obstacles,
-    with_arrivals, with_batteries, with_layers, with_leaving, with_sight, with_times,
+    with_arrivals, with_batteries, with_layers, with_leaving, with_sight, with_times, with_wheels,
 };
 
 const ENVS: usize = 3;
@@ -62,7 +62,13 @@ fn sees(scenario: &Scenario, world: &World, own: usize, at: [f32; 2]) -> Option<
         };
         let centres = world.obstacles.iter().map(|centre| wide((*centre).into()));
         let hidden = scenario.occlusion && zip(&scenario.obstacles, centres).any(hides);
-        robot.sight_m.is_none_or(|sight| distance <= sight - gap) && !hidden
+        let off = world.headings.get(own).map_or(0.0, |heading| {
+            let off = (to[1] - from[1]).atan2(to[0] - from[0]) - f64::from(heading.angle);
+            off.sin().atan2(off.cos()).abs()
+        });
+        let half = robot.field_of_view_deg.to_radians() / 2.0;
+        let in_front = distance == 0.0 || robot.field_of_view_deg == 360.0 || off <= half - gap / distance;
+        robot.sight_m.is_none_or(|sight| distance <= sight - gap) && in_front && !hidden
     };
     (sees(1e-5) == sees(-1e-5)).then(|| sees(0.0))
 }
@@ -116,6 +122,42 @@ fn changed(scenario: Scenario, more: usize) -> Scenario {
         4 => with_batteries(with_arrivals(scenario)),
         _ => with_times(Scenario { situation: Situation::Double, obstacles: some_obstacles(), ..scenario }),
     }
+}
+
+#[test]
+fn robots_with_a_heading_see_what_is_in_their_field_of_view() {
+    let plain = Scenario { obstacles: some_obstacles(), robots: mixed_team(6), ..tight(Engine::Discs) };
+    let scenario = with_sight(with_wheels(plain));
+    let mut table = Table::new(scenario.clone(), options(ENVS, 4));
+    let (mut chance, mut counts) = (chance(4), [0; 2]);
+    for _ in 0..2 * STEPS {
+        let drives: Vec<_> = (0..table.reward.len()).map(|_| random_drive(&mut chance)).collect();
+        table.step(&drives);
+        for world in table.batch.worlds() {
+            let victims = world.victims.iter().map(|victim| victim.map(|victim| victim.position));
+            let things: Vec<_> = world.positions.iter().copied().map(Some).chain(victims).collect();
+            for (own, row) in world.sightings.chunks_exact(things.len()).enumerate() {
+                for (at, (last, place)) in zip(row, &things).enumerate().filter(|(at, _)| *at != own) {
+                    let place = place.map(<[f32; 2]>::from);
+                    let Some(seen) = place.and_then(|place| sees(&scenario, world, own, place)) else {
+                        continue;
+                    };
+                    assert_eq!(*last == world.step, seen, "robot {own}, {at}");
+                    counts[usize::from(seen)] += 1;
+                }
+            }
+        }
+    }
+    assert!(counts.iter().all(|count| *count > 1000), "{counts:?}");
+    let angle = |degrees: f64, drive: DriveMode| {
+        let mut scenario = Scenario::default();
+        (scenario.robots[2].field_of_view_deg, scenario.robots[2].drive) = (degrees, drive);
+        Rules::new(scenario).err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    let key = "scenario.robots[2].field_of_view_deg";
+    assert!(angle(90.0, DriveMode::Velocity).starts_with(&format!("{key} = 90: must be 360 of a robot")));
+    assert!(angle(0.5, DriveMode::Unicycle).starts_with(&format!("{key} = 0.5: must be in 1..=360")));
+    assert_eq!(angle(90.0, DriveMode::Unicycle), "");
 }
 
 proptest! {
