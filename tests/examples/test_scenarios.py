@@ -13,15 +13,24 @@ from innerattn.train.build import build_learner
 ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "examples" / "scenarios").glob("*.toml"))
 EPISODES = 60
-KEYS = {"--network.symmetry": "network.symmetry", "--warm-start": "train.warm_start"}
+KEYS = {
+    "--network.hidden-width": "network.hidden_width",
+    "--network.message-width": "network.message_width",
+    "--network.symmetry": "network.symmetry",
+    "--warm-start": "train.warm_start",
+}
 
 
-def test_there_are_six() -> None:
+def test_there_are_ten() -> None:
     assert [file.stem for file in FILES] == [
         "assembly",
+        "convoy",
+        "drones",
         "fire",
         "flood",
+        "lookout",
         "office",
+        "rovers",
         "search",
         "warehouse",
     ]
@@ -52,7 +61,8 @@ def test_the_command_in_the_file_can_train(file: Path) -> None:
     overrides = {"network.hidden_width": 16, "train.threads": 1}
     for option, key in KEYS.items():
         if option in options:
-            overrides[key] = options[option]
+            value = options[option]
+            overrides[key] = int(value) if value.isdigit() else value
     config = load_run_config(
         method=options["--method"],
         budget=options["--budget"],

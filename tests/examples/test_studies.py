@@ -14,5 +14,5 @@ FOLDER = Path(__file__).parents[2] / "examples" / "studies"
 def test_it_is_planned_and_asks_something(file: Path) -> None:
     study = study_in(file.read_bytes(), file)
     assert study.question
-    assert study.contrasts or study.search
+    assert study.contrasts or study.search or study.tables
     assert plan_study(study, FOLDER.joinpath)

@@ -102,3 +102,34 @@ def test_raw_data_of_marl_eval(tmp_path: Path) -> None:
         for step in steps:
             (rescues,) = of_run[step]["rescues"]
             assert of_run[step]["score"] == [pytest.approx((rescues - scripts["random"]) / span)]
+
+
+@pytest.mark.parametrize(
+    ("scripted", "score", "wanted"),
+    [
+        ({"random": 0.5, "greedy-seen": 2.5, "hungarian": 4.5}, 0.75, 1.5),
+        ({"random": 0.5, "greedy-seen": 0.5, "hungarian": 4.5}, 0.75, None),
+        ({"random": 0.5, "hungarian": 4.5}, 0.75, 0.75),
+        ({"random": 0.5, "hungarian": 0.4}, None, None),
+    ],
+)
+def test_the_score_as_seen_takes_the_script_that_knows_as_much(
+    scripted: dict[str, float], score: float | None, wanted: float | None
+) -> None:
+    part = {
+        "scripted": {name: {"mean": mean} for name, mean in scripted.items()},
+        "score": None if score is None else {"mean": score},
+        "rescues_per_episode": {"mean": 3.5},
+    }
+    run = PlannedRun({"scenario": "mixed"}, 0, RunConfig(), "")
+    found = Result(run, {**part, "long": part})
+    for length in ("standard", "long"):
+        assert found.value("score_as_seen", length) == wanted  # type: ignore[arg-type]
+    assert found.value("train_seconds", "standard") is None
+
+
+def test_the_seconds_of_a_training_are_those_of_its_run(tmp_path: Path) -> None:
+    run = made_run(tmp_path, "mixed", "td-inner", 0)
+    planned = PlannedRun({"scenario": "mixed"}, 0, run.config, "")
+    found = Result(planned, run.summary, run)
+    assert found.value("train_seconds", "standard") == run.info.seconds

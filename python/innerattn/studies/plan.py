@@ -19,8 +19,10 @@ from innerattn.measures.registry import MEASURES
 from innerattn.studies.space import Search, Value
 from innerattn.studies.study import RETAINED, Grid, Study, StudyContrast, Variant, coordinates
 
-MEASURES_OF_ALL = ("score", "rescues_per_episode")
-"""What every evaluation holds beside the registered measures."""
+SCORE_AS_SEEN = "score_as_seen"
+TRAIN_SECONDS = "train_seconds"
+MEASURES_OF_ALL = ("score", "rescues_per_episode", SCORE_AS_SEEN, TRAIN_SECONDS)
+"""What every run has beside the registered measures."""
 MOST_RUNS = 10_000
 RECIPE = "recipe"
 """The trial of a search that changes nothing, as its variant is called."""

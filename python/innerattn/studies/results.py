@@ -18,7 +18,14 @@ from innerattn.stats.seeds import seed_estimate
 from innerattn.studies.faults import retained
 from innerattn.studies.folder import StudyFolder
 from innerattn.studies.ledger import Ledger, State
-from innerattn.studies.plan import MEASURES_OF_ALL, PlannedRun, pairs, run_digest
+from innerattn.studies.plan import (
+    MEASURES_OF_ALL,
+    SCORE_AS_SEEN,
+    TRAIN_SECONDS,
+    PlannedRun,
+    pairs,
+    run_digest,
+)
 from innerattn.studies.shown import StudyTable
 from innerattn.studies.space import Length, Value
 from innerattn.studies.study import (
@@ -32,6 +39,8 @@ from innerattn.studies.study import (
 
 LEAST_SEEDS = 3
 """Fewer seeds decide nothing."""
+
+_SEEN = "greedy-seen"
 
 Verdict = Literal["greater", "smaller", "alike", "undecided"]
 
@@ -62,17 +71,30 @@ class Result:
     retained: Mapping[str, float | None] = field(default_factory=dict)
 
     def value(self, measure: str, length: Length) -> float | None:
-        """A measure of the run; None where its episodes do not determine it."""
+        """A measure of the run; None where it does not determine it."""
         part = self.summary if length == "standard" else self.summary["long"]
         found: Any
         if measure.startswith(RETAINED):
             found = self.retained.get(measure)
+        elif measure == TRAIN_SECONDS:
+            found = None if self.finished is None else self.finished.info.seconds
+        elif measure == SCORE_AS_SEEN:
+            found = _score_as_seen(part)
         elif measure in MEASURES_OF_ALL:
             found = part[measure]
         else:
             found = part["measures"][self.run.config.train.method].get(measure)
         value = found["mean"] if isinstance(found, Mapping) else found
         return None if value is None or not math.isfinite(value) else float(value)
+
+
+def _score_as_seen(part: Mapping[str, Any]) -> float | None:
+    """The score, whose 1 is the script that knows what robots have seen, where sight is limited."""
+    if _SEEN not in part["scripted"]:
+        return None if part["score"] is None else float(part["score"]["mean"])
+    least, most = (part["scripted"][name]["mean"] for name in ("random", _SEEN))
+    rescues = part["rescues_per_episode"]["mean"]
+    return float((rescues - least) / (most - least)) if most > least else None
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,9 @@ class StudyContrast(Model):
     )
     b: dict[str, Any] = Field(min_length=1, description="which runs they are compared with")
     measure: str = Field(
-        "score", description="score, rescues_per_episode or a registered measure of a run"
+        "score",
+        description="score, score_as_seen, rescues_per_episode, train_seconds or a registered "
+        "measure of a run",
     )
     length: Length | Literal["both"] = Field(
         "standard",
