@@ -8,6 +8,7 @@ from innerattn.config import (
     Arrival,
     Battery,
     Depot,
+    Map,
     Obstacle,
     RangeSensor,
     Robot,
@@ -279,3 +280,20 @@ def with_rays(scenario: Scenario, rng: np.random.Generator) -> Scenario:
         for index, robot in enumerate(scenario.robots)
     ]
     return scenario.replace(robots=tuple(robots))
+
+
+def with_map(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same in an arena twice as wide, with a few solid blocks that some layers meet."""
+    side = int(rng.integers(6, 20))
+    cells = np.zeros((side, side), bool)
+    for _ in range(rng.integers(1, 5)):
+        row, column = rng.integers(0, side - 2, 2)
+        cells[row : row + rng.integers(1, 3), column : column + rng.integers(1, 4)] = True
+    rows = tuple("".join("#" if solid else "." for solid in row) for row in cells)
+    layers = sorted({robot.layer for robot in scenario.robots})
+    some = tuple(layers[: rng.integers(1, len(layers) + 1)]) if rng.random() < 0.5 else None
+    half = 2.0 * scenario.arena_half_width_m
+    radius = min(2.0 * scenario.rescue_radius_m, half)
+    return scenario.replace(
+        map=Map(rows=rows, layers=some), arena_half_width_m=half, rescue_radius_m=radius
+    )

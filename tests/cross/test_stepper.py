@@ -16,6 +16,7 @@ from teams import (
     with_layers,
     with_list,
     with_loads,
+    with_map,
     with_order,
     with_rays,
     with_sight,
@@ -40,11 +41,19 @@ THIRDS = [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))]
 """Chunks of 12,000 transitions; two of three are for `make test-slow`."""
 
 
+def in_boxes(scenario: Scenario) -> Scenario:
+    """The same with an obstacle in place of each box of the map."""
+    boxes = scenario.map_boxes
+    return scenario.replace(map=None, obstacles=(*scenario.obstacles, *boxes))
+
+
 def state_of(env: BatchEnv) -> State:
+    boxes = np.array([box.position_m for box in env.scenario.map_boxes]).reshape(-1, 2)
+    boxes = np.broadcast_to(boxes, (env.num_envs, *boxes.shape))
     return State(
         env.positions().astype(np.float64),
         env.velocities().astype(np.float64),
-        env.obstacles().astype(np.float64),
+        np.concatenate([env.obstacles().astype(np.float64), boxes], axis=1),
         env.victims(),
         env.fault_state(),
         env.step_counts(),
@@ -109,7 +118,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
     robots = len(scenario.robots)
     num_envs = max(4, 256 // robots)
     env = BatchEnv(scenario, num_envs, seed=seed, num_threads=1, autoreset="disabled")
-    plain = Stepper(scenario)
+    plain = Stepper(in_boxes(scenario))
     seen: Counter[str] = Counter()
     env.reset()
     healthy = env.fault_state()
@@ -280,10 +289,14 @@ def test_worlds_without_contacts_are_as_the_plain_stepper_says(chunk: int) -> No
         assert total[what] > 50, (what, total)
 
 
-def compare_some(rng: np.random.Generator, changed: Callable[[Scenario], Scenario]) -> Counter[str]:
-    """12,000 transitions of random scenarios, each ``changed``; counts what was seen."""
+def compare_some(
+    rng: np.random.Generator,
+    changed: Callable[[Scenario], Scenario],
+    transitions: int = 12_000,
+) -> Counter[str]:
+    """Transitions of random scenarios, each ``changed``; counts what was seen."""
     total: Counter[str] = Counter()
-    while total["transitions"] < 12_000:
+    while total["transitions"] < transitions:
         scenario = changed(random_scenario(rng))
         some = min(1000, 20_000 // len(scenario.robots))
         seed = int(rng.integers(2**32))
@@ -424,6 +437,28 @@ def test_worlds_with_range_sensors_are_as_the_plain_stepper_says(chunk: int) -> 
     total = compare_some(rng, changed)
     assert total["met"] > 10_000
     assert total["rays"] - total["met"] > 10_000
+    assert total["unsure of rays"] < 0.02 * total["rays"]
+
+
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_with_a_map_are_as_the_plain_stepper_says(chunk: int) -> None:
+    rng = np.random.default_rng(1300 + chunk)
+
+    def changed(scenario: Scenario) -> Scenario:
+        while True:
+            while len(scenario.robots) > 8:  # every ray meets every box of the plain stepper
+                scenario = random_scenario(rng)
+            try:
+                found = with_layers(scenario, rng) if rng.random() < 0.5 else scenario
+                found = with_rays(with_sight(with_map(found, rng), rng), rng)
+                return found.replace(occlusion=rng.random() < 0.7)
+            except ValueError:  # no room for victims, or an obstacle with a place in a cell
+                scenario = random_scenario(rng)
+
+    total = compare_some(rng, changed, 5_000)
+    for what in ("free", "touched", "rescues", "appeared", "hidden"):
+        assert total[what] > 20, (what, total)
+    assert total["met"] > 1000
     assert total["unsure of rays"] < 0.02 * total["rays"]
 
 
