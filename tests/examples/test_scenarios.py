@@ -16,6 +16,7 @@ EPISODES = 60
 KEYS = {
     "--network.hidden-width": "network.hidden_width",
     "--network.message-width": "network.message_width",
+    "--train.env-steps": "train.env_steps",
     "--network.symmetry": "network.symmetry",
     "--warm-start": "train.warm_start",
 }
