@@ -33,12 +33,12 @@ CHUNKS = 8
 LEAST = 104_000
 """Transitions of all chunks together."""
 PARTS = [
-    *(0, 1),
-    *(pytest.param(n, marks=pytest.mark.long) for n in (2, 3)),
+    0,
+    *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2, 3)),
     *(pytest.param(n, marks=pytest.mark.slow) for n in range(4, CHUNKS)),
 ]
 THIRDS = [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))]
-"""Chunks of 12,000 transitions; two of three are for `make test-slow`."""
+"""Chunks of 8,000 transitions; two of three are for `make test-slow`."""
 
 
 def in_boxes(scenario: Scenario) -> Scenario:
@@ -66,7 +66,8 @@ def state_of(env: BatchEnv) -> State:
 
 
 def assert_close(found: np.ndarray, wanted: np.ndarray, what: str, scale: float = 1.0) -> None:
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=EXACT * scale, err_msg=what)
+    if not (abs(found - wanted) <= EXACT * scale).all():  # quicker than what words it
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=EXACT * scale, err_msg=what)
 
 
 def random_actions(rng: np.random.Generator, scenario: Scenario, state: State) -> np.ndarray:
@@ -292,7 +293,7 @@ def test_worlds_without_contacts_are_as_the_plain_stepper_says(chunk: int) -> No
 def compare_some(
     rng: np.random.Generator,
     changed: Callable[[Scenario], Scenario],
-    transitions: int = 12_000,
+    transitions: int = 8_000,
 ) -> Counter[str]:
     """Transitions of random scenarios, each ``changed``; counts what was seen."""
     total: Counter[str] = Counter()
