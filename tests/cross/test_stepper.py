@@ -404,8 +404,8 @@ def test_worlds_that_end_when_all_is_done_are_as_the_plain_stepper_says(chunk: i
         return scenario.replace(arrivals=arrivals, end_when_done=True, episode_steps=60)
 
     total = compare_some(rng, changed)
-    for what in ("rescues", "appeared", "lost", "done"):
-        assert total[what] > 50, (what, total)
+    for what, least in (("rescues", 50), ("appeared", 50), ("lost", 50), ("done", 20)):
+        assert total[what] > least, (what, total)
 
 
 @pytest.mark.parametrize("chunk", THIRDS)
