@@ -126,7 +126,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
     given = env.victims()["present"].sum(1)
     if scenario.has_arrivals:
         start = env.victims()
-        check_arrivals(env, start, np.zeros(start.shape, bool), np.zeros(num_envs, int))
+        check_arrivals(plain, env, start, np.zeros(start.shape, bool), np.zeros(num_envs, int))
     rescued = np.zeros(num_envs, dtype=int)
     for _ in range(-(-transitions // num_envs)):
         if faulty:
@@ -184,7 +184,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
             rescued[world] += 1
         assert (env.step_counts() == steps + 1).all()
         seen["turned away"] += int(env.turned_away().sum())
-        seen["appeared"] += check_victims(env, before, after, gone, given)
+        seen["appeared"] += check_victims(plain, env, before, after, gone, given)
         given = np.maximum(given, after.victims["id"].max(1) + 1)
         if plain.service.any():
             stays = before.present & ~gone & ~unsure[:, None]
