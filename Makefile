@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PYTHONDONTWRITEBYTECODE := # compiled modules are kept: the tests begin many processes
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train robot test test-pool test-asan test-gpu test-slow examples study-kill reliability soak lint format bench lock docs site schemas dist smoke bounds setup clean
+.PHONY: train robot test test-pool test-asan test-gpu test-slow examples study-kill reliability soak lint lint-rust lint-python format bench lock docs site schemas dist smoke bounds setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -71,8 +71,13 @@ soak: setup ## 10^8 env-steps with each engine and an hour of training: memory, 
 	python benches/soak.py
 
 lint: setup ## formatting, lints, types, stub, import floors
+	$(MAKE) --jobs 2 --output-sync lint-rust lint-python
+
+lint-rust: setup
 	cargo fmt --check
 	cargo clippy --quiet --all-targets -- -D warnings
+
+lint-python: setup
 	ruff check
 	ruff format --check
 	mypy
@@ -113,7 +118,9 @@ $(VENV)/.installed: pyproject.toml $(CONSTRAINTS)
 
 $(VENV)/.built: $(VENV)/.installed $(RUST)
 	@echo "Compiling the worlds."
-	maturin develop --release --quiet --locked --extras dev
+	@# What the worlds need compiles while packages are fetched; maturin takes it over.
+	cargo build --release --quiet --locked -p innerattn-py --features pyo3/extension-module & \
+	maturin develop --release --quiet --locked --extras dev; code=$$?; wait; exit $$code
 	@touch $@
 
 lock: $(VENV)/.installed ## renew constraints.txt: the newest versions that pyproject.toml allows

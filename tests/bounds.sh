@@ -20,11 +20,15 @@ print(*dict.fromkeys(wanted), sep="\n")
 EOF
 "$python" -m venv "$folder/uv"
 "$folder/uv/bin/pip" install --quiet uv
-for versions in lowest-direct highest; do
-  echo "$versions versions"
-  "$python" -m venv "$folder/$versions"
-  install=("$folder/uv/bin/uv" pip install --quiet --python "$folder/$versions/bin/python")
-  "${install[@]}" --resolution "$versions" -r "$folder/bounds.txt"
+try_with() { # VERSIONS
+  local install=("$folder/uv/bin/uv" pip install --quiet --python "$folder/$1/bin/python")
+  "$python" -m venv "$folder/$1"
+  "${install[@]}" --resolution "$1" -r "$folder/bounds.txt"
   "${install[@]}" --no-deps "$wheel"
-  (cd "$folder" && "$folder/$versions/bin/python" "$here/smoke.py" "$extras")
-done
+  mkdir "$folder/in-$1"
+  (cd "$folder/in-$1" && "$folder/$1/bin/python" "$here/smoke.py" "$extras")
+  echo "$1 versions: passed"
+}
+(try_with highest) & # both at once: much of it waits for the network
+(try_with lowest-direct)
+wait $!

@@ -1,5 +1,7 @@
 """Finished runs for tests of more than one room: trained by the command itself, or made up."""
 
+from __future__ import annotations
+
 import os
 import shutil
 import signal
@@ -7,25 +9,24 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
-import torch
 from hypothesis import HealthCheck, settings
 
 sys.path.insert(0, str(Path(__file__).parent / "support"))
 
-from in_turn import do_in_turn
-from made_run import made_run
 from once import made_once
-from small_study import begin_small
 
-from innerattn.cli.main import main
-from innerattn.experiments.crossed.arms import ARMS
-from innerattn.experiments.plan import Case
-from innerattn.experiments.run import FinishedRun, read_run
-from innerattn.studies.work import work
+from innerattn.cores import let_waiting_threads_sleep
 
-torch.set_num_threads(1)  # there is a process of the tests for each core
+# The process that hands out the tests reads this file, too, and does not wait for PyTorch:
+# fixtures import what they need.
+if TYPE_CHECKING:
+    from innerattn.experiments.plan import Case
+    from innerattn.experiments.run import FinishedRun
+
+let_waiting_threads_sleep()  # as the command does
 
 # A slow machine fails no property.
 settings.register_profile(
@@ -44,9 +45,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.timeout(3_600))
 
 
+@pytest.fixture(autouse=True, scope="session")
+def one_thread() -> None:
+    """There is a process of the tests for each core."""
+    import torch
+
+    torch.set_num_threads(1)
+
+
 @pytest.fixture(autouse=True)
 def same_draws() -> None:
     """Each test's draws from torch's own generator are the same in every run and any order."""
+    import torch
+
     torch.manual_seed(0)
 
 
@@ -73,6 +84,8 @@ def tiny() -> list[str]:
 @pytest.fixture(scope="session")
 def run_dir(tmp_path_factory: pytest.TempPathFactory, tiny: list[str]) -> Path:
     """A run's folder; not to be changed."""
+
+    from innerattn.cli.main import main
 
     def make(folder: Path) -> None:
         assert main(["train", "--run-dir", str(folder / "tiny"), "--seed", "3", *tiny]) == 0
@@ -124,12 +137,17 @@ def small() -> dict[str, object]:
 @pytest.fixture
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trains the runs of a study one after the other, in this process."""
+    from in_turn import do_in_turn
+
     monkeypatch.setattr("innerattn.studies.launch.local.run_side_by_side", do_in_turn)
 
 
 @pytest.fixture(scope="session")
 def finished_study(tmp_path_factory: pytest.TempPathFactory, small: dict[str, object]) -> Path:
     """Folder of two finished runs, td-inner and td-uniform, seed 0; not to be changed."""
+    from small_study import begin_small
+
+    from innerattn.studies.work import work
 
     def make(folder: Path) -> None:
         study = begin_small("paper", folder, ("td-inner", "td-uniform"), 1, small)
@@ -148,6 +166,11 @@ def study(tmp_path: Path, finished_study: Path) -> Path:
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> list[FinishedRun]:
     """Three runs with and two without inner attention, and one of another situation."""
+    from made_run import made_run
+
+    from innerattn.experiments.plan import Case
+    from innerattn.experiments.run import read_run
+
     cases = [
         *(Case("mixed", "td-inner", seed) for seed in (2, 0, 1)),
         *(Case("mixed", "td-uniform", seed) for seed in (0, 1)),
@@ -165,6 +188,12 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[FinishedRun]:
 @pytest.fixture(scope="session")
 def crossed_study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[FinishedRun]]:
     """Runs of all arms in mixed, two of each, in a study's folder; not to be changed."""
+    from made_run import made_run
+
+    from innerattn.experiments.crossed.arms import ARMS
+    from innerattn.experiments.plan import Case
+    from innerattn.experiments.run import read_run
+
     cases = [Case("mixed", arm.method, seed, arm.variant) for seed in range(2) for arm in ARMS]
 
     def folder_of(out: Path, case: Case) -> Path:

@@ -154,6 +154,7 @@ def test_pages_show_what_is_made_of_the_archive(
     assert [f"## {name}".startswith(NEEDS_STEPS) for name in by_heading] == [True, True]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", PAGES)
 def test_linked_tables_are_those_of_the_archive(name: str, made: dict[str, Path]) -> None:
     linked = re.findall(rf"\(tables/{name}/([^)]+)\)", page(name))
@@ -209,6 +210,7 @@ def test_the_answer_about_seeds_is_what_was_measured() -> None:
         assert f"{correlation} in {situation}" in answer
 
 
+@pytest.mark.long
 def test_the_table_of_learning_is_made_of_the_same_runs(tmp_path: Path) -> None:
     study = make(["learning", "--budget", "short"], RECORDS / "reproduction.parquet", tmp_path)
     text = (study / "report.md").read_text("utf-8")

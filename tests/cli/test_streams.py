@@ -59,7 +59,10 @@ def test_a_training_goes_on_without_its_streams(
         assert file.is_dir() or b"env-steps/s" not in file.read_bytes()
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&- <&-"])
+@pytest.mark.parametrize(
+    "closed",
+    [">&- 2>&- <&-", *(pytest.param(one, marks=pytest.mark.slow) for one in (">&-", "2>&-"))],
+)
 def test_other_commands_end_as_with_them(closed: str, tmp_path: Path) -> None:
     assert run(START_EACH, [json.dumps(list(OTHERS))], closed, tmp_path) == 0
     codes = json.loads((tmp_path / "codes.json").read_text())

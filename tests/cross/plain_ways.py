@@ -32,10 +32,19 @@ def is_clear(
     solids: list[tuple[Obstacle, Array]], radius: float, half: float, a: Array, b: Array
 ) -> bool:
     """Whether a disc that drives straight from a to b touches nothing."""
-    along = np.linspace(a, b, max(2, int(np.linalg.norm(b - a) / (0.1 * radius))))
-    if np.abs(along).max() > half - radius + _LITTLE:
-        return False
-    return all((distance(solid, along - at) >= radius - _LITTLE).all() for solid, at in solids)
+    return bool(are_clear(solids, radius, half, a, b[None])[0])
+
+
+def are_clear(
+    solids: list[tuple[Obstacle, Array]], radius: float, half: float, a: Array, ends: Array
+) -> NDArray[np.bool_]:
+    """Whether a disc touches nothing that drives straight from a to each of some ends (n, 2)."""
+    longest = np.linalg.norm(ends - a, axis=1).max()
+    along = np.linspace(np.broadcast_to(a, ends.shape), ends, max(2, int(longest / (0.1 * radius))))
+    clear = (np.abs(along) <= half - radius + _LITTLE).all(axis=(0, 2))
+    for solid, at in solids:
+        clear &= (distance(solid, along - at) >= radius - _LITTLE).all(axis=0)
+    return np.asarray(clear)
 
 
 def rim(solid: Obstacle, at: Array, radius: float) -> list[Array]:
@@ -61,10 +70,11 @@ def shortest(
     solids: list[tuple[Obstacle, Array]], radius: float, half: float, a: Array, b: Array
 ) -> float:
     """Length of the shortest way of a disc from a to b [m]; infinite if there is none."""
-    places = [a, b, *(place for solid, at in solids for place in rim(solid, at, radius))]
+    rims = (place for solid, at in solids for place in rim(solid, at, radius))
+    places = np.array([a, b, *rims])
     lengths = np.zeros((len(places), len(places)))
-    for i, one in enumerate(places):
-        for j in range(i):
-            if is_clear(solids, radius, half, one, places[j]):
-                lengths[i, j] = np.linalg.norm(one - places[j])
+    for i, one in enumerate(places[1:], 1):
+        before = places[:i]
+        clear = are_clear(solids, radius, half, one, before)
+        lengths[i, :i] = clear * np.linalg.norm(one - before, axis=1)
     return float(dijkstra(lengths, directed=False, indices=0)[1])

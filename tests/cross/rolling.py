@@ -26,6 +26,11 @@ def roll(plain: Stepper, state: State, drive: Array) -> tuple[Array, Array, Arra
     ways, turned, rates = [], [], []
     for index, robot in enumerate(robots):
         heading, rate = state.headings[:, index], state.turn_rates[:, index]
+        if not plain.rolls[index]:  # has no wheels
+            ways.append(state.velocities[:, index])
+            turned.append(heading)
+            rates.append(rate)
+            continue
         before = _arc(heading - rate * dt + bias[:, index], rate, dt)
         length = np.maximum(np.abs(before), 1e-12)
         moved = state.velocities[:, index] @ np.array([1, 1j])
@@ -38,7 +43,7 @@ def roll(plain: Stepper, state: State, drive: Array) -> tuple[Array, Array, Arra
             speed = _between(_between(top * ahead, speed - gain, speed + gain), -most, most)
             change = robot.turn_acceleration_rad_s2 * dt
             rate = _between(robot.max_turn_rad_s * left, rate - change, rate + change)
-        elif robot.drive == "differential":
+        else:
             base = 2 * robot.radius_m if robot.wheel_base_m is None else robot.wheel_base_m
             wheels = []
             for side in (-1, 1):

@@ -33,12 +33,12 @@ CHUNKS = 8
 LEAST = 104_000
 """Transitions of all chunks together."""
 PARTS = [
-    *(0, 1),
-    *(pytest.param(n, marks=pytest.mark.long) for n in (2, 3)),
+    0,
+    *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2, 3)),
     *(pytest.param(n, marks=pytest.mark.slow) for n in range(4, CHUNKS)),
 ]
 THIRDS = [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))]
-"""Chunks of 12,000 transitions; two of three are for `make test-slow`."""
+"""Chunks of 8,000 transitions; two of three are for `make test-slow`."""
 
 
 def in_boxes(scenario: Scenario) -> Scenario:
@@ -66,7 +66,8 @@ def state_of(env: BatchEnv) -> State:
 
 
 def assert_close(found: np.ndarray, wanted: np.ndarray, what: str, scale: float = 1.0) -> None:
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=EXACT * scale, err_msg=what)
+    if not (abs(found - wanted) <= EXACT * scale).all():  # quicker than what words it
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=EXACT * scale, err_msg=what)
 
 
 def random_actions(rng: np.random.Generator, scenario: Scenario, state: State) -> np.ndarray:
@@ -125,7 +126,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
     given = env.victims()["present"].sum(1)
     if scenario.has_arrivals:
         start = env.victims()
-        check_arrivals(env, start, np.zeros(start.shape, bool), np.zeros(num_envs, int))
+        check_arrivals(plain, env, start, np.zeros(start.shape, bool), np.zeros(num_envs, int))
     rescued = np.zeros(num_envs, dtype=int)
     for _ in range(-(-transitions // num_envs)):
         if faulty:
@@ -183,7 +184,7 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
             rescued[world] += 1
         assert (env.step_counts() == steps + 1).all()
         seen["turned away"] += int(env.turned_away().sum())
-        seen["appeared"] += check_victims(env, before, after, gone, given)
+        seen["appeared"] += check_victims(plain, env, before, after, gone, given)
         given = np.maximum(given, after.victims["id"].max(1) + 1)
         if plain.service.any():
             stays = before.present & ~gone & ~unsure[:, None]
@@ -292,7 +293,7 @@ def test_worlds_without_contacts_are_as_the_plain_stepper_says(chunk: int) -> No
 def compare_some(
     rng: np.random.Generator,
     changed: Callable[[Scenario], Scenario],
-    transitions: int = 12_000,
+    transitions: int = 8_000,
 ) -> Counter[str]:
     """Transitions of random scenarios, each ``changed``; counts what was seen."""
     total: Counter[str] = Counter()
@@ -403,8 +404,8 @@ def test_worlds_that_end_when_all_is_done_are_as_the_plain_stepper_says(chunk: i
         return scenario.replace(arrivals=arrivals, end_when_done=True, episode_steps=60)
 
     total = compare_some(rng, changed)
-    for what in ("rescues", "appeared", "lost", "done"):
-        assert total[what] > 50, (what, total)
+    for what, least in (("rescues", 50), ("appeared", 50), ("lost", 50), ("done", 20)):
+        assert total[what] > least, (what, total)
 
 
 @pytest.mark.parametrize("chunk", THIRDS)

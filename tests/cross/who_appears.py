@@ -11,7 +11,12 @@ EXACT = 1e-6
 
 
 def check_victims(
-    env: BatchEnv, before: State, after: State, gone: np.ndarray, given: np.ndarray
+    plain: Stepper,
+    env: BatchEnv,
+    before: State,
+    after: State,
+    gone: np.ndarray,
+    given: np.ndarray,
 ) -> int:
     """Checks who is there after a step in which the victims of `gone` (E, V) were rescued or lost.
 
@@ -27,7 +32,7 @@ def check_victims(
     assert (new["present"][~empty] == stays[~empty]).all()
     fresh = new["present"] & ~stays
     if scenario.has_arrivals:
-        check_arrivals(env, new, stays, env.turned_away())
+        check_arrivals(plain, env, new, stays, env.turned_away())
     elif scenario.situation == "mixed":
         size = new["present"][empty].sum(1)
         assert (size >= 1).all()
@@ -45,7 +50,6 @@ def check_victims(
     ids = ids[np.lexsort((ids, envs))] if scenario.arrivals else ids
     assert (ids == given[envs] + order).all()
     if scenario.has_deadlines:
-        plain = Stepper(scenario)
         for victim in new[fresh]:
             waits = int(victim["deadline_step"] - victim["appeared_step"])
             low, high = plain.deadline_range(victim["task"]) or (0, 0)
@@ -53,33 +57,37 @@ def check_victims(
     at = after.places[fresh]
     assert (abs(at) <= scenario.arena_half_width_m - scenario.wall_clearance_m + EXACT).all()
     apart = np.linalg.norm(after.positions[envs] - at[:, None], axis=-1)
-    apart = np.where(Stepper(scenario).there(before)[envs], apart, np.inf)
+    apart = np.where(plain.there(before)[envs], apart, np.inf)
     assert (apart >= scenario.spawn_clearance_m - EXACT).all() or scenario.arrivals
     return int(fresh.sum())
 
 
 def check_arrivals(
-    env: BatchEnv, victims: np.ndarray, stays: np.ndarray, turned_away: np.ndarray
+    plain: Stepper,
+    env: BatchEnv,
+    victims: np.ndarray,
+    stays: np.ndarray,
+    turned_away: np.ndarray,
 ) -> None:
     """Checks the slots (E, V) of those that arrived, and how many (E,) found none."""
-    scenario, plain_world = env.scenario, Stepper(env.scenario)
+    scenario = env.scenario
     there, full = victims["present"], np.zeros(len(victims), dtype=bool)
     without = np.zeros(len(victims), dtype=int)
-    for task, plain in enumerate(scenario.tasks):
+    for task, of_task in enumerate(scenario.tasks):
         own = slice(task * scenario.max_victims, (task + 1) * scenario.max_victims)
         assert (victims["task"][:, own][there[:, own]] == task).all()
-        listed = any(one.task == plain.name for one in scenario.arrivals)
-        full |= there[:, own].all(1) & (plain.arrival_rate_hz > 0 or listed)
+        listed = any(one.task == of_task.name for one in scenario.arrivals)
+        full |= there[:, own].all(1) & (of_task.arrival_rate_hz > 0 or listed)
         fresh = there[:, own] & ~stays[:, own]
-        assert not fresh.any() or plain.arrival_rate_hz > 0 or listed
+        assert not fresh.any() or of_task.arrival_rate_hz > 0 or listed
         # They take the first of the empty slots.
         empty = np.cumsum(~stays[:, own], axis=1) * ~stays[:, own]
         assert (fresh == ((empty > 0) & (empty <= fresh.sum(1)[:, None]))).all()
         for world, step in enumerate(env.step_counts() if listed else ()):
-            due, new = plain_world.due(task, step), victims[world, own][fresh[world]]
+            due, new = plain.due(task, step), victims[world, own][fresh[world]]
             assert len(new) == min(len(due), int((empty[world] > 0).sum()))
             places = np.stack([new["x"], new["y"]], -1)
-            np.testing.assert_array_equal(places, np.reshape(due, (-1, 2))[: len(new)].astype("f4"))
+            assert (places == np.reshape(due, (-1, 2))[: len(new)].astype("f4")).all()
             without[world] += len(due) - len(new)
     assert full[turned_away > 0].all()
     assert scenario.situation != "listed" or (turned_away == without).all()

@@ -166,7 +166,7 @@ def test_a_world_of_the_set_is_the_one_that_is_drawn(name: str, publish: ModuleT
     pytest.fail(f"{name}: is not drawn")
 
 
-@pytest.mark.parametrize("robots", [2, 8, 16])
+@pytest.mark.parametrize("robots", [2, 8, pytest.param(16, marks=pytest.mark.long)])
 def test_references_are_what_their_scripts_reach(robots: int) -> None:
     chosen = [one for one in standard() if one.name.endswith(f"_{robots}_1")]
     assert len(chosen) == 10

@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -138,21 +139,21 @@ def test_a_line_of_metrics_has_a_length(run_dir: Path, tmp_path: Path) -> None:
 
 
 SEGMENT = {"first": 0, "count": 1, "sha256": "0" * 64}
-CHECKPOINTS: dict[str, tuple[dict[str, object], str]] = {
-    "segments": ({"rows": {"replay": {"seen": 1, "segments": [SEGMENT] * 49_000}}}, ""),
+CHECKPOINTS: dict[str, tuple[Callable[[], dict[str, object]], str]] = {
+    "segments": (lambda: {"rows": {"replay": {"seen": 1, "segments": [SEGMENT] * 49_000}}}, ""),
     "bad segments": (
-        {"rows": {"replay": {"seen": 1, "segments": [{"a": 1}] * 49_000}}},
+        lambda: {"rows": {"replay": {"seen": 1, "segments": [{"a": 1}] * 49_000}}},
         "rows.replay.segments.0.first: Field required",
     ),
     "memories": (
-        {"rows": {f"r{n}": {"seen": 1, "segments": [SEGMENT]} for n in range(50_000)}},
+        lambda: {"rows": {f"r{n}": {"seen": 1, "segments": [SEGMENT]} for n in range(50_000)}},
         "50,000 keys in one place: must be at most 1,000",
     ),
     "metrics": (
-        {"counters": {"step_metrics": {f"m{n}": "a" for n in range(300_000)}}},
+        lambda: {"counters": {"step_metrics": {f"m{n}": "a" for n in range(300_000)}}},
         "300,000 keys in one place",
     ),
-    "unknown": ({f"k{n}": 1 for n in range(300_000)}, "keys in one place"),
+    "unknown": (lambda: {f"k{n}": 1 for n in range(300_000)}, "keys in one place"),
 }
 
 
@@ -162,7 +163,7 @@ def test_checkpoints_at_their_limits_take_their_share(what: str) -> None:
     changed, message = CHECKPOINTS[what]
     zeros = {f"{name}_sha256": "0" * 64 for name in ("config", "weights", "state", "metrics")}
     document = {"schema_version": 1, "counters": {}, "rows": {}, "metrics_bytes": 0, **zeros}
-    document |= changed
+    document |= changed()
     text = json.dumps(document, sort_keys=True)
     document["sha256"] = hashlib.sha256(text.encode()).hexdigest()
     data = json.dumps(document).encode()

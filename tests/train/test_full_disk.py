@@ -31,7 +31,7 @@ OFTEN = {
 FULL_AT, FREE_AT, SAVED_BEFORE = 240, 480, 216
 """Env-steps; a checkpoint follows on the report of its env-step, so that of 240 fails."""
 OFFSETS = 50
-SHORT = (0, 10, 20, 30, 40, 49)
+SHORT = (0, 20, 40, 49)
 MOUNT_REQUIRED = "INNERATTN_MOUNT_REQUIRED"
 """Environment variable that makes a file system that cannot be mounted a failure."""
 

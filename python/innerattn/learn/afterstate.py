@@ -135,7 +135,12 @@ class AfterstateCritic:
 
 
 def _minibatches(order: Tensor, size: int) -> tuple[Tensor, ...]:
-    """Parts of this worker's rows, as many for every worker: an exchange needs all of them."""
+    """Parts of this worker's rows, as many for every worker: an exchange needs all of them.
+
+    With one worker the last part may be short, and a row in it weighs more than the others; orders
+    are drawn anew for each pass, so each row is as likely to be there. Published runs are fitted
+    in such parts.
+    """
     if workers.count() == 1:
         return torch.split(order, size)
     rows = int(workers.total(torch.tensor(len(order))))

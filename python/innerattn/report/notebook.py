@@ -103,7 +103,7 @@ def _picture(env: BatchEnv, title: str) -> str:
 
 def _replay(record: Record, name: str) -> str:
     page = replay_page([_first_episodes(record)], [name])
-    style = "width:100%;height:900px;border:0"
+    style = "width:100%;height:900px;max-height:88svh;border:0"
     return f'<iframe title="Replay" style="{style}" srcdoc="{escape(page, quote=True)}"></iframe>'
 
 

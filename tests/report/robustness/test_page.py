@@ -82,7 +82,8 @@ def test_tables_of_a_situation(place: int, whole: Robustness) -> None:
     ]
 
 
-def test_training_and_teams(whole: Robustness) -> None:
+def test_training_and_teams() -> None:
+    whole = made("training", "teams")
     text = robustness_page(whole, "short", ["faults of mixed-s9: not measured"])
     assert "- faults of mixed-s9: not measured\n" in text
     training = whole.training

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from browser import PHONE, WIDE, opened_browser, until, visit
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, Page
 
 from innerattn.experiments.paper.fig5 import evidence
 from innerattn.experiments.run import FinishedRun
@@ -46,12 +46,35 @@ def test_the_replay_fits_its_frame_and_dark_is_for_the_whole_page(
         replay = seen.page.frame_locator("iframe")
         replay.get_by_role("button", name="Next event").click()
         replay.locator("#theme").wait_for(state="hidden")
-        until(seen.page, f"{FRAME}.clientHeight >= {INSIDE}.offsetHeight")
-        assert seen.page.evaluate(f"{INSIDE}.scrollHeight <= {INSIDE}.clientHeight")
-        assert seen.page.evaluate(f"{FRAME}.clientHeight - {INSIDE}.offsetHeight") < 5
+        if size == WIDE:
+            until(seen.page, f"{FRAME}.clientHeight >= {INSIDE}.offsetHeight")
+            assert seen.page.evaluate(f"{INSIDE}.scrollHeight <= {INSIDE}.clientHeight")
+            assert seen.page.evaluate(f"{FRAME}.clientHeight - {INSIDE}.offsetHeight") < 5
+        else:
+            play_stays_in_sight(seen.page)
+        assert seen.page.evaluate(f"{INSIDE}.scrollWidth <= {INSIDE}.clientWidth")
         button = seen.page.get_by_role("button", name="Dark")
         for now, pressed in (("dark", "true"), ("light", "false")):
             button.click()
             assert button.get_attribute("aria-pressed") == pressed
             assert seen.page.evaluate("document.documentElement.dataset.theme") == now
             until(seen.page, f"{INSIDE}.dataset.theme === '{now}'")
+
+
+def play_stays_in_sight(page: Page) -> None:
+    """Scrolls the replay in its frame, which is lower than the screen, from end to end."""
+    assert page.evaluate(f"{FRAME}.offsetHeight") <= 0.88 * PHONE[1] + 1
+    page.evaluate(f"{FRAME}.scrollIntoView({{ block: 'center' }})")
+    play = page.frame_locator("iframe").get_by_role("button", name="Play")
+    end = page.evaluate(f"{INSIDE}.scrollHeight")
+    assert end > 2 * PHONE[1]
+    for place in range(0, end, 400):
+        page.evaluate(f"{FRAME}.contentWindow.scrollTo(0, {place})")
+        box = play.bounding_box()
+        assert box is not None
+        assert 0 <= box["y"] < PHONE[1] - 40
+    page.evaluate(f"{FRAME}.contentWindow.scrollTo(0, 0)")
+    before = page.evaluate("scrollY")
+    page.mouse.move(PHONE[0] / 2, PHONE[1] / 2)
+    page.mouse.wheel(0, -300)  # from its top on, the page around it scrolls
+    until(page, f"scrollY < {before}")

@@ -204,7 +204,7 @@ def test_what_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     def fail(*_: object) -> None:
         raise ExportError("differs")
 
-    monkeypatch.setattr("innerattn.train.export.write.onnx_bytes", fail)
+    monkeypatch.setattr("innerattn.train.export.write.onnx_files", fail)
     with pytest.raises(ExportError, match="differs"):
         export_run(run, tmp_path / "export")
     assert [path.name for path in tmp_path.iterdir()] == ["run"]

@@ -1,4 +1,4 @@
-// Light or dark, for a page and the pages in its frames; a frame becomes as high as its page.
+// Light or dark, for a page and the pages in its frames; a frame becomes as high as its page, or as styles allow.
 
 /** Begins with what the system prefers; `changed` draws anew what does not follow by itself. */
 function startTheme(changed = () => {}) {

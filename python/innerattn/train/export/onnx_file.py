@@ -1,10 +1,10 @@
-"""One actor as the bytes of an ONNX file; nothing of the machine that made it is in there."""
+"""Actors as the bytes of ONNX files; nothing of the machine that made it is in there."""
 
 from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -14,28 +14,41 @@ from innerattn.policies.exported.backend import INPUT, MARK
 from innerattn.train.export.actors import OnnxForm
 
 
-def onnx_bytes(form: OnnxForm, width: int, mark: str) -> bytes:
-    """The ONNX file of one actor, for any number of observations at once.
+def onnx_files(
+    forms: Mapping[str, OnnxForm], width: int, marks: Mapping[str, str]
+) -> dict[str, bytes]:
+    """The ONNX files of actors by name, each for any number of observations at once.
 
     Args:
-        form: the actor.
+        forms: the actors, which differ in their weights alone: their graph is made once.
         width: D.
-        mark: what the file says of itself, as of `innerattn.policies.exported.backend.onnx_mark`.
+        marks: what each file says of itself, as of `innerattn.policies.exported.backend.onnx_mark`.
     """
-    rows = torch.zeros(2, width)
+    first, *_ = forms.values()
+    files = {}
     with _quiet():
         program = torch.onnx.export(
-            form.eval(),
-            (rows,),
+            first.eval(),
+            (torch.zeros(2, width),),
             dynamo=True,
             external_data=False,
             input_names=[INPUT],
-            output_names=[*form.names],
+            output_names=[*first.names],
             dynamic_shapes=({0: torch.export.Dim("batch", min=1)},),
             verbose=False,
+            optimize=False,  # that computes with weights, and is done for those of each
         )
-    assert program is not None  # as no file was asked for
-    model = program.model_proto
+        assert program is not None  # as no file was asked for
+        graph = program.model
+        for name, form in forms.items():
+            program.model = graph.clone()
+            program.apply_weights(form.state_dict())
+            program.optimize()
+            files[name] = _bytes_of(program.model_proto, marks[name])
+    return files
+
+
+def _bytes_of(model: Any, mark: str) -> bytes:
     _forget(model)
     entry = model.metadata_props.add()
     entry.key, entry.value = MARK, mark

@@ -32,7 +32,7 @@ from innerattn.train.columns import entity_columns
 from innerattn.train.export.actors import OnnxForm, OnnxVectorForm, inner_actor, team_actors
 from innerattn.train.export.check import check_export
 from innerattn.train.export.document import PUSHES, contract_document, network_of
-from innerattn.train.export.onnx_file import onnx_bytes
+from innerattn.train.export.onnx_file import onnx_files
 from innerattn.train.policy import load_newest
 from innerattn.train.weights import write_weights
 
@@ -122,9 +122,10 @@ def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: 
     pushes = None if continuous else PUSHES
     frame = None if network.frame is None else Frame(network.frame, len(names), pushes)
     scenario_sha256 = digest_of(config.scenario.model_dump(mode="json"))
-    for name, one in team.actors.items():
-        mark = onnx_mark(weights_sha256, scenario_sha256, name)
-        write_whole(out / files[name], onnx_bytes(form(one, frame), len(names), mark))
+    forms = {name: form(one, frame) for name, one in team.actors.items()}
+    marks = {name: onnx_mark(weights_sha256, scenario_sha256, name) for name in forms}
+    for name, data in onnx_files(forms, len(names), marks).items():
+        write_whole(out / files[name], data)
     document = contract_document(
         config,
         names,
