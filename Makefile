@@ -71,7 +71,7 @@ soak: setup ## 10^8 env-steps with each engine and an hour of training: memory, 
 	python benches/soak.py
 
 lint: setup ## formatting, lints, types, stub, import floors
-	$(MAKE) --jobs 2 --output-sync lint-rust lint-python
+	@$(MAKE) --no-print-directory --jobs 2 lint-rust lint-python
 
 lint-rust: setup
 	cargo fmt --check
