@@ -64,7 +64,7 @@ def test_the_state_has_what_robots_hear_and_measure() -> None:
 
 
 def test_a_robot_put_beside_a_wall_measures_it(browser: Browser) -> None:
-    with played(scripted_world(sensing())) as server, visit(browser, server.url) as seen:
+    with played(scripted_world(sensing())) as server, visit(browser, server.address) as seen:
         page = seen.page
         ready(page)
         page.evaluate("play.setLook({ robot: 0, hearing: 'all' })")
@@ -86,6 +86,6 @@ def test_a_robot_put_beside_a_wall_measures_it(browser: Browser) -> None:
 
 
 def test_no_switch_without_such_senses(browser: Browser) -> None:
-    with played(scripted_world()) as server, visit(browser, server.url) as seen:
+    with played(scripted_world()) as server, visit(browser, server.address) as seen:
         ready(seen.page)
         assert seen.page.locator("#senses").is_hidden()

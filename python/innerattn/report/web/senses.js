@@ -14,7 +14,7 @@ function fillSenses(box, run, look, change) {
   box.replaceChildren();
   if (run.heard) {
     const select = element("select", { id: "hearing" });
-    const texts = [["none", "hidden"], ["own", "of the chosen robot"], ["all", "of all robots"]];
+    const texts = [["none", "hidden"], ["own", "chosen robot"], ["all", "all robots"]];
     fillSelect(select, texts, look.hearing);
     select.addEventListener("change", () => change({ hearing: select.value }));
     box.append(element("label", { class: "inline" }, "Who hears whom ", select));
