@@ -143,7 +143,9 @@ def test_without_attention_none_is_recorded_or_reported(tmp_path: Path) -> None:
     assert summary["attention_entropy"] == summary["attention_entropy_share"] == {}
     recorded = read_records(tmp_path / "evaluation")[0]
     assert list(recorded.steps) == [
-        name for name in FIELDS if name not in ("headings", "charge", "load", "attention")
+        name
+        for name in FIELDS
+        if name not in ("headings", "charge", "load", "heard", "rays", "attention")
     ]
 
 

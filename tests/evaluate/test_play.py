@@ -41,7 +41,9 @@ def test_record_against_a_plain_loop() -> None:
     scenario = Scenario.preset("double").replace(episode_steps=12)
     record = record_of("hungarian", scenario, 6, record=FIELDS)
     assert list(record.steps) == [
-        name for name in FIELDS if name not in ("headings", "charge", "load", "attention")
+        name
+        for name in FIELDS
+        if name not in ("headings", "charge", "load", "heard", "rays", "attention")
     ]
     policy = scripted_policy("hungarian", scenario)
     env = BatchEnv(scenario, 6, seed=SEED, copy=True)

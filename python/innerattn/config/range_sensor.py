@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 from pydantic import Field
@@ -24,3 +25,12 @@ class RangeSensor(Model):
     layers: Annotated[tuple[str, ...] | None, Told(1, 64)] = Field(
         None, description="layers whose robots and obstacles the rays meet; None: the robot's own"
     )
+
+    def angles_rad(self) -> list[float]:
+        """Angle of each ray from straight ahead, counterclockwise."""
+        field = math.radians(self.field_of_view_deg)
+        if self.field_of_view_deg >= 360.0:
+            return [field * ray / self.rays for ray in range(self.rays)]
+        if self.rays == 1:
+            return [0.0]
+        return [field * (ray / (self.rays - 1) - 0.5) for ray in range(self.rays)]

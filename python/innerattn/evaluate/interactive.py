@@ -12,6 +12,7 @@ from innerattn import _core
 from innerattn.config import Scenario
 from innerattn.config.streams import stream_seed
 from innerattn.envs import BatchEnv
+from innerattn.envs.senses import ray_columns
 from innerattn.evaluate.moment import Handoff, Loss, Moment, Rescue
 from innerattn.evaluate.play import Attentive
 from innerattn.measures.moments import blocked_between
@@ -60,6 +61,7 @@ class InteractiveWorld:
         self.policies = dict(policies)
         self._seed = stream_seed(seed, "evaluation")
         self._env = BatchEnv(scenario, 1, self._seed, num_threads=1)
+        self._rays = ray_columns(self._env)
         self._policy = next(iter(self.policies))
         self._steered: int | None = None
         self._drive = (0.0, 0.0)
@@ -84,6 +86,8 @@ class InteractiveWorld:
             headings=None if (headings := pointing(env)) is None else headings[0],
             charge=env.charge()[0] if env.scenario.has_batteries else None,
             load=env.load()[0] if env.scenario.has_loads else None,
+            heard=env.heard()[0] if env.scenario.limits_communication else None,
+            rays=self._obs[0][:, self._rays] if self._rays else None,
             obstacles=env.obstacles()[0],
             blocked=self._blocked,
             attention=self._attention,

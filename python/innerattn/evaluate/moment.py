@@ -52,6 +52,8 @@ class Moment:
         headings: (R, 2) float32, angles [rad] and turn rates [rad/s]; none: no robot has any.
         charge: (R,) float32, shares of batteries; none: no robot has one.
         load: (R,) float32, shares of full loads; none: no robot has one.
+        heard: (R, R) bool, robot i hears robot j; none: nothing limits communication.
+        rays: (R, K) float32, readings of range sensors, 1 - distance / range; none: there is none.
         obstacles: (O, 2) float32 [m].
         blocked: (R,) bool, whether something stopped the robot in the last step.
         attention: (H, R, R) float32 for the actions that come next; none: there is none.
@@ -73,6 +75,8 @@ class Moment:
     headings: NDArray[np.float32] | None
     charge: NDArray[np.float32] | None
     load: NDArray[np.float32] | None
+    heard: NDArray[np.bool_] | None
+    rays: NDArray[np.float32] | None
     obstacles: NDArray[np.float32]
     blocked: NDArray[np.bool_]
     attention: NDArray[np.float32] | None

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from innerattn.config import Scenario
 from innerattn.config.streams import Purpose, stream_seed
 from innerattn.envs import BatchEnv
+from innerattn.envs.senses import ray_columns
 from innerattn.policies import Policy, PolicyInput, RememberingPolicy, WorldState
 from innerattn.records.record import FIELDS, LOST_DTYPE, Record, joined, rescue_dtype
 
@@ -51,7 +52,8 @@ def run_episodes(
         seed: seed of the worlds, 0 to 2**63 - 1; with ``first_episode`` it fixes the starts.
         first_episode: number of the first episode.
         record: which of `FIELDS` to keep for every step; attention is kept only if the policy has
-            it, and headings, charge and load only if some robots have such.
+            it, headings, charge, load and rays only if some robots have such, and heard only if
+            something limits communication.
         num_threads: threads that step the worlds; none: all cores.
         progress: called with the number of episodes each time some are done.
         purpose: "training" for the random streams that a training with this seed has; those of
@@ -104,6 +106,7 @@ def _run_batch(
     steps: dict[str, NDArray[Any]] = {}
     rescues, lost = [], []
     turned_away = np.zeros(env.num_envs, np.int64) if env.scenario.has_arrivals else None
+    rays = ray_columns(env)
     state_needed = policy.needs_true_state or not set(record).isdisjoint(WorldState._fields)
     for step_index in range(total_steps):
         state = WorldState.of(env) if state_needed else None
@@ -112,6 +115,10 @@ def _run_batch(
         seen: dict[str, NDArray[Any]] = {"obs": obs, "actions": actions}
         known = {} if state is None else state._asdict()
         seen |= {name: values for name, values in known.items() if values is not None}
+        if "heard" in record and env.scenario.limits_communication:
+            seen["heard"] = env.heard()
+        if "rays" in record and rays:
+            seen["rays"] = obs[..., rays]
         if "attention" in record and isinstance(policy, Attentive):
             weights = policy.attention(view, actions)
             seen |= {} if weights is None else {"attention": weights}

@@ -14,7 +14,7 @@ from innerattn.shown import Shown
 
 FIELDS = (
     *("obs", "actions", "rewards", "positions", "velocities", "victims", "faults"),
-    *("headings", "charge", "load", "attention"),
+    *("headings", "charge", "load", "heard", "rays", "attention"),
 )
 """What can be recorded step by step."""
 
@@ -55,7 +55,9 @@ class Record(Shown):
             float32, rewards (R, C) float32, positions and velocities (R, 2) float32, victims (V,)
             structured, faults (R,) structured, headings (R, 2) float32 (angles [rad] and turn rates
             [rad/s]), where some robots have a heading, charge and load (R,) float32, where some
-            have a battery and a load, attention (H, R, R) float32.
+            have a battery and a load, heard (R, R) bool (robot i hears robot j), where something
+            limits communication, rays (R, K) float32 (1 - distance / range_m; 0: nothing is met, or
+            the robot has fewer rays), where some have a range sensor, attention (H, R, R) float32.
     """
 
     policy: str

@@ -82,9 +82,27 @@ def refuse_impossible(record: Record) -> None:
         for part in [values[field] for field in values.dtype.names or ()] or [values]:
             if not np.isfinite(part).all():
                 raise ValueError(f"{name}: must be finite")
+    _refuse_impossible_senses(record)
     for name, values, low, high in _ranges(record):
         if values.size and not (low <= values.min() and values.max() <= high):
             raise ValueError(f"{name}: must be in {low:g}..={high:g}")
+
+
+def _refuse_impossible_senses(record: Record) -> None:
+    scenario, steps = record.scenario, record.steps
+    robots = scenario.num_robots
+    for name, there, size in (
+        ("heard", scenario.limits_communication, robots),
+        ("rays", scenario.max_rays > 0, scenario.max_rays),
+    ):
+        if name not in steps:
+            continue
+        if not there:
+            raise ValueError(f"{name}: must not be recorded in a scenario without it")
+        if steps[name].shape[2:] != (robots, size):
+            raise ValueError(f"{name}: must have shape (..., {robots}, {size})")
+    if "heard" in steps and steps["heard"][..., range(robots), range(robots)].any():
+        raise ValueError("heard: no robot hears itself")
 
 
 def _ranges(record: Record) -> Iterator[tuple[str, NDArray[Any], float, float]]:
@@ -105,7 +123,7 @@ def _ranges(record: Record) -> Iterator[tuple[str, NDArray[Any], float, float]]:
     if "headings" in steps:
         yield "heading", steps["headings"][..., 0], -_HALF_CIRCLE, _HALF_CIRCLE
         yield "turn rate", steps["headings"][..., 1], -_MOST_TURN, _MOST_TURN
-    for name in ("charge", "load"):
+    for name in ("charge", "load", "heard", "rays"):
         if name in steps:
             yield name, steps[name], 0.0, 1.0
     if "actions" in steps:

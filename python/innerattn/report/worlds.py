@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from innerattn import _core
 from innerattn.config import Map, Scenario
+from innerattn.config.scenario import Robot
 
 
 def worlds_document(scenario: Scenario) -> dict[str, Any]:
@@ -20,6 +22,7 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
         "has_order": scenario.has_order,
         "robots_leave": scenario.robots_leave,
         "layers": scenario.layers,
+        "limits_communication": scenario.limits_communication,
         "tasks": [
             {"name": task.name, "needs": list(task.needs), "amounts": task.sums}
             for task in scenario.tasks
@@ -36,6 +39,7 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
                 "layer": robot.layer,
                 "has_wheels": robot.has_wheels,
             }
+            | _senses(robot)
             for robot in scenario.robots
         ],
         "fault_kinds": [
@@ -58,6 +62,20 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
         ],
         "map": None if scenario.map is None else _map(scenario, scenario.map),
     }
+
+
+def _senses(robot: Robot) -> dict[str, Any]:
+    """The range sensor and the limits of sight of a robot that has such."""
+    found: dict[str, Any] = {}
+    if robot.range_sensor is not None:
+        sensor = robot.range_sensor
+        found["range_sensor"] = {"range_m": sensor.range_m, "angles_rad": sensor.angles_rad()}
+    if robot.has_limited_sight:
+        found["sight"] = {
+            "range_m": robot.sight_m,
+            "field_of_view_rad": math.radians(robot.field_of_view_deg),
+        }
+    return found
 
 
 def _map(scenario: Scenario, found: Map) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from innerattn.report.local_server import Answer
 _WEB = files("innerattn.report.play") / "web"
 _SHARED = (
     *("dom.js", "theme.js", "worlds.js", "story.js", "ground.js", "room.js"),
-    *("scene.js", "marks.js", "charts.js", "panel.js"),
+    *("senses.js", "scene.js", "marks.js", "charts.js", "panel.js"),
 )
 _SCRIPTS = ("live.js", "link.js", "hands.js", "forms.js", "app.js")
 

@@ -45,6 +45,8 @@ def state_document(moment: Moment) -> dict[str, Any]:
         "headings": None if moment.headings is None else _rounded(moment.headings[:, :1]),
         "charge": None if moment.charge is None else np.round(moment.charge, _DECIMALS).tolist(),
         "load": None if moment.load is None else np.round(moment.load, _DECIMALS).tolist(),
+        "heard": None if moment.heard is None else moment.heard.astype(int).tolist(),
+        "rays": None if moment.rays is None else _readings(moment.rays),
         "victims": [
             {"slot": slot, "id": int(one["id"]), "task": int(one["task"])}
             | _times(one)
@@ -64,6 +66,12 @@ def state_document(moment: Moment) -> dict[str, Any]:
 
 def _rounded(values: NDArray[np.float32]) -> list[list[float]]:
     return np.round(values.astype(np.float64), _DECIMALS).tolist()  # type: ignore[no-any-return]
+
+
+def _readings(rays: NDArray[np.float32]) -> list[list[float]]:
+    """Readings of range sensors, rounded up: only a ray that meets nothing is 0."""
+    up = np.ceil(rays.astype(np.float64) * 10**_DECIMALS) / 10**_DECIMALS
+    return up.tolist()  # type: ignore[no-any-return]
 
 
 def _times(victim: np.void) -> dict[str, float | int]:

@@ -65,7 +65,7 @@ def replay_document(records: Sequence[Record], names: Sequence[str]) -> dict[str
 
     Positions are rounded to 1/32,000 of the arena's half width, velocities to 1/127 of the largest,
     headings to 1/32,000 of half a circle, attention to 1/255, rewards to 1/32,000 of each
-    component's largest.
+    component's largest, readings of range sensors up to 1/32,000.
 
     Args:
         records: of one to four policies, in the same worlds.
@@ -178,6 +178,11 @@ def _run(record: Record, name: str, arrays: _Arrays) -> dict[str, Any]:
     if "load" in kept:
         full = np.array([robot.load or 0 for robot in record.scenario.robots])
         found["load"] = arrays.add(np.rint(kept["load"] * full).astype(np.int16))
+    if "heard" in kept:
+        found["heard"] = arrays.add(kept["heard"].astype(np.uint8))
+    if "rays" in kept:
+        readings = np.ceil(_STEPS_OF_INT16 * kept["rays"].astype(np.float64))  # 0: met nothing
+        found["rays"] = arrays.add(readings.astype(np.int16))
     if "attention" in kept and record.scenario.num_robots > 1:
         found["attention"] = arrays.add(_quantised(kept["attention"], 1 / 255, "uint8"))
     if "rewards" in kept:

@@ -14,7 +14,7 @@ from innerattn.report.replay.data import replay_document
 _WEB = files("innerattn.report.replay") / "web"
 _SHARED = (
     *("dom.js", "theme.js", "worlds.js", "story.js", "ground.js", "room.js"),
-    *("scene.js", "marks.js", "charts.js", "panel.js"),
+    *("senses.js", "scene.js", "marks.js", "charts.js", "panel.js"),
 )
 _SCRIPTS = ("data.js", "app.js")
 

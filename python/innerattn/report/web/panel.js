@@ -125,6 +125,18 @@ function fillLegend(list, worlds) {
   }
   row(line("M-9 0H9", kind, { opacity: 0.4 }), "pale line behind a robot: its trail, the last 15 steps");
   row(line("M-9 4Q-2 -6 5 -1M1 -4L7 1L0 3", kind), "arrow: attention, from the robot that attends; the wider, the larger the weight");
+  if (worlds.limits_communication) {
+    const arrow = "M-9 0H9M4 -3.5L9 0L4 3.5";
+    row(line(arrow, "var(--ink)", { "stroke-width": 1.3 }), "thin arrow: the robot at its head hears the one at its start");
+  }
+  if (worlds.robots.some((robot) => robot.range_sensor)) {
+    const met = svg("path", { d: "M-9 -3H7", stroke: kind }), free = svg("path", { d: "M-9 4H9", stroke: kind, opacity: 0.3 });
+    const end = svg("circle", { cx: 7, cy: -3, r: 2.5, fill: kind });
+    row(symbol(met, free, end), "thin lines out of a robot: rays of its range sensor, up to the dot that they meet; pale: nothing is in range");
+  }
+  if (worlds.robots.some((robot) => robot.sight)) {
+    row(symbol(svg("circle", { r: 9, fill: kind, "fill-opacity": 0.15, stroke: kind })), "pale area around a robot: how far it sees, unless an obstacle hides it");
+  }
   row(symbol(disc("var(--floor)", kind)), "small disc at a victim: what it needs");
   row(symbol(disc(kind, kind)), "filled small disc: robots that offer it, enough of it, are inside the rescue radius");
   const ring = svg("circle", { r: 9, fill: "none", stroke: "var(--victim)", "stroke-dasharray": "4 3", "stroke-width": 1.5 });

@@ -58,7 +58,8 @@ class Scene {
   }
 
   /**
-   * Draws a moment. look: {robot, received, all, least, head, trails}; robot -1: nobody is chosen.
+   * Draws a moment. look: {robot, received, all, least, head, trails, hearing, rays, sight}; robot -1:
+   * nobody is chosen.
    * Where no free place is left for a badge it lies below robots, and a text is left out.
    */
   draw(episode, step, look, paint) {
@@ -72,9 +73,11 @@ class Scene {
     context.clearRect(0, 0, this.side, this.side);
     context.lineJoin = context.lineCap = "round";
     drawGround(this);
+    drawSenses(this);
     if (look.trails) worlds.robots.forEach((robot) => this.drawTrail(robot));
     victims.forEach((victim) => this.drawVictim(victim));
     run.rescues[episode].forEach((rescue) => this.drawFlash(rescue));
+    drawHearing(this);
     if (run.attention) this.drawAttention();
     worlds.robots.forEach((robot) => this.drawFault(robot));
     victims.forEach((victim) => this.drawNeeds(victim));

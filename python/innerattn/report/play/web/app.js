@@ -16,7 +16,7 @@ class App {
     this.worlds = new Worlds(worlds, opened.obstacles.flat(), 1);
     this.policies = policies;
     this.run = new LiveRun(document.title, this.worlds);
-    this.look = { robot: 0, received: false, all: false, least: 0, head: -1, trails: true };
+    this.look = { robot: 0, received: false, all: false, least: 0, head: -1, trails: true, ...SENSES };
     this.look.least = strongWeight(this.worlds.robots.length);
     // Only this page changes them: what was asked for last is so, though the answer is on its way.
     Object.assign(this, { steered: opened.steered, policy: opened.policy });
@@ -67,6 +67,7 @@ class App {
     fillSelect($("speed"), SPEEDS.map((speed) => [String(speed), `${speed}×`]), "");
     fillSelect($("task"), this.worlds.tasks.map(({ name }, task) => [String(task), name]), "0");
     fillLegend($("legend"), this.worlds);
+    fillSenses($("senses"), this.run, this.look, (look) => this.setLook(look));
     $("arena").setAttribute("aria-label", "Arena");
   }
 

@@ -49,6 +49,14 @@ class LiveRun {
     return this.now.attention;
   }
 
+  get heard() {
+    return this.now.heard;
+  }
+
+  get rays() {
+    return this.now.rays;
+  }
+
   get heads() {
     return this.attention ? this.attention.length : 0;
   }
@@ -151,6 +159,15 @@ class LiveRun {
 
   load(episode, step, robot) {
     return Math.round((this.now.load?.[robot] ?? 1) * this.worlds.robots[robot].load);
+  }
+
+  hears(episode, step, robot, other) {
+    return this.moment(step).heard[robot][other] === 1;
+  }
+
+  /** What a ray of a robot's range sensor reads: 1 - distance / range; 0: it meets nothing. */
+  reading(episode, step, robot, ray) {
+    return this.moment(step).rays[robot][ray];
   }
 
   isAway(episode, step, robot) {

@@ -7,7 +7,7 @@ class App {
     const { obstacle_places: places, position_unit_m: unit } = described.worlds;
     this.worlds = new Worlds(described.worlds, view(buffer, places), unit);
     this.runs = described.runs.map((run) => new Run(run, buffer, this.worlds));
-    this.look = { robot: 0, received: false, all: false, least: 0, head: -1, trails: true };
+    this.look = { robot: 0, received: false, all: false, least: 0, head: -1, trails: true, ...SENSES };
     this.look.least = strongWeight(this.worlds.robots.length);
     Object.assign(this, { chosen: 0, step: 0, playing: false, hovered: -1, times: [] });
     this.order = [];
@@ -72,6 +72,8 @@ class App {
     const heads = Math.max(...this.runs.map((run) => run.heads));
     const options = Array.from({ length: heads }, (_, head) => [String(head), String(head + 1)]);
     fillSelect($("head"), [["-1", "mean"], ...options], "-1");
+    const sensing = this.runs.find((run) => run.heard || run.rays) ?? this.run;
+    fillSenses($("senses"), sensing, this.look, (look) => this.setLook(look));
     $("policies").hidden = this.runs.length < 2;
     this.runs.forEach((run, index) => {
       const button = element("button", { type: "button" }, run.name);

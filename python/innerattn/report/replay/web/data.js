@@ -27,6 +27,7 @@ function byEpisode(buffer, spec, episodes, toRow) {
 }
 
 const HALF_CIRCLE = 32000; // as headings are packed
+const FULL_READING = 32000; // as readings of range sensors are packed
 
 /** One policy's episodes. Positions are metres, velocities metres per second. */
 class Run {
@@ -51,6 +52,9 @@ class Run {
     this.headings = described.headings ? view(buffer, described.headings) : null;
     this.charges = described.charge ? view(buffer, described.charge) : null;
     this.loads = described.load ? view(buffer, described.load) : null;
+    this.heard = described.heard ? view(buffer, described.heard) : null;
+    this.rays = described.rays ? view(buffer, described.rays) : null;
+    this.mostRays = described.rays?.shape[3] ?? 0;
     this.slots = (described.served ?? described.waits)?.shape[2] ?? 0;
     this.victims = lists(described.victims, ([, id, task, from, to, x, y, slot, deadline]) => (
       { id, task, from, to, x: x * worlds.unit, y: y * worlds.unit, slot, deadline }
@@ -148,6 +152,18 @@ class Run {
     if (!this.loads) return 0;
     const at = Math.min(Math.floor(step), this.lengths[episode] - 1);
     return this.loads[(episode * this.steps + at) * this.size + robot];
+  }
+
+  /** Whether a robot hears another one. */
+  hears(episode, step, robot, other) {
+    const at = Math.min(Math.floor(step), this.lengths[episode] - 1);
+    return this.heard[((episode * this.steps + at) * this.size + robot) * this.size + other] === 1;
+  }
+
+  /** What a ray of a robot's range sensor reads: 1 - distance / range; 0: it meets nothing. */
+  reading(episode, step, robot, ray) {
+    const at = Math.min(Math.floor(step), this.lengths[episode] - 1);
+    return this.rays[((episode * this.steps + at) * this.size + robot) * this.mostRays + ray] / FULL_READING;
   }
 
   isAway(episode, step, robot) {
