@@ -110,21 +110,22 @@ import numpy as np
 from innerattn.config import Robot, Scenario
 from innerattn.envs import BatchEnv
 
+team = [Robot(name=f"r{i}", kind="all", abilities=("food", "medicine", "information"),
+              max_speed_mps=1.0, mass_kg=1.0, radius_m=0.02) for i in range(64)]
+scenarios = [Scenario(robots=tuple(robots), engine="discs", spawn_clearance_m=0.0)
+             for robots in (Scenario().robots, team)]
 in_use = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 limit = 2**30 + in_use * int(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-team = [Robot(name=f"r{i}", kind="all", abilities=("food", "medicine", "information"),
-              max_speed_mps=1.0, mass_kg=1.0, radius_m=0.02) for i in range(64)]
 done = lacked = 0
-for robots in (Scenario().robots, team):
-    scenario = Scenario(robots=tuple(robots), engine="discs", spawn_clearance_m=0.0)
+for scenario in scenarios:
     size = 256
     while size < 2**20:
         size = min(int(1.4 * size), 2**20)
         try:
             with BatchEnv(scenario, size, num_threads=2) as env:
                 env.reset()
-                env.step(np.ones((size, len(robots)), np.int8))
+                env.step(np.ones((size, scenario.num_robots), np.int8))
                 env.positions(), env.victims(), env.fault_state(), env.observe()
                 image = env.snapshot()
                 env.restore(image)
