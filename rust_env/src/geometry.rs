@@ -8,6 +8,13 @@ use crate::scenario::{Obstacle, Shape};
 /// A point or direction in the plane, m or m/s.
 pub type Vec2 = Vector2<f32>;
 
+/// The unit vector at an angle from the x axis, counterclockwise, rad.
+#[must_use]
+pub fn direction(angle: f32) -> Vec2 {
+    let (sin, cos) = libm::sincosf(angle);
+    Vec2::new(cos, sin)
+}
+
 /// The way from a place to the nearest of others, m; ties by their order.
 #[must_use]
 pub fn way_to_nearest(from: Vec2, places: impl Iterator<Item = Vec2>) -> Option<Vec2> {

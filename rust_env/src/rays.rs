@@ -7,7 +7,7 @@ use std::f32::consts::{FRAC_1_SQRT_2, FRAC_PI_2, TAU};
 use std::iter::zip;
 
 use crate::blocks::Blocks;
-use crate::geometry::{Solid, Vec2};
+use crate::geometry::{Solid, Vec2, direction};
 use crate::robot::Body;
 use crate::scenario::{MAX_RAYS, RangeSensor, Scenario};
 
@@ -190,11 +190,6 @@ impl Sweep<'_> {
             self.nearest[ray] = self.nearest[ray].min(met);
         }
     }
-}
-
-fn direction(angle: f32) -> Vec2 {
-    let (sin, cos) = libm::sincosf(angle);
-    Vec2::new(cos, sin)
 }
 
 /// The direction after `ray` of `rays` equal parts of a turn. Quarter turns and mirrors of it are exact.

@@ -106,13 +106,15 @@ impl Sight {
             let (mates, slots) = row.split_at_mut(self.reach.len());
             let is = |robots: u64| robots >> own & 1 == 1;
             let (held, looks) = (is(view.held), !is(view.blind | view.absent));
+            let front = self.front(own, view);
             for (other, last) in mates.iter_mut().enumerate().filter(|_| !held) {
                 let there = other != own && view.absent >> other & 1 == 0;
-                let seen = looks && !is(view.deaf) && there && self.sees(own, view, view.positions[other]);
+                let seen =
+                    looks && !is(view.deaf) && there && self.sees(own, front, view, view.positions[other]);
                 note(seen, view.step, last);
             }
             for (last, victim) in zip(slots, view.victims) {
-                let seen = |victim: &Victim| looks && self.sees(own, view, victim.position);
+                let seen = |victim: &Victim| looks && self.sees(own, front, view, victim.position);
                 if !held {
                     note(victim.as_ref().is_some_and(seen), view.step, last);
                 }
@@ -124,8 +126,8 @@ impl Sight {
         }
     }
 
-    /// Whether a robot whose senses work sees what is at a place.
-    fn sees(&self, own: usize, view: &View, at: Vec2) -> bool {
+    /// Whether a robot whose senses work sees what is at a place; `front` as of [`Self::front`].
+    fn sees(&self, own: usize, front: Option<Vec2>, view: &View, at: Vec2) -> bool {
         let from = view.positions[own];
         let way = at - from;
         let hides = |((solid, layers), centre): (&(Solid, u64), &Vec2)| {
@@ -133,15 +135,14 @@ impl Sight {
         };
         let blocks = self.blocks.iter().filter(|blocks| blocks.block(self.layers[own]));
         way.norm_squared() <= self.reach[own]
-            && self.is_in_front(own, view, way)
+            && front.is_none_or(|ahead| ahead.dot(&way) >= self.edges[own] * way.norm())
             && !zip(&self.hiding, view.obstacles).any(hides)
             && !blocks.into_iter().any(|blocks| blocks.is_crossed(from, way))
     }
 
-    /// Whether what is `way` on from a robot is in its field of view.
-    fn is_in_front(&self, own: usize, view: &View, way: Vec2) -> bool {
-        let edge = self.edges[own];
-        edge <= AROUND || view.headings[own].ahead().dot(&way) >= edge * way.norm()
+    /// Where a robot points whose field of view is limited; none of one that looks all around.
+    fn front(&self, own: usize, view: &View) -> Option<Vec2> {
+        (self.edges[own] > AROUND).then(|| view.headings[own].ahead())
     }
 
     /// The time since something was last seen as a share, t / (t + 1 s): 0 now, 1 if never in the episode.

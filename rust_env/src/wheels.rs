@@ -8,7 +8,7 @@ use std::f32::consts::{PI, TAU};
 use serde::{Deserialize, Serialize};
 
 use crate::fault::Drive;
-use crate::geometry::Vec2;
+use crate::geometry::{Vec2, direction};
 use crate::rng::Stream;
 use crate::robot::Commands;
 use crate::scenario::{DriveMode, Robot, Scenario};
@@ -168,11 +168,6 @@ impl Wheels {
 /// A number nearer to another one, by so much at most.
 fn approached(from: f32, to: f32, most: f32) -> f32 {
     from + (to - from).clamp(-most, most)
-}
-
-fn direction(angle: f32) -> Vec2 {
-    let (sin, cos) = libm::sincosf(angle);
-    Vec2::new(cos, sin)
 }
 
 /// sin x / x: the chord of an arc of 2 x, divided by the arc.
