@@ -1,6 +1,7 @@
 """Studies as files: what they plan, and what is refused before the first run."""
 
 import datetime
+import shutil
 from pathlib import Path
 
 import pytest
@@ -160,6 +161,22 @@ def test_bad_files_are_refused_in_one_line(text: str, message: str, folder: Path
         planned(text, folder)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_the_folder_keeps_a_map_that_is_a_file(folder: Path) -> None:
+    office = Path(__file__).parents[2] / "examples" / "scenarios"
+    for name in ("office.toml", "office.yaml", "office.png"):
+        shutil.copy(office / name, folder)
+    file, out = folder / "sharing.toml", folder / "studies/sharing"
+    file.write_text(SHARING.replace("flood.toml", "office.toml"))
+    begun = begin_study(file, out)
+    for name in ("office.toml", "office.yaml", "office.png"):
+        (folder / name).unlink()
+    again = open_study(out)
+    assert [run.key for run in again.planned] == [run.key for run in begun.planned]
+    worlds = [run.config.scenario for run in again.planned if run.config.scenario.map is not None]
+    assert worlds
+    assert worlds[0].map == Scenario.from_toml(office / "office.toml").map
 
 
 def test_the_folder_keeps_the_file_its_scenarios_and_its_rules_over_time(folder: Path) -> None:

@@ -12,7 +12,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from innerattn.config.files import write_whole
+import tomli_w
+
+from innerattn.config import Scenario
+from innerattn.config.files import toml_table_in, write_whole
+from innerattn.config.scenario import scenario_table
 from innerattn.config.untrusted import MOST_JSON_BYTES, MOST_TOML_BYTES, parse_json, read_plain
 from innerattn.errors import InnerattnError, RunError
 from innerattn.experiments import archive
@@ -196,7 +200,7 @@ def begin_study_in(
         if scenario.endswith(".toml"):
             copy = copy_in(path)(scenario)
             copy.parent.mkdir(exist_ok=True)
-            write_whole(copy, read_plain(file.parent / scenario, MOST_TOML_BYTES, follow_link=True))
+            write_whole(copy, _scenario_copy(file.parent / scenario))
     if begun.pool != path:
         where = os.path.relpath(begun.pool.resolve(), path.resolve())
         document: dict[str, Any] = {"schema_version": 1, "folder": where}
@@ -210,6 +214,14 @@ def begin_study_in(
         write_whole(path / _RULES, f"{json.dumps(document, indent=1)}\n".encode())
     write_whole(path / _FILE, data)
     return begun
+
+
+def _scenario_copy(file: Path) -> bytes:
+    """The bytes of a scenario's file; with the rows of its map in place of the map's file."""
+    data = read_plain(file, MOST_TOML_BYTES, follow_link=True)
+    table = scenario_table(file)
+    given = toml_table_in(data, file)
+    return data if table in (given, given.get(Scenario.place)) else tomli_w.dumps(table).encode()
 
 
 def _chosen_pool(path: Path, pool: Path | None) -> Path:
