@@ -148,6 +148,13 @@ impl Solid {
         }
     }
 
+    /// Whether a disc at a place relative to the solid's centre overlaps it by more than `most` of the smaller of
+    /// the two.
+    #[must_use]
+    pub fn is_sunk_in(&self, at: Vec2, radius: f32, most: f32) -> bool {
+        self.nearest(at).0 < radius - most * radius.min(self.half_breadth())
+    }
+
     /// Radius of the smallest disc around the centre that holds the solid, m.
     #[must_use]
     pub fn reach(&self) -> f32 {

@@ -90,6 +90,10 @@ pub struct Layout {
     rays: Option<Rays>,
     /// Whether each teammate's block says whether it is heard.
     hears: bool,
+    /// Whether rows hold nothing but bodies, motion and victims.
+    plain: bool,
+    /// Whether victims have services, deadlines or an order.
+    times: bool,
     widths: Widths,
     /// The columns that never change, of all robots (R × D); zeros elsewhere.
     fixed: Vec<f32>,
@@ -144,11 +148,15 @@ impl Layout {
             radio,
             rays,
             hears: scenario.communication.is_some_and(|one| one.limits()),
+            plain: false,
+            times: false,
             widths: Widths::default(),
             abilities,
             needs,
             fixed: vec![],
         };
+        layout.plain = layout.stores.is_none() && layout.sight.is_none() && layout.wheels.is_none();
+        layout.times = layout.services.is_some() || layout.deadlines.is_some() || layout.order.is_some();
         layout.widths = layout.count_columns();
         layout.fixed = layout.fixed_columns(scenario);
         layout
@@ -346,6 +354,16 @@ impl Layout {
             let (place, speed) = (scene.positions[other] - position, scene.velocities[other] - velocity);
             block[..4].copy_from_slice(&[place.x, place.y, speed.x, speed.y]);
         }
+        if self.plain {
+            let victims = &mut row[self.widths.victims_from..];
+            return self.write_victims(scene, &scene.team[own], position, &[], victims);
+        }
+        self.write_more(scene, own, position, row);
+    }
+
+    /// Writes the victims, and what robots have but bodies and motion.
+    #[inline(never)] // worlds without such robots are faster without it
+    fn write_more(&self, scene: Scene, own: usize, position: Vec2, row: &mut [f32]) {
         if let Some(stores) = &self.stores {
             let others = (0..self.robots).filter(|other| *other != own);
             for (block, robot) in self.blocks(row).zip(std::iter::once(own).chain(others)) {
@@ -397,20 +415,29 @@ impl Layout {
                 *column = *need;
             }
             (row[1 + abilities], row[2 + abilities]) = (place.x, place.y);
-            if let Some(services) = &self.services {
-                row[3 + abilities] = services[victim.task as usize].share(victim);
-            }
-            if let Some(deadlines) = &self.deadlines {
-                row[3 + abilities + usize::from(self.services.is_some())] =
-                    deadlines.share_left(victim, step);
-            }
-            if let Some(order) = &self.order {
-                row[self.widths.victim - 1 - usize::from(self.sight.is_some()) - self.widths.heading] =
-                    f32::from(u8::from(order.is_blocked(victim, victims)));
+            if self.times {
+                self.write_times(victim, victims, step, row);
             }
             if let Some(since) = since.get(usize::from(*slot)) {
                 row[self.since_seen()] = *since;
             }
+        }
+    }
+
+    /// Writes how far a victim is served, how long it can wait, and whether it has to.
+    #[inline(never)] // worlds without such victims are faster without it
+    fn write_times(&self, victim: &Victim, victims: &[Option<Victim>], step: u32, row: &mut [f32]) {
+        let mut column = 3 + self.abilities.len();
+        if let Some(services) = &self.services {
+            row[column] = services[victim.task as usize].share(victim);
+            column += 1;
+        }
+        if let Some(deadlines) = &self.deadlines {
+            row[column] = deadlines.share_left(victim, step);
+            column += 1;
+        }
+        if let Some(order) = &self.order {
+            row[column] = f32::from(u8::from(order.is_blocked(victim, victims)));
         }
     }
 }

@@ -163,20 +163,12 @@ impl Shapes {
     /// Visits the obstacles, and those of the map's boxes that may be within `reach` of a place, with their
     /// centres.
     #[inline]
-    fn each_solid(
-        &self,
-        at: Vec2,
-        reach: impl FnOnce() -> f32,
-        obstacles: &[Vec2],
-        mut visit: impl FnMut(&Solid, Vec2),
-    ) {
+    fn each_solid(&self, at: Vec2, reach: f32, obstacles: &[Vec2], mut visit: impl FnMut(&Solid, Vec2)) {
         for (solid, centre) in self.solids.iter().zip(obstacles) {
             visit(solid, *centre);
         }
         if let Some(blocks) = &self.blocks {
-            for (solid, centre) in blocks.near(at, reach()) {
-                visit(solid, centre);
-            }
+            each_block(blocks, at, reach, &mut visit);
         }
     }
 
@@ -202,16 +194,22 @@ impl Shapes {
                 let reach = radius + self.radii[other];
                 first = first.min(touch.discs(positions[other] - at, velocities[other] - velocity, reach));
             }
-            self.each_solid(
-                *at,
-                || radius + velocity.norm() * self.dt,
-                obstacles,
-                |solid, centre| {
-                    first = first.min(touch.solid(solid, at - centre, *velocity, radius));
-                },
-            );
+            for (solid, centre) in self.solids.iter().zip(obstacles) {
+                first = first.min(touch.solid(solid, at - centre, *velocity, radius));
+            }
+            if let Some(blocks) = &self.blocks {
+                first = first.min(self.first_block(blocks, touch, *at, *velocity, radius));
+            }
         }
         first
+    }
+
+    /// Time until a robot would touch a box of the map, as [`Self::first_touch`].
+    #[inline(never)] // worlds without a map are faster without it
+    fn first_block(&self, blocks: &Blocks, touch: Touch, at: Vec2, velocity: Vec2, radius: f32) -> f32 {
+        let near = blocks.near(at, radius + velocity.norm() * self.dt);
+        near.map(|(solid, centre)| touch.solid(solid, at - centre, velocity, radius))
+            .fold(f32::INFINITY, f32::min)
     }
 
     /// Puts whoever overlaps something by more than `most` of the smaller of the two back to where it was
@@ -254,20 +252,29 @@ impl Shapes {
                     sunk |= 1 << index | 1 << other;
                 }
             }
-            self.each_solid(
-                *at,
-                || radius,
-                obstacles,
-                |solid, centre| {
-                    let reach = radius - most * radius.min(solid.half_breadth());
-                    if solid.nearest(at - centre).0 < reach {
-                        sunk |= 1 << index;
-                    }
-                },
-            );
+            for (solid, centre) in self.solids.iter().zip(obstacles) {
+                if solid.is_sunk_in(at - centre, radius, most) {
+                    sunk |= 1 << index;
+                }
+            }
+            if let Some(blocks) = &self.blocks {
+                sunk |= u64::from(is_in_block(blocks, *at, radius, most)) << index;
+            }
         }
         sunk
     }
+}
+
+/// Visits the boxes of a map that may be within `reach` of a place, with their centres.
+#[inline(never)] // worlds without a map are faster without it
+fn each_block(blocks: &Blocks, at: Vec2, reach: f32, visit: &mut dyn FnMut(&Solid, Vec2)) {
+    blocks.near(at, reach).for_each(|(solid, centre)| visit(solid, centre));
+}
+
+/// Whether a robot overlaps a box of the map, as [`Shapes::sunk`] says.
+#[inline(never)] // worlds without a map are faster without it
+fn is_in_block(blocks: &Blocks, at: Vec2, radius: f32, most: f32) -> bool {
+    blocks.near(at, radius).any(|(solid, centre)| solid.is_sunk_in(at - centre, radius, most))
 }
 
 /// Whether a robot is one of those given as bits.

@@ -332,6 +332,9 @@ impl World {
     /// on the robot alone.
     fn come_and_go(&mut self, rules: &Rules, before: u64) {
         let absent = self.absent(rules);
+        if before | absent == 0 {
+            return;
+        }
         let robots = self.positions.len();
         for robot in (0..robots).filter(|robot| (before | absent) >> robot & 1 == 1) {
             self.velocities[robot] = Vec2::zeros();
@@ -357,9 +360,7 @@ impl World {
             self.look(rules, sight);
         }
         if let Some(radio) = &rules.radio {
-            let mut traffic = std::mem::take(&mut self.traffic);
-            self.exchange(rules, radio, &mut traffic);
-            self.traffic = traffic;
+            self.hear(rules, radio);
         }
         self.freeze(rules);
     }
@@ -374,6 +375,13 @@ impl World {
 
     /// Lets robots send and hear at the present step.
     #[inline(never)]
+    fn hear(&mut self, rules: &Rules, radio: &Radio) {
+        let mut traffic = std::mem::take(&mut self.traffic);
+        self.exchange(rules, radio, &mut traffic);
+        self.traffic = traffic;
+    }
+
+    /// What robots send and hear at the present step, in the traffic of the step before.
     fn exchange(&self, rules: &Rules, radio: &Radio, traffic: &mut Traffic) {
         let stream = Stream::new(self.seed, self.stream, self.episode, Purpose::Losses);
         radio.exchange(&self.view(rules), rules.sight.as_ref(), &self.sightings, stream, traffic);

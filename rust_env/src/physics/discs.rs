@@ -87,17 +87,12 @@ impl Discs {
                     add(index, Some(other), apart.try_normalize(0.0).unwrap_or_else(Vec2::x));
                 }
             }
-            self.shapes.each_solid(
-                *at,
-                || radius + near,
-                obstacles,
-                |solid, centre| {
-                    let (depth, outward) = solid.nearest(at - centre);
-                    if depth <= radius + near {
-                        add(index, None, -outward);
-                    }
-                },
-            );
+            self.shapes.each_solid(*at, radius + near, obstacles, |solid, centre| {
+                let (depth, outward) = solid.nearest(at - centre);
+                if depth <= radius + near {
+                    add(index, None, -outward);
+                }
+            });
         }
     }
 
@@ -153,18 +148,13 @@ impl Discs {
                 if is_in(absent, index) {
                     continue;
                 }
-                self.shapes.each_solid(
-                    *at,
-                    || *radius,
-                    obstacles,
-                    |solid, centre| {
-                        let (distance, outward) = solid.nearest(*at - centre);
-                        if distance < *radius {
-                            overlapped = true;
-                            *at += outward * (radius - distance);
-                        }
-                    },
-                );
+                self.shapes.each_solid(*at, *radius, obstacles, |solid, centre| {
+                    let (distance, outward) = solid.nearest(*at - centre);
+                    if distance < *radius {
+                        overlapped = true;
+                        *at += outward * (radius - distance);
+                    }
+                });
                 let limit = self.shapes.arena - radius;
                 *at = at.map(|place| place.clamp(-limit, limit));
             }
