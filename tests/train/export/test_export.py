@@ -14,9 +14,9 @@ import torch
 from fresh_run import make_run, run_config
 from made_export import FRAMED, made_export
 
-from innerattn.config import Scenario
+from innerattn.config import Battery, RangeSensor, Scenario
 from innerattn.envs import BatchEnv
-from innerattn.errors import ConfigError, ExportError, RunError
+from innerattn.errors import ExportError, RunError
 from innerattn.policies import Exported, PolicyInput
 from innerattn.records.run_files import RunFiles
 from innerattn.train import load_policy
@@ -226,36 +226,56 @@ def test_a_run_without_weights_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "export").exists()
 
 
-def test_a_team_with_loads_is_trained_and_not_exported(tmp_path: Path) -> None:
-    robots = [robot.model_dump() for robot in Scenario().robots]
-    robots[1]["load"] = 2
-    values = {"scenario.robots": robots, "scenario.depots": [{"position_m": [0.5, 0.0]}]}
-    run = make_run(tmp_path / "run", run_config("ppo-inner", **FRAMED, **values))
-    with pytest.raises(ConfigError, match=r"robots\[1\].load = 2: there must be no load; exported"):
-        export_run(run, tmp_path / "export")
-    assert not (tmp_path / "export").exists()
-
-
-def test_a_team_with_batteries_is_trained_and_not_exported(tmp_path: Path) -> None:
-    robots = [robot.model_dump() for robot in Scenario().robots]
-    robots[1]["battery"] = {"capacity_j": 10.0, "per_m_j": 2.0}
-    stations = [{"position_m": [0.5, 0.0], "recharge_w": 20.0}]
-    values = {"scenario.robots": robots, "scenario.stations": stations}
-    run = make_run(tmp_path / "run", run_config("ppo-inner", **FRAMED, **values))
-    with pytest.raises(ConfigError, match=r"robots\[1\].battery.capacity_j = 10: there must be no"):
-        export_run(run, tmp_path / "export")
-    assert not (tmp_path / "export").exists()
-
-
-def test_a_team_whose_velocity_is_set_is_trained_and_not_exported(tmp_path: Path) -> None:
-    robots = [robot.model_dump() for robot in Scenario().robots]
-    robots[2]["drive"] = "velocity"
-    run = make_run(
-        tmp_path / "run", run_config("ppo-inner", **FRAMED, **{"scenario.robots": robots})
+def wheels(rays: bool) -> dict[str, object]:
+    """Keys of a team on wheels beside a robot that sets its velocity, with short sight and rays."""
+    sensor = RangeSensor(rays=6, range_m=0.8, field_of_view_deg=180.0) if rays else None
+    food, other, navigation, medical = Scenario().robots
+    robots = (
+        food.replace(drive="differential", range_sensor=sensor, sight_m=0.9),
+        other.replace(drive="unicycle", range_sensor=sensor),
+        navigation.replace(drive="unicycle"),
+        medical.replace(drive="velocity", layer="air"),
     )
-    with pytest.raises(ConfigError, match=r"robots\[2\].drive = 'velocity': must be 'force'; exp"):
-        export_run(run, tmp_path / "export")
-    assert not (tmp_path / "export").exists()
+    return {"scenario.robots": [one.model_dump() for one in robots], "scenario.situation": "double"}
+
+
+def stores() -> dict[str, object]:
+    """Keys of a team with a battery, a load and rays all around."""
+    sensor = RangeSensor(rays=8, range_m=1.0)
+    food, other, *others = (robot.replace(range_sensor=sensor) for robot in Scenario().robots)
+    robots = (food.replace(load=2), other.replace(battery=Battery(capacity_j=9.0, idle_w=1.0)))
+    return {
+        "scenario.robots": [one.model_dump() for one in (*robots, *others)],
+        "scenario.depots": [{"position_m": [0.5, 0.0]}],
+        "scenario.communication": {"range_m": 0.8},
+    }
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("actions", ["discrete", "continuous"])
+@pytest.mark.parametrize(
+    "values",
+    [FRAMED | wheels(True), wheels(False), FRAMED | stores() | {"network.symmetry": "none"}],
+    ids=["wheels and rays in frames", "wheels", "stores"],  # depots have a place: no frames
+)
+def test_teams_of_every_drive_and_sense_play_as_the_trained_ones(
+    tmp_path: Path, values: dict[str, object], actions: str
+) -> None:
+    values = values | {"scenario.actions": actions}
+    run, folder = made_export(tmp_path, "ppo-inner", **values)
+    config, learner = load_policy(run)
+    exported = [Exported(folder, backend=one, greedy=True) for one in ("numpy", "onnxruntime")]
+    assert exported[0].contract.checked is not None
+    with closing(BatchEnv(config.scenario, 32, seed=9, num_threads=1)) as env:
+        obs = env.reset()
+        taken = []
+        for _ in range(20):
+            commands = learner.act(torch.tensor(obs), greedy=True).numpy()
+            for one in exported:
+                np.testing.assert_allclose(one.act(PolicyInput(obs)), commands, atol=1e-5)
+            taken.append(commands)
+            obs = env.step(commands).obs
+    assert len(np.unique(np.round(taken, 2))) > 2
 
 
 def test_a_team_with_messages_is_trained_and_not_exported(tmp_path: Path) -> None:

@@ -53,8 +53,39 @@ class Action:
 
 
 @dataclass(frozen=True)
+class RangeRays:
+    """A range sensor: rays from the robot's centre, and how far each reaches.
+
+    The angles count from the robot's heading, or from the x axis for a robot without one,
+    counterclockwise.
+    """
+
+    __pydantic_config__ = _STRICT
+
+    rays: Annotated[int, Field(ge=1, le=360)]
+    range_m: _Positive
+    angles_rad: tuple[_Number, ...]
+
+
+@dataclass(frozen=True)
 class Member:
-    """One robot of the team, and which actor is its policy."""
+    """One robot of the team, and which actor is its policy.
+
+    Attributes:
+        drive: what its actions set: a force, a velocity, or on wheels the speed and the turn rate
+            (unicycle) or the speeds of two wheels (differential).
+        actions: the actions of a robot on wheels, where they are discrete; that of a unicycle
+            sets shares of its speed and turn rate, that of a differential those of its wheels.
+        max_turn_rad_s: of a robot on wheels.
+        acceleration_m_s2: of a unicycle, or of each wheel of a differential.
+        turn_acceleration_rad_s2: of a unicycle.
+        track_m: between the wheels of a differential.
+        sight_m: how far it sees; None: as far as the arena goes.
+        field_of_view_deg: within which it sees, its middle straight ahead; None: all around.
+        range_sensor: what measures the ``ranges`` of its readings.
+        battery_j: capacity of its battery; it tells its ``charge`` as a share of it.
+        load: its full load; it tells its ``load`` as a share of it.
+    """
 
     __pydantic_config__ = _STRICT
 
@@ -66,6 +97,28 @@ class Member:
     radius_m: _Positive
     drive_force_n: Annotated[float, Field(ge=0, allow_inf_nan=False)]
     actor: _Name
+    drive: Literal["force", "velocity", "unicycle", "differential"] = "force"
+    actions: tuple[Action, ...] = ()
+    max_turn_rad_s: _Positive | None = None
+    acceleration_m_s2: _Positive | None = None
+    turn_acceleration_rad_s2: _Positive | None = None
+    track_m: _Positive | None = None
+    sight_m: _Positive | None = None
+    field_of_view_deg: _Positive | None = None
+    range_sensor: RangeRays | None = None
+    battery_j: _Positive | None = None
+    load: Annotated[int, Field(ge=1)] | None = None
+
+    @property
+    def has_wheels(self) -> bool:
+        """Whether it drives along a heading."""
+        return self.drive in ("unicycle", "differential")
+
+    @property
+    def stores(self) -> tuple[str, ...]:
+        """What it has of ``charge`` and ``load``."""
+        found = {"charge": self.battery_j, "load": self.load}
+        return tuple(key for key, most in found.items() if most is not None)
 
 
 @dataclass(frozen=True)
@@ -94,13 +147,19 @@ class Entities:
 
 @dataclass(frozen=True)
 class FrameColumns:
-    """Columns that turn: pairs (x, y), those that change sign in a mirror, those that choose."""
+    """Columns that turn: pairs (x, y), those that change sign in a mirror, those that choose.
+
+    Those of rays change places: ``ray_turns`` says for each element of the group which of them
+    takes the place of each.
+    """
 
     __pydantic_config__ = _STRICT
 
     vectors: tuple[tuple[_Index, _Index], ...]
     handed: tuple[_Index, ...]
     anchors: Annotated[tuple[tuple[_Index, _Index], ...], Field(min_length=1)]
+    rays: tuple[_Index, ...] = ()
+    ray_turns: tuple[tuple[_Index, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -177,6 +236,8 @@ class Contract:
         observation: the columns.
         actions: the actions; none where they are continuous.
         action_kind: "continuous" where a policy gives a force itself; see `about`.
+        stations: places [m] that charge batteries.
+        depots: places [m] that refill loads.
         network: what numpy needs.
         actors: the ONNX file of each actor.
         weights_sha256: that of the tensors of `weights.safetensors`: names, types, shapes, bytes.
@@ -212,6 +273,8 @@ class Contract:
     files: dict[_File, FileEntry]
     checked: Checked | None
     action_kind: Literal["discrete", "continuous"] = "discrete"
+    stations: tuple[tuple[_Number, _Number], ...] = ()
+    depots: tuple[tuple[_Number, _Number], ...] = ()
 
     @property
     def outputs(self) -> int:
@@ -265,6 +328,8 @@ def _checked(document: dict[str, Any]) -> Contract:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         raise ValueError(f"{place}: {first['msg']}") from error
+    for robot in contract.robots:
+        _check_member(robot, len(contract.actions))
     discrete = contract.action_kind == "discrete"
     if bool(contract.actions) != discrete or (contract.network.log_std is None) != discrete:
         raise ValueError(
@@ -277,3 +342,18 @@ def _checked(document: dict[str, Any]) -> Contract:
     if unknown := {robot.actor for robot in contract.robots} - contract.actors.keys():
         raise ValueError(f"actors: {min(unknown)} is missing")
     return contract
+
+
+def _check_member(robot: Member, actions: int) -> None:
+    """Refuse a robot whose numbers do not fit its drive or its sensor."""
+    needed = {
+        "unicycle": (robot.max_turn_rad_s, robot.acceleration_m_s2, robot.turn_acceleration_rad_s2),
+        "differential": (robot.max_turn_rad_s, robot.acceleration_m_s2, robot.track_m),
+    }
+    if None in needed.get(robot.drive, ()):
+        raise ValueError(f"robots: {robot.name} lacks a limit of its drive {robot.drive!r}")
+    if len(robot.actions) != (actions if robot.has_wheels else 0):
+        raise ValueError(f"robots: {robot.name} must have {actions} actions of its own, on wheels")
+    sensor = robot.range_sensor
+    if sensor is not None and len(sensor.angles_rad) != sensor.rays:
+        raise ValueError(f"robots: {robot.name} must have an angle for each ray")

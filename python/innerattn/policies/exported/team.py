@@ -17,12 +17,17 @@ from innerattn.policies.exported.backend import (
     chosen_backend,
     onnx_mark,
 )
-from innerattn.policies.exported.contract import WEIGHTS, Contract
-from innerattn.policies.exported.decision import Decision, velocity_command
+from innerattn.policies.exported.contract import WEIGHTS, Contract, Member
+from innerattn.policies.exported.decision import (
+    Decision,
+    twist_command,
+    velocity_command,
+    wheel_speeds,
+)
 from innerattn.policies.exported.folder import ExportFolder, read_export
-from innerattn.policies.exported.frame import Frame
+from innerattn.policies.exported.frame import frame_of
 from innerattn.policies.exported.network import NumpyActor, probabilities_of
-from innerattn.policies.exported.readings import TIMES, RowBuilder
+from innerattn.policies.exported.readings import RowBuilder
 from innerattn.policies.exported.tensors import tensors_in
 from innerattn.policies.policy import PolicyInput
 
@@ -75,13 +80,19 @@ class Exported:
         self._numbers = {robot.name: index for index, robot in enumerate(self.contract.robots)}
         self._width = len(self.contract.observation)
         try:
-            _check_columns(self.contract)
+            _check_names(self.contract)
+            robots = range(len(self._numbers))
+            self._builders = [RowBuilder(self.contract, robot, age) for robot in robots]
             self._actors = _actors(found, self.backend)
             _refuse_not_finite(self.contract, self._actors)
         except ValueError as error:
             raise ExportError(f"{found.path}: {error}") from error
-        self._builders = [RowBuilder(self.contract, i, age) for i in range(len(self._numbers))]
-        self._forces = np.array([action.force for action in self.contract.actions], np.float32)
+        self._forces = [
+            np.array(
+                [action.force for action in robot.actions or self.contract.actions], np.float32
+            )
+            for robot in self.contract.robots
+        ]
         self._continuous = self.contract.action_kind == "continuous"
         self._draws = np.random.default_rng(seed)
 
@@ -97,12 +108,21 @@ class Exported:
             robot: its name.
             readings: a row (D,) of numbers, or a mapping in the frame of the world:
                 ``own``: ``position`` [m] and ``velocity`` [m/s], two numbers each; optional
-                ``available`` (True) and ``faults`` (all healthy);
-                ``teammates``: the last message of each by name, of the same form; who is left out
-                or None is not heard, and its columns are zeros;
-                ``victims``: a list of ``task`` and ``position``; None for an empty slot;
+                ``available`` (True) and ``faults`` (all healthy); of a robot on wheels ``heading``
+                [rad from the x axis, counterclockwise] and ``turn_rate`` [rad/s]; ``ranges`` [m] of
+                its rays in their order, None or inf where one meets nothing; ``charge`` and
+                ``load``, shares of what it holds;
+                ``teammates``: the last message of each by name, of the same form, without
+                ``turn_rate`` and ``ranges``; who is left out or None is not heard, and its columns
+                are zeros. Where sight is limited, these are the teammates that it sees; a teammate
+                that it saw ``since_seen`` seconds ago is ``{"since_seen": 2.5}``;
+                ``victims``: a list of ``task`` and ``position``, and of ``served``, ``time_left``
+                and ``blocked`` where there are such columns; None for an empty slot. Where sight is
+                limited, ``{"since_seen": 2.5}`` stands for a victim that it does not see now, and a
+                victim that it is told of has ``since_seen``, too;
+                ``heard``: names of the teammates that it hears, where communication is limited;
                 optional ``now`` [s]: then ``own.time``, ``victims_time`` and each teammate's
-                ``time`` must be there. A message that is too old counts as not heard.
+                ``time`` must be there. A message that is too old counts as not heard, or not seen.
 
         Raises:
             ReadingError: a reading is wrong, missing or not finite, or so large that the policy
@@ -119,42 +139,81 @@ class Exported:
         if self._continuous:
             force = self._drawn(logits)[0]
             length = np.sqrt((force * force).sum())
-            return Decision(None, _NOTHING, force / length if length > 1.0 else force, row)
+            if length > 1.0 and not self.contract.robots[number].has_wheels:
+                force /= length
+            return Decision(None, _NOTHING, force, row)
         action = int(self._chosen(logits)[0])
-        return Decision(action, probabilities_of(logits)[0], self._forces[action], row)
+        return Decision(action, probabilities_of(logits)[0], self._forces[number][action], row)
 
     def row(self, robot: str, readings: Mapping[str, Any]) -> NDArray[np.float32]:
         """The observation (D,) float32 that `decide` makes of readings; raises what it does."""
         return self._builders[self._number(robot)].row(readings)
 
     def dark_row(
-        self, robot: str, *, available: bool = True, faults: Mapping[str, float] | None = None
+        self,
+        robot: str,
+        *,
+        available: bool = True,
+        faults: Mapping[str, float] | None = None,
+        **stores: float,
     ) -> NDArray[np.float32]:
         """The observation (D,) float32 of a robot whose sensors give nothing (`blackout`).
 
+        Args:
+            robot: its name.
+            available: whether it drives and helps.
+            faults: those in effect; None: it is healthy.
+            **stores: ``charge`` and ``load`` of a robot that has them, as shares.
+
         Raises:
-            ReadingError: no such robot, or a reading is wrong.
+            ReadingError: no such robot, or a reading is wrong or missing.
         """
-        own = {"available": available, "faults": faults or {}}
+        own = {"available": available, "faults": faults or {}, **stores}
         return self._builders[self._number(robot)].dark_row(own)
 
     def velocity_command(
         self, robot: str, force: ArrayLike, velocity: ArrayLike
     ) -> NDArray[np.float32]:
-        """The velocity (2,) float32 [m/s] that amounts to a force over one control period.
+        """The velocity (2,) float32 [m/s] that an action sets for one control period.
 
         Args:
-            robot: its name.
-            force: (2,) share of full force, as `Decision.force`.
+            robot: its name; it has no wheels.
+            force: (2,) share of full force or speed, as `Decision.force`.
             velocity: (2,) its present velocity [m/s].
 
         Raises:
-            ReadingError: no such robot, or not two finite numbers.
+            ReadingError: no such robot, it has wheels, or not two finite numbers.
         """
-        member = self.contract.robots[self._number(robot)]
+        member = self._member(robot, "force", "velocity")
         return velocity_command(
             self.contract, member, _two(force, "force"), _two(velocity, "velocity")
         )
+
+    def twist_command(self, robot: str, force: ArrayLike, twist: ArrayLike) -> NDArray[np.float32]:
+        """The speed [m/s] and turn rate [rad/s] (2,) float32 that an action sets for one period.
+
+        Args:
+            robot: its name; it has wheels.
+            force: (2,) shares that it sets, as `Decision.force`.
+            twist: (2,) its present speed along its heading [m/s] and turn rate [rad/s].
+
+        Raises:
+            ReadingError: no such robot, it has no wheels, or not two finite numbers.
+        """
+        member = self._member(robot, "unicycle", "differential")
+        return twist_command(self.contract, member, _two(force, "force"), _two(twist, "twist"))
+
+    def wheel_speeds(self, robot: str, twist: ArrayLike) -> NDArray[np.float32]:
+        """The speeds (2,) float32 [m/s] of the left and the right wheel of a differential drive.
+
+        Args:
+            robot: its name.
+            twist: (2,) speed along its heading [m/s] and turn rate [rad/s].
+
+        Raises:
+            ReadingError: no such robot, it has another drive, or not two finite numbers.
+        """
+        return wheel_speeds(self._member(robot, "differential"), _two(twist, "twist"))
 
     def act(self, view: PolicyInput) -> NDArray[Any]:
         """Choose the actions of whole worlds, (E, R) or (E, R, 2); see `Policy.act`.
@@ -209,6 +268,14 @@ class Exported:
             mean = mean + noise
         return np.tanh(mean)
 
+    def _member(self, robot: str, *drives: str) -> Member:
+        """A robot with one of some drives."""
+        member = self.contract.robots[self._number(robot)]
+        if member.drive not in drives:
+            known = " or ".join(repr(one) for one in drives)
+            raise ReadingError("robot", f"{robot} has the drive {member.drive!r}: must be {known}")
+        return member
+
     def _number(self, robot: str) -> int:
         try:
             return self._numbers[robot]
@@ -224,17 +291,8 @@ def _two(value: ArrayLike, place: str) -> NDArray[np.float32]:
     return found.astype(np.float32)
 
 
-def _check_columns(contract: Contract) -> None:
-    """Refuse a contract whose parts do not make one observation."""
-    abilities = contract.abilities
-    names = [column.name for column in contract.observation]
-    faults = [name for name in names if name.startswith("own.fault.")]
-    own = 4 + len(abilities) + 1 + len(faults)  # position and velocity, and availability
-    times = sum(f"victim_0.{one}" in names for one in TIMES)
-    victim = 3 + len(abilities) + times  # presence and place
-    expected = len(contract.robots) * own + contract.victim_slots * victim
-    if len(names) != expected or bool(faults) != contract.observe_faults:
-        raise ValueError(f"observation: has {len(names)} columns: must have {expected}")
+def _check_names(contract: Contract) -> None:
+    """Refuse a team in which two robots have the same name."""
     if len({robot.name for robot in contract.robots}) != len(contract.robots):
         raise ValueError("robots: a name comes twice")
 
@@ -251,8 +309,8 @@ def _actors(found: ExportFolder, backend: Backend) -> list[Actor]:
             made[name] = OnnxActor(found.files[file], place, contract, mark)
     else:
         tensors = tensors_in(found.files[WEIGHTS])
-        frame = _frame_of(contract)
         for name in contract.actors:
+            frame = frame_of(contract, name)
             own = {
                 key.removeprefix(f"{name}."): value
                 for key, value in tensors.items()
@@ -268,13 +326,3 @@ def _refuse_not_finite(contract: Contract, actors: list[Actor]) -> None:
     for robot, actor in zip(contract.robots, actors, strict=True):
         if not np.isfinite(actor.logits(row)).all():
             raise ValueError(f"{robot.actor}: gives numbers that are not finite; it is damaged")
-
-
-def _frame_of(contract: Contract) -> Frame | None:
-    """The frame that the policies see in; None where they see the world as it is."""
-    if contract.network.frame is None:
-        return None
-    if contract.action_kind == "continuous":
-        return Frame(contract.network.frame, len(contract.observation), None)
-    pushes = [(int(x), int(y)) for x, y in (action.force for action in contract.actions)]
-    return Frame(contract.network.frame, len(contract.observation), pushes)

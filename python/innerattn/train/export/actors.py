@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,14 +11,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from innerattn.config import RunConfig
+from innerattn.config import Robot, RunConfig
 from innerattn.errors import ExportError
 from innerattn.learn.framed import unframed
 from innerattn.learn.types import Learner
 from innerattn.nn import Actor, EntityColumns, PerRobotLinear
 from innerattn.nn.actions import mean_and_log_std
 from innerattn.policies.exported.backend import FORCE, LOGITS, POLICY, PROBABILITIES
-from innerattn.policies.exported.frame import SWAPPED, Frame
+from innerattn.policies.exported.frame import Frame
 
 
 @dataclass(frozen=True)
@@ -67,12 +68,19 @@ def team_actors(config: RunConfig, actor: Actor, entities: EntityColumns | None)
         entities: the columns that the actor encodes separately; None: it takes the whole row.
     """
     robots = config.scenario.robots
-    shared = config.network.parameter_sharing == "kind"
-    of_robot = tuple(robot.kind if shared else robot.name for robot in robots)
+    of_robot = tuple(robot.name for robot in robots)
+    if config.network.parameter_sharing == "kind":
+        of_robot = tuple(_shared_name(robot, robots) for robot in robots)
     actors = {}
     for name in dict.fromkeys(of_robot):
         actors[name] = _of_robot(actor, of_robot.index(name), entities)
     return TeamActors(of_robot, actors)
+
+
+def _shared_name(robot: Robot, team: Sequence[Robot]) -> str:
+    """The actor of a robot's kind; one for each drive, which frames turn in unlike ways."""
+    alike = {other.drive for other in team if other.kind == robot.kind} == {robot.drive}
+    return robot.kind if alike else f"{robot.kind}-{robot.drive}"
 
 
 def _of_robot(actor: Actor, robot: int, entities: EntityColumns | None) -> Actor:
@@ -109,9 +117,9 @@ class OnnxForm(nn.Module):
         self.actor = actor
         self.framed = frame is not None
         if frame is not None:
-            self.signs = _table(frame.signs)
-            self.swapped = _table(frame.swapped)
-            self.actions = _table(frame.mirrors if frame.forward is None else frame.forward)
+            self.signs, self.order = _table(frame.signs), _table(frame.order)
+            self.outputs = _table(frame.outputs if frame.forward is None else frame.forward)
+            self.mirrors = _table(frame.mirrors)
             self.x, self.y = _table(frame.x), _table(frame.y)
             self.importance = _table(frame.importance)
 
@@ -122,13 +130,11 @@ class OnnxForm(nn.Module):
         else:
             element = self._element(observation)
             turned = self._turned(observation, element)
-            logits = self._logits(turned).gather(1, self.actions[element])
+            logits = self._logits(turned).gather(1, self.outputs[element])
         return logits, logits.softmax(dim=1)
 
     def _turned(self, observation: Tensor, element: Tensor) -> Tensor:
-        turned = observation * self.signs[element]
-        swapped = turned.index_select(1, self.swapped)
-        return torch.where((element >= 4).unsqueeze(1), swapped, turned)
+        return (observation * self.signs[element]).gather(1, self.order[element])
 
     def _logits(self, rows: Tensor) -> Tensor:
         logits: Tensor = self.actor(rows.unsqueeze(0))
@@ -157,9 +163,7 @@ class OnnxVectorForm(OnnxForm):
         else:
             element = self._element(observation)
             inside = self._policy(self._turned(observation, element))
-            swapped = inside[:, SWAPPED]
-            policy = torch.where((element >= 4).unsqueeze(1), swapped, inside)
-            policy = policy * self.actions[element]
+            policy = inside.gather(1, self.outputs[element]) * self.mirrors[element]
         return policy, policy[:, :2].tanh()
 
     def _policy(self, rows: Tensor) -> Tensor:

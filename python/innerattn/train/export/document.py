@@ -9,7 +9,7 @@ from hashlib import sha256
 from importlib.metadata import version
 from typing import Any
 
-from innerattn.config import RunConfig
+from innerattn.config import Robot, RunConfig, Scenario
 from innerattn.nn import EntityColumns
 from innerattn.nn.actions import LOG_STD_RANGE, LOG_STD_SHIFT
 from innerattn.policies.exported.contract import (
@@ -21,7 +21,9 @@ from innerattn.policies.exported.contract import (
     Network,
     digest_of,
 )
-from innerattn.train.columns import vector_columns
+from innerattn.policies.exported.frame import Frame
+from innerattn.train.export.about import about
+from innerattn.train.frames import turning_columns
 
 MAX_AGE_PERIODS = 3
 """How many control periods old a reading may be, if nothing else is asked for."""
@@ -34,44 +36,10 @@ _FORCES = (
     ("+y", (0.0, 1.0)),
     ("-y", (0.0, -1.0)),
 )
-PUSHES = [(int(x), int(y)) for _, (x, y) in _FORCES]
-"""Direction of each action."""
-
-_ABOUT = {
-    "frames": "World frame: origin in the centre of the arena, x and y along its walls, metres. "
-    "relative_* columns are differences in axes of the world frame; nothing is rotated with the "
-    "robot's heading. The ONNX files take rows in this frame and give actions in it; a frame that "
-    "the team was trained in is inside them.",
-    "observation": "One float32 number for each column, in this order. own.* comes from the "
-    "robot's own estimate of its pose and velocity. teammate_k.* comes from the last message of "
-    "the k-th other robot in the order of `robots`, minus the robot's own position or velocity. "
-    "victim_k.* comes from the list of victims that are waiting.",
-    "victims": "With victim_order 'relevant': first the victims that need an ability of this "
-    "robot, then the others; within each the nearer first. With 'slot': as in the list. Slots "
-    "without a victim are zeros.",
-    "not_heard": "All columns of a teammate that is not heard are zeros, its abilities and "
-    "availability too. A message older than max_age_s counts as not heard.",
-    "faults": "frozen_sensor: give the row of the step before once more. blackout: zeros, except "
-    "own abilities, availability and faults. unavailable: the robot's own availability is 0 in "
-    "its row and in its messages. Noise needs nothing: all relative columns use the robot's own "
-    "estimate.",
-    "action": "One action for each control period. Its force is held for the whole period. Without "
-    "contact that is the velocity clip((1 - damping) v + force * drive_force_n / mass_kg * "
-    "control_period_s, max_speed_mps), set at the start of the period, where v is the present "
-    "velocity and clip shortens the vector.",
-    "probabilities": "softmax of the logits. With greedy_actions the likeliest action is taken, "
-    "else one is drawn.",
-}
-_ABOUT_FORCES = _ABOUT | {
-    "action": "One force for each control period, as a share of full force along x and y. A vector "
-    "longer than 1 is shortened to 1. It is held for the whole period. Without contact that is the "
-    "velocity clip((1 - damping) v + force * drive_force_n / mass_kg * control_period_s, "
-    "max_speed_mps), set at the start of the period, where v is the present velocity and clip "
-    "shortens the vector.",
-    "probabilities": "The output `policy` holds means x and y, then log standard deviations x and "
-    "y, of a normal distribution. Its draws go through tanh on each axis. With greedy_actions the "
-    "force is tanh of the means, the output `force`, else one is drawn.",
-}
+_PUSHES = [(int(x), int(y)) for _, (x, y) in _FORCES]
+_WAYS = ("stop", "forward", "backward", "left", "right")
+_WHEELS = ((0.0, 0.0), (1.0, 1.0), (-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0))
+"""What the actions of a differential drive set of its left and right wheel."""
 
 
 def contract_document(
@@ -102,6 +70,8 @@ def contract_document(
     parts = asdict(network)
     if network.log_std is None:
         del parts["log_std"]  # so that earlier versions read the contract
+    if network.frame is not None and not network.frame.rays:
+        del parts["frame"]["rays"], parts["frame"]["ray_turns"]
     kind = {"action_kind": scenario.actions} if continuous else {}
     forces = () if continuous else _FORCES
     worlds = scenario.model_dump(mode="json")
@@ -109,7 +79,7 @@ def contract_document(
         {
             "format": FORMAT,
             "version": VERSION,
-            "about": _ABOUT_FORCES if continuous else _ABOUT,
+            "about": about(scenario),
             "made_with": {
                 name: version(name) for name in ("innerattn", "torch", "onnx", "onnxscript")
             },
@@ -136,6 +106,7 @@ def contract_document(
                     "radius_m": robot.radius_m,
                     "drive_force_n": robot.drive_force_n,
                     "actor": actor,
+                    **_body_of(robot, continuous),
                 }
                 for robot, actor in zip(scenario.robots, of_robot, strict=True)
             ],
@@ -153,8 +124,54 @@ def contract_document(
             },
             "checked": None,
             **kind,
+            **_spots_of(scenario),
         }
     )
+
+
+def _body_of(robot: Robot, continuous: bool) -> dict[str, Any]:
+    """What a contract says of a robot that does more than push and see everything."""
+    found: dict[str, Any] = {}
+    if robot.drive != "force":
+        found["drive"] = robot.drive
+    if robot.has_wheels:
+        shares = _WHEELS if robot.drive == "differential" else _PUSHES
+        actions = () if continuous else zip(_WAYS, shares, strict=True)
+        found["actions"] = [
+            {"number": number, "name": name, "force": share}
+            for number, (name, share) in enumerate(actions)
+        ]
+        found["max_turn_rad_s"] = robot.max_turn_rad_s
+        found["acceleration_m_s2"] = robot.acceleration_m_s2
+    if robot.drive == "unicycle":
+        found["turn_acceleration_rad_s2"] = robot.turn_acceleration_rad_s2
+    elif robot.drive == "differential":
+        found["track_m"] = robot.track_m
+    if robot.sight_m is not None:
+        found["sight_m"] = robot.sight_m
+    if robot.field_of_view_deg < 360.0:
+        found["field_of_view_deg"] = robot.field_of_view_deg
+    if robot.range_sensor is not None:
+        sensor = robot.range_sensor
+        found["range_sensor"] = {
+            "rays": sensor.rays,
+            "range_m": sensor.range_m,
+            "angles_rad": sensor.angles_rad(),
+        }
+    if robot.battery is not None:
+        found["battery_j"] = robot.battery.capacity_j
+    if robot.load is not None:
+        found["load"] = robot.load
+    return found
+
+
+def _spots_of(scenario: Scenario) -> dict[str, Any]:
+    """Stations and depots, of which robots see the nearest."""
+    found = {
+        "stations": [one.position_m for one in scenario.stations],
+        "depots": [one.position_m for one in scenario.depots],
+    }
+    return {name: places for name, places in found.items() if places}
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -167,8 +184,10 @@ def network_of(config: RunConfig, names: Sequence[str], entities: EntityColumns 
     """What numpy needs to know of the actors."""
     frame = None
     if config.network.symmetry == "canonical":
-        found = vector_columns(names)
-        frame = FrameColumns(found.vectors, found.handed, found.anchors)
+        found = turning_columns(config.scenario, names)
+        frame = FrameColumns(
+            found.vectors, found.handed, found.anchors, found.rays, found.ray_turns
+        )
     return Network(
         encoder=config.network.encoder,
         hidden_width=config.network.hidden_width,
@@ -177,6 +196,20 @@ def network_of(config: RunConfig, names: Sequence[str], entities: EntityColumns 
         frame=frame,
         log_std=_log_std() if config.scenario.actions == "continuous" else None,
     )
+
+
+def frame_in(network: Network, width: int, drive: str, continuous: bool) -> Frame | None:
+    """The frame of robots with a drive; None where the network has none.
+
+    Args:
+        network: of the team.
+        width: D.
+        drive: what actions set, as `Robot.drive`.
+        continuous: whether actions are.
+    """
+    if network.frame is None:
+        return None
+    return Frame(network.frame, width, None if continuous else _PUSHES, drive)
 
 
 def _log_std() -> LogStd:
@@ -195,23 +228,33 @@ _SOURCES = {
     "teammate": "the teammate's last message",
     "victim": "the list of victims",
 }
+_AXES = "world axes, relative to the robot"
+_UNITS = {
+    "position": ("m", "world"),
+    "velocity": ("m/s", "world"),
+    "relative_position": ("m", _AXES),
+    "relative_velocity": ("m/s", _AXES),
+    "heading": ("1", "world"),
+    "station": ("m", _AXES),
+    "depot": ("m", _AXES),
+    "turn_rate": ("rad/s", "none"),
+    "ahead": ("m", "the robot's heading"),
+    "left": ("m", "the robot's heading"),
+}
+_FAULT_UNITS = {"heading_bias": "rad", "position_noise": "m", "velocity_noise": "m/s"}
+_SENSES = {
+    "ray": "the robot's range sensor",
+    "seen": "what the robot sees",
+    "since_seen": "what the robot sees",
+    "heard": "whom the robot hears",
+}
 
 
 def _column(name: str) -> dict[str, str]:
     owner, _, quantity = name.partition(".")
-    unit, frame = "1", "none"
-    first = quantity.split(".")[0]
-    if first in ("position", "velocity"):
-        unit, frame = ("m", "world") if first == "position" else ("m/s", "world")
-    elif first in ("relative_position", "relative_velocity"):
-        unit = "m" if first == "relative_position" else "m/s"
-        frame = "world axes, relative to the robot"
-    elif first == "fault":
-        kinds = {"heading_bias": "rad", "position_noise": "m", "velocity_noise": "m/s"}
-        unit = kinds.get(quantity.split(".")[1], "1")
-    return {
-        "name": name,
-        "unit": unit,
-        "frame": frame,
-        "source": _SOURCES[owner.split("_")[0]],
-    }
+    first, *more = quantity.split(".")
+    unit, frame = _UNITS.get(first, ("1", "none"))
+    if first == "fault":
+        unit = _FAULT_UNITS.get(more[0], "1")
+    source = _SENSES.get(first, _SOURCES[owner.split("_")[0]])
+    return {"name": name, "unit": unit, "frame": frame, "source": source}

@@ -12,7 +12,6 @@ from pathlib import Path
 
 from innerattn.config import RunConfig
 from innerattn.config.files import sync_folder, write_whole
-from innerattn.config.refusals import refuse_stores_drives_and_senses
 from innerattn.envs import BatchEnv
 from innerattn.errors import ExportError, MissingLibraryError, missing_library
 from innerattn.learn.types import Learner
@@ -25,13 +24,12 @@ from innerattn.policies.exported.contract import (
     contract_text,
     digest_of,
 )
-from innerattn.policies.exported.frame import Frame
 from innerattn.policies.exported.team import Exported
 from innerattn.records.run_files import RunFiles, amend
 from innerattn.train.columns import entity_columns
 from innerattn.train.export.actors import OnnxForm, OnnxVectorForm, inner_actor, team_actors
 from innerattn.train.export.check import check_export
-from innerattn.train.export.document import PUSHES, contract_document, network_of
+from innerattn.train.export.document import contract_document, frame_in, network_of
 from innerattn.train.export.onnx_file import onnx_files
 from innerattn.train.policy import load_newest
 from innerattn.train.weights import write_weights
@@ -68,8 +66,7 @@ def export_run(run: str | Path, out: str | Path | None = None) -> tuple[Path, Co
         MissingLibraryError: a library of the extra ``deploy`` is not installed.
         ExportError: the folder is already there or cannot be made, the run's policy is not one of
             this package, or the exported one differs from it.
-        RunError, ConfigError: there is no readable run, it holds no weights, or its robots have a
-            battery, a load, a limited sight or limited communication.
+        RunError, ConfigError: there is no readable run, or it holds no weights.
         OSError: the run's manifest cannot be written.
     """
     needed_libraries()
@@ -100,7 +97,6 @@ def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: 
     """Fill a folder, and check what is in it."""
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         names = env.observation_names()
-    refuse_stores_drives_and_senses(config.scenario, "exported policies")
     if config.network.memory_width:
         raise ExportError(
             f"{run}: network.memory_width = {config.network.memory_width}: exported policies have "
@@ -119,10 +115,14 @@ def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: 
     network = network_of(config, names, entities)
     continuous = config.scenario.actions == "continuous"
     form = OnnxVectorForm if continuous else OnnxForm
-    pushes = None if continuous else PUSHES
-    frame = None if network.frame is None else Frame(network.frame, len(names), pushes)
     scenario_sha256 = digest_of(config.scenario.model_dump(mode="json"))
-    forms = {name: form(one, frame) for name, one in team.actors.items()}
+    drives = {
+        name: robot.drive for name, robot in zip(team.of_robot, config.scenario.robots, strict=True)
+    }
+    forms = {
+        name: form(one, frame_in(network, len(names), drives[name], continuous))
+        for name, one in team.actors.items()
+    }
     marks = {name: onnx_mark(weights_sha256, scenario_sha256, name) for name in forms}
     for name, data in onnx_files(forms, len(names), marks).items():
         write_whole(out / files[name], data)
