@@ -92,8 +92,6 @@ pub struct Layout {
     hears: bool,
     /// Whether rows hold nothing but bodies, motion and victims.
     plain: bool,
-    /// Whether victims have services, deadlines or an order.
-    times: bool,
     widths: Widths,
     /// The columns that never change, of all robots (R × D); zeros elsewhere.
     fixed: Vec<f32>,
@@ -114,6 +112,8 @@ struct Widths {
     victims_from: usize,
     /// Of one victim.
     victim: usize,
+    /// Of its service, its deadline and the order of its task.
+    times: usize,
     /// Of a heading, at the end of a robot's block, and of a bearing, at that of a victim's: two, or none.
     heading: usize,
     /// Of a whole row.
@@ -149,14 +149,12 @@ impl Layout {
             rays,
             hears: scenario.communication.is_some_and(|one| one.limits()),
             plain: false,
-            times: false,
             widths: Widths::default(),
             abilities,
             needs,
             fixed: vec![],
         };
         layout.plain = layout.stores.is_none() && layout.sight.is_none() && layout.wheels.is_none();
-        layout.times = layout.services.is_some() || layout.deadlines.is_some() || layout.order.is_some();
         layout.widths = layout.count_columns();
         layout.fixed = layout.fixed_columns(scenario);
         layout
@@ -201,19 +199,15 @@ impl Layout {
         let heading = 2 * usize::from(self.wheels.is_some());
         let robot = self.stores_from() + stores.map_or(0, Stores::robot_width) + heading;
         let limited = usize::from(self.sight.is_some());
-        let victim = 3
-            + self.abilities.len()
-            + usize::from(self.services.is_some())
-            + usize::from(self.deadlines.is_some())
-            + usize::from(self.order.is_some())
-            + limited
-            + heading;
+        let times = [self.services.is_some(), self.deadlines.is_some(), self.order.is_some()];
+        let times = times.into_iter().filter(|there| *there).count();
+        let victim = 3 + self.abilities.len() + times + limited + heading;
         let rays = self.rays.as_ref().map_or(0, Rays::width);
         let ways = stores.map_or(0, Stores::ways_width) + usize::from(self.wheels.is_some()) + rays;
         let mate = robot + 2 * limited + usize::from(self.hears);
         let victims_from = robot + ways + (self.robots - 1) * mate;
         let row = victims_from + self.victims * victim;
-        Widths { robot, ways, rays, mate, victims_from, victim, heading, row }
+        Widths { robot, ways, rays, mate, victims_from, victim, times, heading, row }
     }
 
     /// The blocks of the robot itself and of its teammates.
@@ -415,7 +409,7 @@ impl Layout {
                 *column = *need;
             }
             (row[1 + abilities], row[2 + abilities]) = (place.x, place.y);
-            if self.times {
+            if self.widths.times > 0 {
                 self.write_times(victim, victims, step, row);
             }
             if let Some(since) = since.get(usize::from(*slot)) {
