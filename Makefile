@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PYTHONDONTWRITEBYTECODE := # compiled modules are kept: the tests begin many processes
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train robot test test-pool test-asan test-gpu test-slow examples study-kill reliability soak lint lint-rust lint-python format bench lock docs site schemas dist smoke bounds setup clean
+.PHONY: train robot test test-pool test-asan test-gpu test-slow examples study-kill reliability soak lint lint-rust lint-python format bench lock docs site schemas dist smoke bounds wasm setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -122,6 +122,14 @@ $(VENV)/.built: $(VENV)/.installed $(RUST)
 	cargo build --release --quiet --locked -p innerattn-py --features pyo3/extension-module & \
 	maturin develop --release --quiet --locked --extras dev; code=$$?; wait; exit $$code
 	@touch $@
+
+RUST_SRC ?= $(shell rustc --print sysroot)/lib/rustlib/src/rust/library# sources of the standard library
+WASM_TARGET := target/wasm
+
+wasm: ## compile the worlds for pages (WebAssembly); needs the sources of Rust's standard library, RUST_SRC=FOLDER says where
+	RUSTC_BOOTSTRAP=1 __CARGO_TESTS_ONLY_SRC_ROOT=$(RUST_SRC) cargo build --quiet -p innerattn-wasm --target-dir $(WASM_TARGET) $$($(PYTHON) rust_env/wasm/sources.py --flags)
+	cp $(WASM_TARGET)/wasm32-unknown-unknown/page/innerattn_wasm.wasm python/innerattn/report/page/worlds.wasm
+	$(PYTHON) rust_env/wasm/sources.py
 
 lock: $(VENV)/.installed ## renew constraints.txt: the newest versions that pyproject.toml allows
 	PIP_CONSTRAINT= pip install --dry-run --ignore-installed --report $(VENV)/report.json '.[dev,log,peers]'

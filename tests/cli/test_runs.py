@@ -83,7 +83,8 @@ def test_a_misspelt_run_is_asked_for(runs: Path, wrong: str, meant: str) -> None
 
 
 @pytest.mark.parametrize(
-    "command", ["evaluate", "export", "play", "replay", "report", "robustness", "train", "watch"]
+    "command",
+    ["evaluate", "export", "page", "play", "replay", "report", "robustness", "train", "watch"],
 )
 def test_every_command_asks_for_a_misspelt_run(
     runs: Path, command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

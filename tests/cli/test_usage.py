@@ -87,20 +87,25 @@ def test_the_nearest_value_is_named(line: str, capsys: Captured) -> None:
 def test_equal_faults_have_equal_codes(tmp_path: Path, capsys: Captured) -> None:
     wrong = tmp_path / "wrong.toml"
     wrong.write_text("situaton = 'mixed'\n")
-    out_of_range = ["train --seed -1", "evaluate random --seed -1", "play random --seed -1"]
+    out_of_range = [
+        "train --seed -1",
+        "evaluate random --seed -1",
+        "play random --seed -1",
+        "page random --seed -1",
+    ]
     out_of_range += ["replay random --seed -1", "robustness random --seed -1"]
     for line in out_of_range:
         assert main(line.split()) == 2, line
-    scenario = ["train", "evaluate random", "play random", "replay random", "info"]
+    scenario = ["train", "evaluate random", "play random", "page random", "replay random", "info"]
     missing = [f"{command} --scenario none.toml" for command in scenario]
     for line in missing:
         assert main(line.split()) == 1, line
     for command in scenario:
         assert main([*command.split(), "--scenario", str(wrong)]) == 1, command
-    for command in ("evaluate", "replay", "report", "robustness", "watch", "play"):
+    for command in ("evaluate", "replay", "report", "robustness", "watch", "play", "page"):
         assert main([command, "no-such-run"]) == 1, command
     err = capsys.readouterr().err
-    assert err.count("\n") == len(out_of_range) + 2 * len(scenario) + 6
+    assert err.count("\n") == len(out_of_range) + 2 * len(scenario) + 7
     assert err.count("did you mean situation?") == len(scenario)
 
 

@@ -8,12 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
 import pytest
-from made_export import made_export
-
-from innerattn.config import RangeSensor, Scenario
-from innerattn.policies import Exported
 
 STEPS = 8
 
@@ -52,60 +47,6 @@ def test_clocks_too_far_apart_are_as_good_as_no_link(robot: ModuleType, export: 
     found = drive(robot, export, skew_s=1000.0)
     assert found.commands > 0
     assert found.heard == 0
-
-
-@pytest.fixture(scope="module")
-def rovers(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A team on wheels whose cameras look ahead, with rays, of which nobody hears all."""
-    sensor = RangeSensor(rays=5, range_m=0.8, field_of_view_deg=180.0)
-    robots = [
-        robot.replace(drive=drive, field_of_view_deg=200.0, range_sensor=sensor)
-        for robot, drive in zip(Scenario().robots, 2 * ["unicycle", "differential"], strict=True)
-    ]
-    values = {
-        "scenario.robots": [robot.model_dump() for robot in robots],
-        "scenario.communication": {"share": "victims", "range_m": 1.0},
-    }
-    return made_export(tmp_path_factory.mktemp("rovers"), "ppo-inner", **values)[1]
-
-
-@pytest.mark.long
-def test_what_robots_on_wheels_sense_makes_the_rows_of_their_world(
-    robot: ModuleType, rovers: Path
-) -> None:
-    from robot.member import OWN_ALONE
-    from robot.senses import sensed
-
-    team = Exported(rovers, backend="numpy")
-    env = robot.Drive(rovers, seed=3).world(team)
-    rng = np.random.default_rng(0)
-    heard_less = 0
-    for _ in range(20):
-        obs = env.step(rng.integers(0, 5, (1, 4))).obs[0]
-        found = [sensed(env, team, index) for index in range(4)]
-        told = {
-            name: {key: one for key, one in each["own"].items() if key not in OWN_ALONE}
-            for name, each in zip(team.robot_names, found, strict=True)
-        }
-        for index, name in enumerate(team.robot_names):
-            unseen = found[index].pop("unseen")
-            heard = [team.robot_names[other] for other in np.flatnonzero(env.heard()[0, index])]
-            heard_less += len(heard) < 3
-            teammates = {other: told[other] for other in told if other != name}
-            teammates |= {
-                other: None if since is None else {"since_seen": since}
-                for other, since in unseen.items()
-            }
-            row = team.row(name, {**found[index], "teammates": teammates, "heard": heard})
-            np.testing.assert_allclose(row, obs[index], atol=2e-6)
-    assert heard_less
-
-
-@pytest.mark.long
-def test_processes_drive_robots_on_wheels(robot: ModuleType, rovers: Path) -> None:
-    found = drive(robot, rovers, latency_s=0.05, loss=0.2)
-    assert found.commands > 0
-    assert 0 < found.heard < 3 * found.commands
 
 
 @pytest.mark.usefixtures("robot")

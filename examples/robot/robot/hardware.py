@@ -22,7 +22,6 @@ from innerattn.envs import BatchEnv
 from innerattn.policies import Exported, PolicyInput
 from robot.link import LinkSettings, open_socket, pack, received
 from robot.member import MemberSettings
-from robot.senses import sensed
 
 _START_S = 120.0
 """Processes must have begun within so long [s]."""
@@ -214,13 +213,28 @@ def _sense(
     port: socket.socket,
     addresses: dict[str, tuple[Address, int]],
 ) -> None:
-    """Tell each robot what its own sensors give."""
+    """Tell each robot its own pose and velocity, and where victims are."""
+    positions, velocities = env.positions()[0].tolist(), env.velocities()[0].tolist()
+    tasks = [task.name for task in team.contract.tasks]
+    victims = [
+        {"task": tasks[one["task"]], "position": [float(one["x"]), float(one["y"])]}
+        if one["present"]
+        else None
+        for one in env.victims()[0]
+    ]
+    unavailable = env.fault_state()["unavailable"][0] >= 1.0
     for index, (address, _) in enumerate(addresses.values()):
+        own = {
+            "position": positions[index],
+            "velocity": velocities[index],
+            "available": not unavailable[index],
+        }
         message: dict[str, Any] = {
             "kind": "sense",
             "tick": tick,
             "episode": int(env.episodes()[0]),
-            **sensed(env, team, index),
+            "own": own,
+            "victims": victims,
         }
         port.sendto(pack(message), address)
 

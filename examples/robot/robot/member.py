@@ -20,8 +20,6 @@ from robot.link import LOOPBACK, Clock, LinkSettings, LossyLink, open_socket, pa
 
 LISTEN_SHARE = 0.3
 """Part of a control period that a robot listens to its teammates before it decides."""
-OWN_ALONE = ("turn_rate", "ranges")
-"""What a robot senses and does not tell."""
 _MOST_PATIENCE_S = 1.0
 """So often a process that waits looks whether the hardware's process is still there [s]."""
 
@@ -53,8 +51,6 @@ class Member:
         self._team = Exported(settings.export, backend=settings.backend, seed=settings.seed)  # type: ignore[arg-type]
         self._max_age_s = self._team.contract.max_age_s
         self._period_s = self._team.contract.control_period_s
-        columns = [column.name for column in self._team.contract.observation]
-        self._tells_who_is_heard = "teammate_0.heard" in columns
         self._hardware = open_socket()
         self._hardware.connect((LOOPBACK, settings.hardware_port))
         link = LinkSettings(settings.latency_s, settings.loss, settings.skew_s)
@@ -114,7 +110,7 @@ class Member:
             }
         self._sensed = {**message, "time": now}
         self._decide_at = now + LISTEN_SHARE * self._period_s
-        own = {key: one for key, one in message["own"].items() if key not in OWN_ALONE}
+        own = {key: message["own"][key] for key in ("position", "velocity", "available")}
         told = {"robot": self._name, "episode": message["episode"], "time": now, "body": own}
         self._link.send(told, self._peers, now)
 
@@ -136,11 +132,6 @@ class Member:
             for name, one in self._heard.items()
             if one["episode"] == sensed["episode"] and isinstance(one["body"], dict)
         }
-        fresh = [
-            name for name, one in teammates.items() if abs(now - one["time"]) <= self._max_age_s
-        ]
-        for name, since in sensed.get("unseen", {}).items():  # it hears them, but does not see them
-            teammates[name] = None if since is None else {"since_seen": since}
         readings = {
             "now": now,
             "own": {**sensed["own"], "time": sensed["time"]},
@@ -148,8 +139,7 @@ class Member:
             "victims": sensed["victims"],
             "teammates": teammates,
         }
-        if self._tells_who_is_heard:
-            readings["heard"] = fresh
+        fresh = [one for one in teammates.values() if abs(now - one["time"]) <= self._max_age_s]
         try:
             decision = self._team.decide(self._name, readings)
         except ReadingError as error:  # no command: the hardware gives no force then

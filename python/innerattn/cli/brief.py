@@ -137,6 +137,17 @@ BRIEF: Mapping[str, Brief] = {
         ),
         ("zoo:mixed", "latest --scenario flood.toml"),
     ),
+    "page": Brief(
+        "[OPTIONS] RUN|POLICY",
+        (
+            ("RUN|POLICY", "a run (also zoo:NAME), or a script that a page can compute: random"),
+            ("-o, --output FILE", "page to write: .html ({output})"),
+            ("--preset NAME", "built-in scenario to play in (that of the run, or mixed)"),
+            ("--scenario FILE", "TOML file with the scenario to play in, instead"),
+            ("--seed N", "seed of the world"),
+        ),
+        ("zoo:mixed", "latest -o team.html", "random --preset mixed-wheels"),
+    ),
     "export": Brief(
         "[OPTIONS] RUN",
         (

@@ -25,6 +25,7 @@ from innerattn.cli.export import Export
 from innerattn.cli.info import Info
 from innerattn.cli.new import New
 from innerattn.cli.options import UsageError
+from innerattn.cli.page import Page
 from innerattn.cli.plain import escaped_output
 from innerattn.cli.play import Play
 from innerattn.cli.replay import Replay
@@ -61,6 +62,7 @@ COMMANDS: Mapping[str, Any] = {
     "report": Report,
     "watch": Watch,
     "play": Play,
+    "page": Page,
     "robustness": Robustness,
     "reproduce": Reproduce,
     "study": Study,

@@ -122,9 +122,18 @@ class InteractiveWorld:
         self._note_lost(env.lost())
         self._choose()
 
-    def restart(self) -> None:
-        """Begin the next episode, without the faults that somebody has set."""
-        self._begin(self._env.reset())
+    def restart(self, seed: int | None = None) -> None:
+        """Begin an episode, without the faults that somebody has set.
+
+        Args:
+            seed: of the world and of what policies draw: it begins their episode 0; None: the next
+                episode.
+        """
+        if seed is None:
+            self._begin(self._env.reset())
+            return
+        self._seed = stream_seed(seed, "evaluation")
+        self._begin(self._env.reset(self._seed))
 
     def choose_policy(self, name: str) -> None:
         """Let another policy act, from the present state on.

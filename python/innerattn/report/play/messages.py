@@ -36,13 +36,14 @@ class Step(_Message):
 
 
 class Restart(_Message):
-    """The next episode."""
+    """The next episode, or episode 0 of a seed."""
 
     do: Literal["restart"]
+    seed: Annotated[int, Field(ge=0, lt=2**53)] | None = None
 
     def apply(self, world: InteractiveWorld) -> None:
         """Begin it."""
-        world.restart()
+        world.restart(self.seed)
 
 
 class ChoosePolicy(_Message):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from innerattn.config import Scenario
 from innerattn.evaluate.interactive import HEALTHY, MOST_PUSH_MPS, InteractiveWorld
 from innerattn.evaluate.moment import Moment
 from innerattn.report.worlds import worlds_document
@@ -19,13 +20,20 @@ _DECIMALS = 5
 
 def opening_document(session: str, world: InteractiveWorld) -> dict[str, Any]:
     """What a page gets first: its session, the world, the policies, and the state."""
-    scenario = world.scenario
-    reach = np.float32(scenario.arena_half_width_m) - np.float32(scenario.wall_clearance_m)
-    known = {"most_push_mps": MOST_PUSH_MPS, "victim_reach_m": float(str(reach))}
     return state_document(world.moment()) | {
         "session": session,
-        "worlds": worlds_document(scenario) | known | {"num_victims": scenario.num_victims},
+        "worlds": playable_worlds(world.scenario),
         "policies": list(world.policies),
+    }
+
+
+def playable_worlds(scenario: Scenario) -> dict[str, Any]:
+    """What does not change while a page plays: the worlds, and what hands may do."""
+    reach = np.float32(scenario.arena_half_width_m) - np.float32(scenario.wall_clearance_m)
+    return worlds_document(scenario) | {
+        "most_push_mps": MOST_PUSH_MPS,
+        "victim_reach_m": float(str(reach)),
+        "num_victims": scenario.num_victims,
     }
 
 

@@ -1,4 +1,4 @@
-// The page: what is chosen, what is shown, and when the server is asked for the next step.
+// The page: what is chosen, what is shown, and when the next step is asked for.
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const CHART_STEPS = 100;
@@ -60,9 +60,7 @@ class App {
   }
 
   fillControls() {
-    const { situation, robots } = this.worlds;
-    $("subtitle").textContent = `Situation ${situation}, ${counted(robots.length, "robot")}. Drag a robot or ` +
-      "a victim, break something, and watch what the team does.";
+    $("subtitle").textContent = aboutText(this.worlds, this.run.heads > 0);
     fillSelect($("policy"), this.policies.map((name) => [name, name]), this.run.now.policy);
     fillSelect($("speed"), SPEEDS.map((speed) => [String(speed), `${speed}×`]), "");
     fillSelect($("task"), this.worlds.tasks.map(({ name }, task) => [String(task), name]), "0");
@@ -76,6 +74,10 @@ class App {
     on("run", "click", () => this.setRunning(!this.running));
     on("step", "click", () => this.step());
     on("restart", "click", () => this.restart());
+    on("from-seed", "submit", (event) => {
+      event.preventDefault();
+      this.send({ do: "restart", seed: Number(event.target.elements.seed.value) });
+    });
     on("speed", "change", () => this.setSpeed(Number($("speed").value)));
     on("policy", "change", () => this.choosePolicy($("policy").value));
     on("head", "change", () => this.setLook({ head: Number($("head").value) }));
@@ -133,8 +135,7 @@ class App {
     this.setRunning(false);
     const again = element("button", { type: "button" }, "Begin again");
     again.addEventListener("click", () => location.reload());
-    const text = error instanceof Refusal ? error.message :
-      `The server does not answer (${error.message}). Is innerattn play still running?`;
+    const text = error instanceof Refusal ? error.message : this.link.transport.lost(error);
     clearTimeout(this.telling);
     $("problem").replaceChildren(text, again);
     $("problem").hidden = false;
@@ -149,8 +150,7 @@ class App {
 
   /** Shows a state. */
   take(state, isStep = false) {
-    const { episode } = this.run.now ?? state;
-    if (state.episode !== episode) this.events.clear();
+    if (!this.run.continues(state)) this.events.clear();
     const events = this.run.take(state);
     this.events.add(events, this.worlds.dt_s);
     if (isStep) this.arrived = performance.now();
@@ -370,7 +370,7 @@ function pressed(app, event) {
 }
 
 async function start() {
-  const link = new Link(), opened = await link.open();
+  const link = new Link(await transport()), opened = await link.open();
   $("main").hidden = false;
   window.play = new App(link, opened);
 }

@@ -1,18 +1,19 @@
-// Messages to the server, one after the other.
+// Messages to what answers this page, one after the other.
 
 const SCHEMA_VERSION = 1;
 
-/** What the server refused, in its words; `ended`: the session is over. */
+/** What was refused, in its words; `ended`: the session is over. */
 class Refusal extends Error {
-  constructor(text, status) {
+  constructor(text, ended = false) {
     super(text);
-    this.ended = status === 410;
+    this.ended = ended;
   }
 }
 
 class Link {
-  constructor() {
-    Object.assign(this, { session: "", waiting: 0, tail: Promise.resolve(), sent: 0 });
+  /** `transport` has ask(path, message), leave(path) and lost(error). */
+  constructor(transport) {
+    Object.assign(this, { transport, session: "", waiting: 0, tail: Promise.resolve(), sent: 0 });
   }
 
   /** Begins a session; gives the opening document. */
@@ -34,20 +35,15 @@ class Link {
     return answer;
   }
 
-  /** Tells the server that the page goes away. */
+  /** Says that the page goes away. */
   end() {
-    const body = new Blob(['{"do":"end"}'], { type: "application/json" });
-    if (this.session) navigator.sendBeacon(`sessions/${this.session}`, body);
+    if (this.session) this.transport.leave(`sessions/${this.session}`);
     this.session = "";
   }
 
   async post(path, message) {
     this.sent = performance.now();
-    const answer = await fetch(path, {
-      method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(message),
-    });
-    const document = await answer.json();
-    if (!answer.ok) throw new Refusal(document.error, answer.status);
+    const document = await this.transport.ask(path, message);
     if (document.schema_version !== SCHEMA_VERSION) {
       throw new Error(`the server speaks version ${document.schema_version}, this page ${SCHEMA_VERSION}`);
     }

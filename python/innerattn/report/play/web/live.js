@@ -16,9 +16,14 @@ class LiveRun {
     this.cuts = this.worlds.robots.map(() => 0);
   }
 
+  /** Whether a state belongs to the episode that is known. */
+  continues({ episode, step }) {
+    return Boolean(this.now) && episode === this.now.episode && step >= this.now.step;
+  }
+
   /** Takes a state; gives what happened, as events. */
   take(state) {
-    const before = this.now, again = Boolean(before) && before.episode === state.episode;
+    const before = this.now, again = this.continues(state);
     if (!again) this.clear();
     if (again && state.step === before.step) this.moments[this.moments.length - 1] = state;
     else this.moments.push(state);

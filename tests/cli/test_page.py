@@ -1,0 +1,88 @@
+"""`innerattn page`: which file the command writes, and what it refuses."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from innerattn.cli.main import main
+
+
+def given(path: Path) -> dict[str, Any]:
+    """What the page's world begins with."""
+    found = re.search(
+        r'<script id="given" type="application/json">(.*?)</script>', path.read_text()
+    )
+    assert found is not None
+    document: dict[str, Any] = json.loads(found[1])
+    return document
+
+
+def test_a_team_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "team.html"
+    words = ["--preset", "mixed-faults", "--seed", "3"]
+    assert main(["page", "zoo:mixed-faults", "-o", str(out), *words]) == 0
+    size = out.stat().st_size
+    assert size < 3_000_000
+    assert capsys.readouterr().out == f"{out}: mixed-faults, {size / 1e6:.1f} MB\n"
+    found = given(out)
+    assert [one["name"] for one in found["policies"]] == ["mixed-faults", "random"]
+    assert found["seed"] == str(2**63 + 3)
+    scenario = json.loads(found["scenario"])
+    assert scenario["faults"]
+    assert scenario["episode_steps"] == 1_000_000
+    assert "http" not in re.sub(
+        r"http-equiv|www\.w3\.org", "", out.read_text().split('id="given"')[0]
+    )
+
+
+def test_a_run_and_a_script_are_written(run_dir: Path, tmp_path: Path) -> None:
+    out = tmp_path / "page.html"
+    assert main(["page", str(run_dir), "-o", str(out)]) == 0
+    assert given(out)["policies"][0]["name"] == run_dir.name
+    assert main(["page", "random", "-o", str(out), "--preset", "air-ground"]) == 0
+    assert [one["name"] for one in given(out)["policies"]] == ["random"]
+    assert len(given(out)["worlds"]["layers"]) == 2
+
+
+@pytest.mark.long
+def test_a_team_of_the_package_needs_no_torch(tmp_path: Path) -> None:
+    out = str(tmp_path / "a.html")
+    code = (
+        "import sys\n"
+        "from innerattn.cli.main import main\n"
+        f"code = main(['page', 'zoo:mixed', '-o', {out!r}])\n"
+        "sys.exit(code or bool({'torch', 'onnx', 'safetensors'} & sys.modules.keys()))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    other = tmp_path / "other.toml"
+    other.write_text("max_victims = 5\n")
+    cases = [
+        (1, ["nobody"], "nobody: neither a run's folder nor one of random, greedy, hungarian"),
+        (1, ["oracle"], "oracle: a page has no such script"),
+        (1, ["zoo:any"], "a page cannot play it: train.method = 'team-inner'"),
+        (1, [str(tmp_path)], f"{tmp_path}/run.json: missing"),
+        (2, ["random", "--seed", "-1"], "--seed -1: must be 0 to 2**63 - 1"),
+        (2, ["random", "-o", "page.gif"], "-o page.gif: must end in .html"),
+        (1, ["random", "-o", str(tmp_path / "none" / "page.html")], "none: no such folder"),
+        (1, ["random", "--preset", "mxied"], "mxied"),
+        (1, ["random", "--scenario", "none.toml"], "none.toml"),
+        (2, ["random", "--preset", "mixed", "--scenario", str(other)], "only one of them"),
+        (1, [str(run_dir), "--scenario", str(other)], "was trained for other observations"),
+    ]
+    for code, options, message in cases:
+        options = options if "-o" in options else [*options, "-o", str(tmp_path / "page.html")]
+        assert main(["page", *options]) == code, options
+        captured = capsys.readouterr()
+        assert message in captured.err
+        assert captured.err.count(os.linesep) == 1
+        assert not captured.out
+    assert not (tmp_path / "page.html").exists()
