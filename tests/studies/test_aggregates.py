@@ -11,12 +11,12 @@ from made_run import LOGGED, made_run
 
 from innerattn.config import RunConfig
 from innerattn.report.study.exports import marl_eval_document, rliable_document
-from innerattn.report.study.page import aggregates_table, algorithm_names
+from innerattn.report.study.page import aggregates_table, algorithm_names, means_table
 from innerattn.report.table import markdown
 from innerattn.stats.aggregate import interquartile_mean
 from innerattn.studies.aggregates import THRESHOLDS, aggregate, performance_profile
 from innerattn.studies.plan import PlannedRun
-from innerattn.studies.results import Result
+from innerattn.studies.results import Length, Mean, Result, Values
 
 SCORES = {
     ("mixed", "mappo"): {0: 0.9, 1: 0.95, 2: 0.2},
@@ -44,6 +44,17 @@ def test_profiles_against_a_plain_loop(tasks: list[list[float]]) -> None:
     for threshold, share in zip(THRESHOLDS, found, strict=True):
         plain = [sum(score > threshold for score in scores) / len(scores) for scores in tasks]
         assert share == pytest.approx(sum(plain) / len(plain))
+
+
+def test_places_of_grids_that_set_other_keys_stand_in_one_table() -> None:
+    values: dict[tuple[str, Length], Values] = {("score", "standard"): Values({0: 0.5}, None)}
+    found = [
+        Mean({"scenario": scenario, **keys}, (0,), values, {"standard": 25})
+        for scenario, keys in (("mixed", {}), ("office", {"network.hidden_width": 128}))
+    ]
+    table = markdown(means_table(found))
+    assert "| mixed    | default" in table
+    assert "| office   | 128" in table
 
 
 def test_algorithms_over_their_tasks() -> None:

@@ -207,7 +207,7 @@ def aggregates_table(aggregates: Mapping[Length, Mapping[str, Aggregate]]) -> Ta
 def algorithm_names(found: Sequence[Aggregate]) -> dict[str, Aggregate]:
     """Algorithms by a name of their own: what differs between their places in the grid."""
     varied = varied_in([one.algorithm for one in found]) or ["method"]
-    return {" ".join(str(one.algorithm[key]) for key in varied): one for one in found}
+    return {" ".join(_named(one.algorithm, varied)): one for one in found}
 
 
 def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:
@@ -221,7 +221,7 @@ def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:
     rows = []
     for one in found:
         cells = [value_cell(x) if seeds else plus_minus(x.mean) for x in one.values.values()]
-        rows.append([*(str(one.place[key]) for key in varied), format_seeds(one.seeds), *cells])
+        rows.append([*_named(one.place, varied), format_seeds(one.seeds), *cells])
     heads = []
     for measure, length in found[0].values:
         if measure.startswith(RETAINED):  # its episodes have a length of their own
@@ -328,6 +328,11 @@ def _sides(compared: Sequence[Compared]) -> list[tuple[str, str]]:
         shared = [str(one.a[key]) for key in varied if key not in free and key in one.a]
         texts.append((f"{a} - {b}", " ".join(shared)))
     return texts
+
+
+def _named(place: Mapping[str, Value], varied: Sequence[str]) -> list[str]:
+    """What differs of a place; a grid may leave out what another one sets."""
+    return [str(place.get(key, "default")) for key in varied]
 
 
 def varied_in(places: Sequence[Mapping[str, Value]]) -> list[str]:
