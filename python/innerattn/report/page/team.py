@@ -133,7 +133,7 @@ def _frame(names: Sequence[str]) -> dict[str, Any]:
     """The tables of the frames that a team sees in."""
     frame = Frame(frame_columns(names), len(names), _PUSHES)
     assert frame.forward is not None  # as actions are discrete
-    tables = {"signs": frame.signs.astype(int), "swapped": frame.swapped, "forward": frame.forward}
+    tables = {"signs": frame.signs.astype(int), "order": frame.order, "forward": frame.forward}
     return {name: table.tolist() for name, table in (tables | {"x": frame.x, "y": frame.y}).items()}
 
 

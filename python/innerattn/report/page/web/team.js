@@ -150,8 +150,8 @@ class Team {
 
   turned(row, element) {
     if (!this.frame) return Array.from(row);
-    const { signs, swapped } = this.frame, mirrored = Array.from(row, (value, at) => value * signs[element][at]);
-    return element >= 4 ? swapped.map((column) => mirrored[column]) : mirrored;
+    const { signs, order } = this.frame, mirrored = Array.from(row, (value, at) => value * signs[element][at]);
+    return order[element].map((column) => mirrored[column]);
   }
 }
 
