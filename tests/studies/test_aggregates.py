@@ -16,7 +16,8 @@ from innerattn.report.table import markdown
 from innerattn.stats.aggregate import interquartile_mean
 from innerattn.studies.aggregates import THRESHOLDS, aggregate, performance_profile
 from innerattn.studies.plan import PlannedRun
-from innerattn.studies.results import Length, Mean, Result, Values
+from innerattn.studies.results import Mean, Result, Values
+from innerattn.studies.space import Length
 
 SCORES = {
     ("mixed", "mappo"): {0: 0.9, 1: 0.95, 2: 0.2},
@@ -53,8 +54,8 @@ def test_places_of_grids_that_set_other_keys_stand_in_one_table() -> None:
         for scenario, keys in (("mixed", {}), ("office", {"network.hidden_width": 128}))
     ]
     table = markdown(means_table(found))
-    assert "| mixed    | default" in table
-    assert "| office   | 128" in table
+    assert "| mixed | default |" in table
+    assert "| office | 128 |" in table
 
 
 def test_algorithms_over_their_tasks() -> None:
