@@ -92,6 +92,7 @@ def test_what_is_run_elsewhere_is_there() -> None:
 def place(tmp_path: Path, run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder in which a user would type the commands, with what the pages name."""
     monkeypatch.chdir(tmp_path)
+    shutil.copytree(ROOT / "examples" / "scenarios", tmp_path / "examples" / "scenarios")
     for name in ("NAME", "OTHER", "mine", "first", "hardened", "harbour", "mixed-s0"):
         shutil.copytree(run_dir, tmp_path / "runs" / name)
     for page in PAGES:
