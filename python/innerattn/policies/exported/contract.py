@@ -352,8 +352,9 @@ def _check_member(robot: Member, actions: int) -> None:
     }
     if None in needed.get(robot.drive, ()):
         raise ValueError(f"robots: {robot.name} lacks a limit of its drive {robot.drive!r}")
-    if len(robot.actions) != (actions if robot.has_wheels else 0):
-        raise ValueError(f"robots: {robot.name} must have {actions} actions of its own, on wheels")
+    own = actions if robot.has_wheels else 0
+    if len(robot.actions) != own:
+        raise ValueError(f"robots: {robot.name} must have {own} actions of its own")
     sensor = robot.range_sensor
     if sensor is not None and len(sensor.angles_rad) != sensor.rays:
         raise ValueError(f"robots: {robot.name} must have an angle for each ray")
