@@ -28,8 +28,8 @@ def ready(page: Page) -> None:
 
 
 def settle(page: Page) -> None:
-    """Wait for answers that are under way, and for what they show."""
-    until(page, "!play.link.busy && !play.stale")
+    """Wait for answers that are under way, and until the page shows the last state."""
+    until(page, "!play.link.busy && !play.stale && play.hands.step === play.run.last")
 
 
 def sensing() -> Scenario:

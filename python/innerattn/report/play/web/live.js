@@ -112,25 +112,29 @@ class LiveRun {
     return this.moments[index];
   }
 
+  /** The moment that shows a robot at a step: a later one if somebody has put it elsewhere since. */
+  momentOf(step, robot) {
+    return this.moment(this.cuts[robot] > Math.floor(step) ? step + 1 : step);
+  }
+
   firstOf(episode, robot) {
     return Math.max(this.first, this.cuts[robot]);
   }
 
   place(episode, step, robot) {
     if (this.held?.robot === robot) return [this.held.x, this.held.y];
-    const low = this.moment(step).positions[robot], high = this.moment(step + 1).positions[robot];
-    const share = step - Math.floor(step), isCut = this.cuts[robot] > Math.floor(step);
-    if (isCut || !share) return isCut ? high : low;
+    const low = this.momentOf(step, robot).positions[robot], high = this.moment(step + 1).positions[robot];
+    const share = step - Math.floor(step);
     return [low[0] + (high[0] - low[0]) * share, low[1] + (high[1] - low[1]) * share];
   }
 
   velocity(episode, step, robot) {
-    return this.moment(step).velocities[robot];
+    return this.momentOf(step, robot).velocities[robot];
   }
 
   /** Where a robot on wheels points, rad; null for another one. */
   heading(episode, step, robot) {
-    return this.worlds.robots[robot].has_wheels ? this.moment(step).headings[robot][0] : null;
+    return this.worlds.robots[robot].has_wheels ? this.momentOf(step, robot).headings[robot][0] : null;
   }
 
   served(episode, step, { id }) {
@@ -142,7 +146,7 @@ class LiveRun {
   }
 
   isBlocked(episode, step, robot) {
-    return this.moment(step).blocked[robot];
+    return this.momentOf(step, robot).blocked[robot];
   }
 
   weight(episode, step, head, robot, other) {
@@ -172,7 +176,7 @@ class LiveRun {
 
   /** What a ray of a robot's range sensor reads: 1 - distance / range; 0: it meets nothing. */
   reading(episode, step, robot, ray) {
-    return this.moment(step).rays[robot][ray];
+    return this.momentOf(step, robot).rays[robot][ray];
   }
 
   isAway(episode, step, robot) {
