@@ -20,10 +20,12 @@ class AlgorithmConfig(Model, ABC):
     """Base of the configuration section of an algorithm; `place` is the name of the section.
 
     Attributes:
+        for_any_team: Whether it learns one policy for any team, in teams of a family, too.
         remembers: Whether the learner's networks may have a memory (`network.memory_width`).
         speaks: Whether its policies may have messages (`network.message_width`).
     """
 
+    for_any_team: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
     speaks: ClassVar[bool] = False
     gamma: float = Field(0.95, ge=0.0, le=1.0, description="discount per control step")
@@ -38,6 +40,18 @@ class AlgorithmConfig(Model, ABC):
         """Transitions that all updates of ``env_steps`` compute with, each as often as it is used.
 
         Decides whether compiling the update pays.
+        """
+
+    @property
+    def batches(self) -> Mapping[str, int]:
+        """Sizes that workers share among them beside the worlds, by key of the section."""
+        return {}
+
+    def check_memory(self) -> None:
+        """Check keys that only matter where networks have a memory.
+
+        Raises:
+            ValueError: they contradict each other; the message begins with the key.
         """
 
     @property

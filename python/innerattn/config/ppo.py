@@ -80,6 +80,14 @@ class PPOConfig(AlgorithmConfig):
         1e-2, gt=0.0, description="least standard deviation of returns that rewards are divided by"
     )
 
+    def check_memory(self) -> None:
+        """Check that a rollout is made of whole sequences."""
+        if self.rollout_steps % self.sequence_steps:
+            raise ValueError(
+                f"ppo.sequence_steps = {self.sequence_steps}: must divide ppo.rollout_steps = "
+                f"{self.rollout_steps}"
+            )
+
     @property
     def needs_afterstates(self) -> bool:
         """Whether values after a step are those of afterstates."""

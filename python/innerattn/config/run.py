@@ -28,7 +28,6 @@ from innerattn.config.registry import algorithms, methods
 from innerattn.config.scenario import Scenario
 from innerattn.config.sections import EvaluateConfig, ImitationConfig, NetworkConfig, TrainConfig
 from innerattn.config.td import TDConfig
-from innerattn.config.team import TeamConfig
 from innerattn.errors import ConfigError
 
 BUDGETS = preset_names("budgets")
@@ -98,8 +97,8 @@ class RunConfig(Model):
     def shared_by_workers(self) -> dict[str, int]:
         """What `train.workers` must divide, by key."""
         wholes = {"train.num_envs": self.train.num_envs}
-        if isinstance(self.algorithm, TDConfig):
-            wholes["td.batch_size"] = self.td.batch_size
+        algorithm = self.algorithm
+        wholes |= {f"{algorithm.place}.{key}": n for key, n in algorithm.batches.items()}
         if self.train.warm_start != "none":
             wholes["imitation.batch_size"] = self.imitation.batch_size
         return wholes
@@ -233,11 +232,11 @@ class RunConfig(Model):
     def _check_any_team(self) -> None:
         """Refuse a family, and imitation alone, for methods that learn for one team."""
         train = self.train
-        if isinstance(self.algorithm, TeamConfig):
+        if self.algorithm.for_any_team:
             if train.env_steps == 0 and train.warm_start == "none":
                 raise ValueError("train.env_steps = 0: must be at least 1 without a warm start")
             return
-        able = ", ".join(name for name in methods() if name.startswith(f"{TeamConfig.place}-"))
+        able = ", ".join(n for n, one in methods().items() if one.algorithm.config.for_any_team)
         if self.family is not None:
             raise ValueError(
                 f"family: train.method = {train.method!r} learns for one team; methods for a "
@@ -263,13 +262,10 @@ class RunConfig(Model):
                 f"{key}: train.warm_start = {train.warm_start!r} imitates single steps; must be "
                 "'none'"
             )
-        if isinstance(self.algorithm, PPOConfig):
-            rollout, sequence = self.ppo.rollout_steps, self.ppo.sequence_steps
-            if rollout % sequence:
-                raise ValueError(
-                    f"ppo.sequence_steps = {sequence}: must divide ppo.rollout_steps = {rollout}, "
-                    f"because {key}"
-                )
+        try:
+            self.algorithm.check_memory()
+        except ValueError as error:
+            raise ValueError(f"{error}, because {key}") from None
 
     def _check_messages(self) -> None:
         """Refuse messages for what cannot train them."""

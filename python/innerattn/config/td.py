@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -73,6 +74,11 @@ class TDConfig(AlgorithmConfig):
                 f"td.batch_size = {self.batch_size}"
             )
         return self
+
+    @property
+    def batches(self) -> Mapping[str, int]:
+        """A minibatch is drawn by all workers together."""
+        return {"batch_size": self.batch_size}
 
     @property
     def rows_per_update(self) -> int:

@@ -16,6 +16,7 @@ class TeamConfig(AlgorithmConfig):
     """Learning of one policy for any team, whose networks know no names and no number of robots."""
 
     place: ClassVar[str] = "team"
+    for_any_team: ClassVar[bool] = True
     removed: ClassVar[Mapping[str, object]] = {}
 
     gamma: float = Field(0.98, ge=0.0, le=1.0, description="discount per control step")

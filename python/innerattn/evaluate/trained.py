@@ -11,7 +11,6 @@ import torch
 from numpy.typing import NDArray
 
 from innerattn.config import RunConfig, Scenario
-from innerattn.config.team import TeamConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.learn.types import Learner, RememberingLearner
@@ -67,7 +66,7 @@ def load_trained(
         ConfigError: its configuration is not valid.
     """
     config, learner = load_policy(run, scenario=scenario)
-    for_one_team = not isinstance(config.algorithm, TeamConfig)
+    for_one_team = not config.algorithm.for_any_team
     if for_one_team and scenario is not None and _seen(scenario) != _seen(config.scenario):
         raise RunError(
             f"{run}: was trained for other observations than these worlds give "

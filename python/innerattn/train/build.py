@@ -14,7 +14,6 @@ from torch import Tensor
 
 from innerattn.config import RunConfig
 from innerattn.config.registry import methods
-from innerattn.config.team import TeamConfig
 from innerattn.cores import usable_cores
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError, RunError
@@ -24,7 +23,7 @@ from innerattn.learn.types import Learner, LearnerClass, Team
 from innerattn.nn import SquareSymmetry
 from innerattn.train.columns import entity_columns, hearing, partner_columns, state_columns
 from innerattn.train.frames import turning_columns
-from innerattn.train.teams.learner import team_networks
+from innerattn.train.teams.learner import team_networks, team_section
 from innerattn.train.teams.policy import TeamPolicy
 
 
@@ -40,7 +39,7 @@ def build_learner(config: RunConfig, env: BatchEnv, *, training: bool = False) -
         ConfigError: the device does not exist here, or the scenario does not allow
             `network.symmetry`.
     """
-    if isinstance(config.algorithm, TeamConfig):
+    if config.algorithm.for_any_team:
         return TeamPolicy(config, env)
     names, team = env.observation_names(), team_of(config, env)
     make: LearnerClass = resolve_name(methods()[config.train.method].algorithm.learner)
@@ -73,8 +72,8 @@ def refuse_larger_networks(
         RunError: the configuration asks for larger networks.
     """
     with torch.device("meta"):  # tensors have a shape and no memory there
-        if isinstance(config.algorithm, TeamConfig):
-            networks = team_networks(config.algorithm)
+        if config.algorithm.for_any_team:
+            networks = team_networks(team_section(config))
         else:
             team, generator = team_of(config, env), torch.Generator("cpu")
             networks = draw_networks(team, config.network, generator, critic_outputs=1)

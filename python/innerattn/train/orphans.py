@@ -16,9 +16,6 @@ from pathlib import Path
 
 from innerattn.train.run_lock import FolderLock
 
-if sys.platform != "win32":
-    import fcntl
-
 _NAME = re.compile(r"\..+\.([1-9][0-9]{0,9})")
 _FILE = re.compile(r"config\.toml|run\.json|\.(config\.toml|run\.json)\.[0-9]+\.[0-9a-f]{16}")
 
@@ -69,13 +66,12 @@ def sweep_orphans(parent: Path) -> None:
 
 def _remove_if_orphan(folder: Path) -> None:
     with suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        lock = FolderLock(folder)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if _is_ours(folder):
-                shutil.rmtree(folder)
+            if lock.refused is None and _is_ours(folder):
+                shutil.rmtree(folder)  # never through a symbolic link
         finally:
-            os.close(descriptor)
+            lock.release()
 
 
 def _is_ours(folder: Path) -> bool:

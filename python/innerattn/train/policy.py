@@ -12,7 +12,6 @@ from pathlib import Path
 from torch import Tensor
 
 from innerattn.config import RunConfig, Scenario
-from innerattn.config.team import TeamConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.learn.actor_critic import MOMENTS
@@ -97,7 +96,7 @@ def _load(files: RunFiles, name: str, device: str, scenario: Scenario | None) ->
     known = files.info.weights_sha256 if files.info.state != "running" else None
     tensors = weights_in(files.read(name, MOST_BYTES), weights, known)
     worlds = config.scenario
-    if scenario is not None and isinstance(config.algorithm, TeamConfig):
+    if scenario is not None and config.algorithm.for_any_team:
         worlds = scenario
     with closing(BatchEnv(worlds, 1, num_threads=1)) as env:
         refuse_larger_networks(config, env, tensors, weights)

@@ -10,7 +10,6 @@ import torch
 
 from innerattn.config import RunConfig
 from innerattn.config.streams import stream_seed
-from innerattn.config.team import TeamConfig
 from innerattn.envs import BatchEnv
 from innerattn.learn import workers
 from innerattn.train.build import keep_heap_small, torch_threads
@@ -61,7 +60,7 @@ def prepared(
         chosen_matmul_backend(config.train.matmul_backend) as matmul_backend,
         remembered_interruptions() as interruptions,
     ):
-        if isinstance(config.algorithm, TeamConfig):
+        if config.algorithm.for_any_team:
             with closing(TeamTraining(config, stage)) as training:
                 yield Prepared(training, False, matmul_backend, interruptions)
             return

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import RunConfig, Scenario
-from innerattn.config.team import TeamConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
 from innerattn.policies.exported.contract import FrameColumns
@@ -142,7 +141,7 @@ def _refuse(run: str | Path, config: RunConfig) -> None:
     network, scenario = config.network, config.scenario
     turns = network.symmetry == "canonical"
     refused = [
-        (isinstance(config.algorithm, TeamConfig), f"train.method = {config.train.method!r}"),
+        (config.algorithm.for_any_team, f"train.method = {config.train.method!r}"),
         (network.encoder != "flat", f"network.encoder = {network.encoder!r}"),
         (network.memory_width > 0, f"network.memory_width = {network.memory_width}"),
         (network.message_width > 0, f"network.message_width = {network.message_width}"),
