@@ -68,7 +68,7 @@ def walk(budgets: Path) -> Algorithm:
 
 
 def test_the_built_in_methods_are_these() -> None:
-    kinds = ("inner", "uniform", "frozen", "oracle")
+    kinds = ("inner", "uniform", "frozen", "oracle", "max", "independent")
     known = [f"{algorithm}-{kind}" for algorithm in ("td", "ppo") for kind in kinds]
     any_team = [f"team-{pooling}" for pooling in ("inner", "uniform", "max", "nearest")]
     known += ["mappo", *any_team]
@@ -81,7 +81,7 @@ def test_the_built_in_methods_are_these() -> None:
 
 @pytest.mark.usefixtures("walk")
 def test_methods_of_a_registered_algorithm() -> None:
-    assert [*registry.methods()][-3:] == ["walk-frozen", "walk-oracle", "stroll"]
+    assert [*registry.methods()][-3:] == ["walk-max", "walk-independent", "stroll"]
     config = load_run_config(method="walk-uniform")
     assert config.algorithm == WalkConfig()
     assert config.network.attention == "uniform"

@@ -1,13 +1,15 @@
-"""Properties of the two attentions."""
+"""Properties of the attentions."""
 
 import pytest
 import torch
 from torch import Tensor
 
-from innerattn.nn import InnerAttention, UniformAttention
+from innerattn.learn.adam import Network
+from innerattn.learn.compiled import traced
+from innerattn.nn import Critic, InnerAttention, MaxAttention, NoAttention, UniformAttention
 
 WIDTH, HEADS, BATCH = 8, 2, 5
-KINDS = [InnerAttention, UniformAttention]
+KINDS = [InnerAttention, UniformAttention, MaxAttention]
 
 
 def make(kind: type, seed: int = 0):
@@ -38,6 +40,62 @@ def test_uniform_attention_is_the_mean_of_the_teammates(robots: int) -> None:
     assert out.scores is None
     expected = (torch.ones(robots, robots) - torch.eye(robots)) / (robots - 1)
     torch.testing.assert_close(out.weights, expected.double().expand(BATCH, HEADS, -1, -1))
+
+
+@pytest.mark.parametrize("masked", [False, True])
+@pytest.mark.parametrize("robots", [1, 2, 3, 6])
+def test_max_attention_beside_plain_loops(robots: int, masked: bool) -> None:
+    attention = make(MaxAttention)
+    own, others = encodings(robots)
+    drawn = torch.rand((BATCH, robots), generator=torch.Generator().manual_seed(2)) > 0.5
+    out = attention(own, others, drawn if masked else None)
+    v = values(attention, others)
+    for i in range(robots):
+        for b in range(BATCH):
+            seen = [j for j in range(robots) if j != i and (drawn[b, j] or not masked)]
+            shares = torch.zeros(HEADS, robots, dtype=torch.float64)
+            for feature in range(WIDTH):
+                most = max(seen, key=lambda j: v[j, b, feature], default=None)
+                if most is not None:
+                    shares[feature * HEADS // WIDTH, most] += HEADS / WIDTH
+                assert out.mixed[i, b, feature] == (0.0 if most is None else v[most, b, feature])
+            torch.testing.assert_close(out.weights[b, :, i], shares)
+    assert out.scores is None
+
+
+def test_the_largest_values_alone_get_a_gradient() -> None:
+    attention = make(MaxAttention)
+    own, others = encodings(4)
+    others.requires_grad_()
+    attention(own, others).mixed[0].sum().backward()
+    assert not others.grad[0].any()  # a robot is not its own teammate
+    assert others.grad[1:].any(2).any(1).all()
+
+
+@pytest.mark.parametrize("kind", [MaxAttention, NoAttention])
+def test_a_compiled_critic_gives_the_same_values(kind: type) -> None:
+    source = torch.Generator().manual_seed(0)
+    critic = Critic(4, 6, 5, kind(8, 2, source), source)
+    obs = torch.randn(4, 7, 6, generator=source)
+    actions = torch.randint(0, 5, (4, 7), generator=source)
+    for available in (None, torch.rand((7, 4), generator=source) > 0.4):
+        compiled = traced(Network(critic))(obs, actions, available)
+        torch.testing.assert_close(compiled.q, critic(obs, actions, available).q)
+
+
+def test_without_attention_a_value_depends_on_the_robot_alone() -> None:
+    source = torch.Generator().manual_seed(0)
+    critic = Critic(3, 6, 5, NoAttention(8, 2, source), source)
+    obs = torch.randn(3, 4, 6, generator=source)
+    actions = torch.zeros(3, 4, dtype=torch.int64)
+    before = critic(obs, actions)
+    assert not before.attended.weights.any()
+    assert not before.attended.visible.any()
+    obs[1:] += 1.0
+    actions[1:] = 2
+    after = critic(obs, actions).q
+    assert torch.equal(after[0], before.q[0])
+    assert not torch.equal(after[1], before.q[1])
 
 
 @pytest.mark.parametrize("kind", KINDS)

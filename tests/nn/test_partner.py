@@ -1,4 +1,4 @@
-"""The controls of learnt attention: the right partner beside plain loops, and untrained queries."""
+"""The controls of learnt attention: right partners beside plain loops, and untrained queries."""
 
 import numpy as np
 import pytest
@@ -15,9 +15,12 @@ from innerattn.train.build import build_learner
 from innerattn.train.columns import partner_columns
 
 
-def seen(preset: str, worlds: int = 20, steps: int = 12) -> tuple[Tensor, PartnerColumns]:
+def seen(
+    preset: str | Scenario, worlds: int = 20, steps: int = 12
+) -> tuple[Tensor, PartnerColumns]:
     """Observations (R, B, D) of worlds at play, and their columns."""
-    env = BatchEnv(Scenario.preset(preset), worlds, seed=3, num_threads=1)
+    scenario = preset if isinstance(preset, Scenario) else Scenario.preset(preset)
+    env = BatchEnv(scenario, worlds, seed=3, num_threads=1)
     draw = np.random.default_rng(0)
     rows = [env.reset()]
     for _ in range(steps):
@@ -36,17 +39,20 @@ def plain(row: Tensor, columns: PartnerColumns, there: list[bool]) -> set[int]:
     if not any(need > 0.0 and can for need, can in zip(needs, own, strict=True)):
         return everyone
     missing = [need - can > 0.0 for need, can in zip(needs, own, strict=True)]
-    best, distance = None, float("inf")
-    for number in sorted(everyone):
-        can = [float(row[column]) > 0.0 for column in columns.teammate_abilities[number]]
-        if not any(one and other for one, other in zip(can, missing, strict=True)):
-            continue
-        x, y = (float(row[column]) for column in columns.teammate_places[number])
-        to_x, to_y = (float(row[column]) for column in columns.victim_place)
-        away = (x - to_x) ** 2 + (y - to_y) ** 2
-        if away < distance:
-            best, distance = number, away
-    return everyone if best is None else {best}
+    chosen = set()
+    for ability, is_missing in enumerate(missing):
+        best, distance = None, float("inf")
+        for number in sorted(everyone):
+            can = row[columns.teammate_abilities[number][ability]] > 0.0
+            if not (is_missing and can):
+                continue
+            x, y = (float(row[column]) for column in columns.teammate_places[number])
+            to_x, to_y = (float(row[column]) for column in columns.victim_place)
+            away = (x - to_x) ** 2 + (y - to_y) ** 2
+            if away < distance:
+                best, distance = number, away
+        chosen |= set() if best is None else {best}
+    return chosen or everyone
 
 
 @pytest.mark.parametrize("preset", ["mixed", "single", "mixed-8", "mixed-1-food"])
@@ -67,6 +73,22 @@ def test_the_right_partner_beside_plain_loops(preset: str, masked: bool) -> None
             assert set(found[b, i].nonzero().flatten().tolist()) == expected
             alone += len(expected) == 1
     assert alone > batch * robots / 4  # the loop has seen partners
+
+
+def test_a_victim_with_three_needs_asks_for_two_partners() -> None:
+    mixed = Scenario.preset("mixed-8")
+    needs = tuple(sorted({ability for robot in mixed.robots for ability in robot.abilities}))
+    assert len(needs) == 3
+    scenario = mixed.replace(tasks=({"name": "all", "needs": needs},))
+    obs, columns = seen(scenario)
+    found = right_partners(obs, columns, None)
+    robots, batch, _ = obs.shape
+    for b in range(batch):
+        for i in range(robots):
+            teammates = [j for j in range(robots) if j != i]
+            expected = {teammates[n] for n in plain(obs[i, b], columns, [True] * (robots - 1))}
+            assert len(expected) == 2
+            assert set(found[b, i].nonzero().flatten().tolist()) == expected
 
 
 def test_a_victim_with_two_of_one_need_asks_for_a_robot_of_the_same_kind() -> None:

@@ -29,6 +29,8 @@ _attentions = {
     "uniform": "innerattn.nn:UniformAttention",
     "frozen": "innerattn.nn:FrozenAttention",
     "oracle": "innerattn.nn:OracleAttention",
+    "max": "innerattn.nn:MaxAttention",
+    "independent": "innerattn.nn:NoAttention",
 }
 
 

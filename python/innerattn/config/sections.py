@@ -30,7 +30,8 @@ class NetworkConfig(Model):
     attention: Attention = Field(
         "inner",
         description="inner: learnt; uniform: 1/(N-1); frozen: as drawn, untrained; oracle: all on "
-        "the partner that the first victim needs; or none; follows from the method",
+        "the partners that the first victim needs; max: the largest of each feature; independent: "
+        "no teammates; none: one network over all observations; follows from the method",
     )
     mask_unavailable: bool = Field(
         False, description="keep unavailable teammates out of the attention"

@@ -1,4 +1,6 @@
-"""Attention of each robot over its teammates: learnt, untrained or uniform, of the same parameters.
+"""Attention of each robot over its teammates: learnt, untrained, uniform, the largest, or none.
+
+All but the last have the same parameters.
 
 Sources: eqs. 2-4 of the paper, read as in Iqbal & Sha 2019, section 3.2. The softmax is over
 teammates j != i, and the query comes from an encoding without the robot's own action.
@@ -166,6 +168,40 @@ class UniformAttention(MatrixAttention):
         return self.attend(self.values(others), self.heads, available)
 
 
+class MaxAttention(MatrixAttention):
+    """A control: x_i = the largest v_j over the teammates j that robot i sees, for each feature.
+
+    A weight is the share of a head's features in which a teammate has the largest value. It has the
+    parameters of `InnerAttention`, but does not use or train query and key.
+    """
+
+    def __init__(self, width: int, heads: int, generator: torch.Generator) -> None:
+        """Draw the parameters; arguments as in `TeammateAttention`."""
+        super().__init__(width, heads, generator)
+        self.query.requires_grad_(False)
+        self.key.requires_grad_(False)
+
+    def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
+        """Take the largest values; arguments as in `TeammateAttention.forward`."""
+        del own
+        return max_attention(self.values(others), self.heads, available)
+
+
+class NoAttention(TeammateAttention):
+    """A control: the value of a robot depends on what it sees itself alone, as in independent PPO.
+
+    It has no parameters. All weights are 0, and so is x_i.
+    """
+
+    def forward(self, own: Tensor, others: Tensor, available: Tensor | None = None) -> Attended:
+        """Attend to nobody; arguments as in `TeammateAttention.forward`."""
+        del others, available
+        robots, batch, _ = own.shape
+        nobody = torch.zeros(1, robots, robots, dtype=torch.bool, device=own.device)
+        weights = own.new_zeros(1, 1, robots, robots).expand(batch, self.heads, -1, -1)
+        return Attended(torch.zeros_like(own), weights, None, nobody)
+
+
 def dot_product_attention(
     queries: Tensor, keys: Tensor, values: Tensor, heads: int, available: Tensor | None
 ) -> Attended:
@@ -216,6 +252,32 @@ def mean_attention(values: Tensor, heads: int, available: Tensor | None) -> Atte
     return Attended(
         mixed.contiguous(), weights.unsqueeze(1).expand(batch, heads, -1, -1), None, visible
     )
+
+
+def max_attention(values: Tensor, heads: int, available: Tensor | None) -> Attended:
+    """x_i = the largest v_j over the teammates j that robot i sees, for each feature.
+
+    Args:
+        values: (R, B, W).
+        heads: H.
+        available: (B, R) bool, as in `dot_product_attention`.
+    """
+    robots, batch, width = values.shape
+    visible = visible_teammates(robots, available, values.device)
+    seen = visible.any(2).t().unsqueeze(2)  # (R, 1 or B, 1) whether a robot sees anybody
+    if available is not None:
+        lowest = torch.finfo(values.dtype).min
+        values = values.masked_fill(~available.t().unsqueeze(2), lowest)
+    # A robot's largest value is the team's, or the second where the team's is its own.
+    best, who = values.topk(min(2, robots), dim=0)
+    own = who[0] == torch.arange(robots, device=values.device).view(-1, 1, 1)
+    mixed = torch.where(own, best[-1], best[0]) * seen
+    with torch.no_grad():
+        whose = torch.where(own, who[-1], who[0]).view(robots, batch, heads, width // heads)
+        counts = values.new_zeros(robots, batch, heads, robots)
+        counts.scatter_add_(3, whose, values.new_ones(()).expand(whose.shape))
+        weights = counts * (heads / width) * seen.unsqueeze(3)
+    return Attended(mixed, weights.permute(1, 2, 0, 3), None, visible)
 
 
 def _by_head(x: Tensor, heads: int) -> Tensor:

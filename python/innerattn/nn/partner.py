@@ -1,6 +1,6 @@
-"""A control for learnt attention: the whole weight on the teammate that a robot should mind.
+"""A control for learnt attention: the whole weight on the teammates that a robot should mind.
 
-A robot's own observation tells who that is, so the control knows nothing that the critic does not.
+A robot's own observation tells who they are, so the control knows nothing that the critic does not.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ class PartnerColumns:
 
 
 def right_partners(obs: Tensor, columns: PartnerColumns, available: Tensor | None) -> Tensor:
-    """The one teammate of each robot that it needs most, else all of them.
+    """The teammates that each robot needs most, else all of them.
 
-    A robot's first victim is the nearest one that the robot can help. The right partner is the
-    teammate nearest to this victim among those that have an ability that the victim still needs
-    beside the robot's own. Where there is no such victim or no such teammate, there is no right
+    A robot's first victim is the nearest one that the robot can help. For each ability that the
+    victim still needs beside the robot's own, the right partner is the teammate nearest to this
+    victim that has it. Where there is no such victim or no such teammate, there is no right
     partner, and the robot may attend to all teammates.
 
     Args:
@@ -65,16 +65,17 @@ def right_partners(obs: Tensor, columns: PartnerColumns, available: Tensor | Non
     missing = needs - own > 0.0
     flat = [column for one in columns.teammate_abilities for column in one]
     has = obs[:, :, flat].view(robots, batch, teammates, -1) > 0.0
-    useful = (has & missing.unsqueeze(2)).any(3)  # (R, B, T)
     numbers = _teammates(robots, obs.device)  # (R, T)
     there_by_teammate = there.gather(2, numbers.expand(batch, -1, -1)).transpose(0, 1)
-    useful = useful & there_by_teammate
+    useful = has & missing.unsqueeze(2) & there_by_teammate.unsqueeze(3)  # (R, B, T, A)
     flat = [column for one in columns.teammate_places for column in one]
     place = obs[:, :, flat].view(robots, batch, teammates, 2)
     away = (place - obs[:, :, list(columns.victim_place)].unsqueeze(2)).square().sum(3)
-    nearest = away.masked_fill(~useful, torch.inf).argmin(2)
-    chosen = functional.one_hot(numbers.gather(1, nearest), robots).bool()  # (R, B, R)
-    known = (helps & useful.any(2)).unsqueeze(2)
+    nearest = away.unsqueeze(3).masked_fill(~useful, torch.inf).argmin(2)  # (R, B, A)
+    found = useful.any(2)
+    robot = numbers.gather(1, nearest.flatten(1)).view(nearest.shape)
+    chosen = (functional.one_hot(robot, robots).bool() & found.unsqueeze(3)).any(2)  # (R, B, R)
+    known = (helps & found.any(2)).unsqueeze(2)
     return torch.where(known, chosen, there.transpose(0, 1)).transpose(0, 1)
 
 
@@ -85,12 +86,13 @@ def _teammates(robots: int, device: torch.device) -> Tensor:
 
 
 class OracleAttention(MatrixAttention):
-    """The whole weight on `right_partners`; equal weights for a robot that has none.
+    """Equal weights on `right_partners`, and on all teammates for a robot that has none.
 
     It has the parameters of `InnerAttention`, but does not use or train query and key.
 
     Attributes:
-        partners: Where observations say who the right partner is; set by whoever builds the critic.
+        partners: Where observations say who the right partners are; whoever builds the critic sets
+            it.
         attend: From values to the result; a compiled update has another form.
     """
 
