@@ -7,8 +7,10 @@ error. Pages need no network when they are read.
 
 import re
 import sys
+from contextlib import redirect_stdout
 from importlib import import_module
 from importlib.metadata import version as version_of
+from io import StringIO
 from pathlib import Path
 from posixpath import dirname, join, normpath
 
@@ -17,8 +19,12 @@ from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 from sphinx.util.osutil import relative_uri
 
+from innerattn.cli.main import main
+from innerattn.zoo import zoo_names
+
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
+TEAMS = [name for name in zoo_names() if name != "any"]  # a page cannot play a policy for any team
 sys.path.insert(0, str(DOCS))
 
 project = "innerattn"
@@ -79,6 +85,28 @@ def add_navigation(app: Sphinx, name: str, source: list[str]) -> None:
         app.env.note_dependency(str(DOCS / "README.md"))
 
 
+def link_teams(_: Sphinx, name: str, source: list[str]) -> None:
+    """Say where the site has a team to play with: Markdown that is read elsewhere has none."""
+    if name == root_doc:
+        text = '<a href="play/mixed.html">Play with a trained team in this browser</a>: move, push'
+        text += " and break its robots.\n\n"
+        source[0] = source[0].replace("## Two commands", f"{text}## Two commands", 1)
+    elif name == "docs/zoo":
+        for team in TEAMS:
+            to = f'<a href="../play/{team}.html">play in this browser</a>'
+            source[0] = source[0].replace(f"| `zoo:{team}` |", f"| `zoo:{team}`, {to} |", 1)
+
+
+def write_teams(app: Sphinx, failure: Exception | None) -> None:
+    """A page for each team of the package, to play with, in the folder `play`."""
+    if failure is None and app.builder.format == "html":
+        folder = Path(app.outdir) / "play"
+        folder.mkdir(exist_ok=True)
+        for team in TEAMS:
+            with redirect_stdout(StringIO()):
+                main(["page", f"zoo:{team}", "-o", str(folder / f"{team}.html")])
+
+
 def pages_of_the_program(*_: object) -> list[str]:
     """Pages that change with the program, which are made anew each time."""
     return ["docs/reference/commands", "docs/reference/keys"]
@@ -126,4 +154,6 @@ def setup(app: Sphinx) -> None:
     app.connect("source-read", load_lazy_names)
     app.add_lexer("mermaid", TextLexer)
     app.connect("source-read", add_navigation)
+    app.connect("source-read", link_teams)
     app.connect("build-finished", write_start)
+    app.connect("build-finished", write_teams)

@@ -8,12 +8,13 @@ from typing import Any, get_args
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from browser import PHONE, WIDE, opened_browser, visit
+from browser import PHONE, WIDE, opened_browser, until, visit
 from playwright.sync_api import Browser
 
 from innerattn.cli.main import COMMANDS
 from innerattn.config import RunConfig, Scenario
 from innerattn.config.team import TeamConfig
+from innerattn.zoo import zoo_names
 
 ROOT = Path(__file__).parents[2]
 
@@ -129,6 +130,19 @@ def test_no_page_scrolls_sideways(site: Path, browser: Browser, size: tuple[int,
             assert seen.page.evaluate(over) <= 0, name
             broken = "[...document.images].filter(i => i.complete && !i.naturalWidth).length"
             assert seen.page.evaluate(broken) == 0, name
+
+
+def test_the_teams_of_the_package_can_be_played_with(site: Path, browser: Browser) -> None:
+    text = (site / "docs" / "zoo.html").read_text("utf-8")
+    links = re.findall(r'href="\.\./play/([\w-]+)\.html"', text)
+    assert links == [name for name in zoo_names() if name != "any"]
+    assert 'href="play/mixed.html"' in (site / "README.html").read_text("utf-8")
+    for name in links:
+        with visit(browser, site / "play" / f"{name}.html") as seen:
+            until(seen.page, "Boolean(window.play)")
+            seen.page.get_by_role("button", name="Pause").click()
+            until(seen.page, "!play.link.busy && play.run.last > 0")
+            assert len(seen.page.evaluate("play.run.attention")) == 4, name  # heads
 
 
 def test_search_works_without_a_network(site: Path, browser: Browser) -> None:
