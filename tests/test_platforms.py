@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 WITHOUT_POSIX = """
 import os, signal, sys
 for name in ("fcntl", "resource", "termios", "pwd", "grp"):
@@ -35,6 +37,7 @@ print("started")
     assert python(WITHOUT_POSIX + code, folder=tmp_path) == "started\n"
 
 
+@pytest.mark.long
 def test_runs_go_side_by_side_where_signals_cannot_be_blocked(tmp_path: Path) -> None:
     code = """
 import signal

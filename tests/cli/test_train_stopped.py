@@ -56,6 +56,7 @@ def test_a_request_to_end_keeps_the_weights(
     assert json.loads((path / "run.json").read_text())["state"] == "interrupted"
 
 
+@pytest.mark.long
 def test_nohup_outlives_the_terminal(tiny: list[str], tmp_path: Path) -> None:
     path = tmp_path / "run"
     with logged(path, tiny, hangup=signal.SIG_IGN) as process:
@@ -109,6 +110,7 @@ def test_interruption_keeps_the_weights(
     assert said.out == ""
 
 
+@pytest.mark.long
 def test_one_that_saved_nothing_begins_anew(
     tmp_path: Path, tiny: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

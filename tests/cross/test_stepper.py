@@ -394,6 +394,7 @@ def test_worlds_with_layers_and_set_velocities_are_as_the_plain_stepper_says(chu
         assert total[what] > 50, (what, total)
 
 
+@pytest.mark.long  # teams are large, and many transitions end nothing
 @pytest.mark.parametrize("chunk", THIRDS)
 def test_worlds_that_end_when_all_is_done_are_as_the_plain_stepper_says(chunk: int) -> None:
     rng = np.random.default_rng(800 + chunk)
@@ -479,8 +480,8 @@ def test_the_usual_team_in_every_situation(situation: str, shaping: str, credit:
         action_cost=0.1,
         contact_cost=0.5,
     )
-    seen = compare(scenario, seed=7, transitions=2500)
-    assert seen["free"] > 1000
+    seen = compare(scenario, seed=7, transitions=1500)
+    assert seen["free"] > 600
     for what in ("touched", "rescues", "appeared", "terminated"):
         assert seen[what] > 40, (what, seen)
 

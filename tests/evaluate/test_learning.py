@@ -23,6 +23,7 @@ LEARNING_RATE = 0.003
         ),
     ],
 )
+@pytest.mark.long
 def test_two_robots_learn_to_rescue(method: str, tmp_path: Path) -> None:
     team = Scenario()
     scenario = Scenario(

@@ -119,6 +119,7 @@ def test_runs_are_those_of_single_commands_and_a_failure_leaves_them_alone(
         pytest.param(signal.SIGHUP, marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.long
 def test_ctrl_c_saves_every_run_and_leaves_no_process(
     sent: signal.Signals,
     tiny: list[str],

@@ -388,6 +388,7 @@ def shares_of_hits(width: int, rollouts: int) -> list[float]:
     return shares
 
 
+@pytest.mark.long
 def test_a_memory_learns_what_cannot_be_seen() -> None:
     assert sum(shares_of_hits(16, 40)[-5:]) / 5 > 0.9
     assert sum(shares_of_hits(0, 20)[-10:]) / 10 < 0.4  # one of four by chance

@@ -164,7 +164,7 @@ def test_updates_follow_gradients_to_those_who_said(
 
 
 @cases
-@pytest.mark.parametrize("after", [2, 4, 8])
+@pytest.mark.parametrize("after", [4, *(pytest.param(n, marks=pytest.mark.long) for n in (2, 8))])
 def test_it_goes_on_from_a_state(delay: int, framed: bool, network: dict, after: int) -> None:
     """In the middle of a rollout, of an episode, and with messages on their way."""
     whole, cut, other = (make(delay, network, seed=seed) for seed in (3, 3, 8))
@@ -321,7 +321,13 @@ def shares_of_hits(width: int, rollouts: int, pooling: str = "attention", delay:
     return shares
 
 
-@pytest.mark.parametrize("pooling", ["attention", "mean", "max", "nearest"])
+@pytest.mark.parametrize(
+    "pooling",
+    [
+        "attention",
+        *(pytest.param(one, marks=pytest.mark.long) for one in ("mean", "max", "nearest")),
+    ],
+)
 def test_robots_learn_what_to_say(pooling: str) -> None:
     assert sum(shares_of_hits(8, 24, pooling)[-16:]) / 16 > 0.9
 

@@ -87,6 +87,7 @@ def test_each_run_meets_the_faults_once(done: StudyFolder) -> None:
     ]
 
 
+@pytest.mark.long
 def test_other_faults_are_measured_anew_and_runs_without_are_told(done: StudyFolder) -> None:
     _, files = write_study(done, read_results(done))
     assert "6 of these have not met the faults" in files[0].read_text()

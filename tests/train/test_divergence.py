@@ -62,7 +62,9 @@ def break_the_actor(patched: pytest.MonkeyPatch, kind: type[ActorCritic]) -> lis
     return done
 
 
-@pytest.mark.parametrize(("method", "kind"), CASES)
+@pytest.mark.parametrize(
+    ("method", "kind"), [pytest.param(*CASES[0], marks=pytest.mark.long), CASES[1]]
+)
 def test_a_run_that_stops_goes_on_from_before_the_update(
     small_config: Configure,
     tmp_path: Path,

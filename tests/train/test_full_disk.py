@@ -214,6 +214,7 @@ def not_mounted(why: str) -> None:
     [(0.5,), pytest.param([n / 25 for n in range(25)], marks=pytest.mark.slow)],
     ids=["one size", "25 sizes"],
 )
+@pytest.mark.long
 def test_on_a_small_file_system(
     small_config: Configure, tmp_path: Path, shares: tuple[float, ...]
 ) -> None:

@@ -88,6 +88,7 @@ def test_a_setting_that_does_nothing_is_not_named_onednn(monkeypatch: pytest.Mon
         assert used.endswith(" (onednn not in use)")
 
 
+@pytest.mark.long
 def test_the_library_that_is_named_multiplies() -> None:
     done = subprocess.run(
         [sys.executable, "-c", WHO_MULTIPLIES],

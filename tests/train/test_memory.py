@@ -50,6 +50,7 @@ def test_it_is_named_and_leaves_no_run(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.long
 def test_only_what_the_run_fills_counts_and_measuring_needs_none(
     small_config: Configure, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

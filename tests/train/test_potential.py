@@ -223,6 +223,7 @@ def test_a_play_is_that_of_the_script() -> None:
 
 
 @pytest.mark.parametrize("method", ["mappo", "td-inner"])
+@pytest.mark.long
 def test_a_shaped_run_says_how_well_the_potential_fits_and_is_repeatable(
     small_config: Callable[..., RunConfig], tmp_path: Path, method: str
 ) -> None:

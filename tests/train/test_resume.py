@@ -130,6 +130,16 @@ CASES: dict[str, dict[str, Any]] = {
     },
     "two threads": {"train.method": "td-inner", "train.threads": 2},
 }
+LONG = (
+    "two threads",
+    *(
+        f"{method} {name}"
+        for method in ("td-inner", "mappo")
+        for name in ("warm start", "schedule", "potential", "canonical", "augmented")
+        if f"{method} {name}" not in ALIKE
+    ),
+)
+"""Cases of which there is another one with `ppo-inner`; `make test-long` cuts them."""
 
 
 def left_by(run: Path) -> tuple[str, str]:
@@ -193,8 +203,8 @@ def whole(
 @pytest.mark.parametrize(
     "case",
     [
-        *(one for one in CASES if one not in (*ALIKE, "two threads")),
-        pytest.param("two threads", marks=pytest.mark.long),
+        *(one for one in CASES if one not in (*ALIKE, *LONG)),
+        *(pytest.param(one, marks=pytest.mark.long) for one in LONG),
         *(pytest.param(one, marks=pytest.mark.slow) for one in ALIKE),
     ],
 )

@@ -256,7 +256,7 @@ def drawn_messages(count: int) -> list[dict[str, Any]]:
     return found
 
 
-@pytest.mark.parametrize("blocks", [False, True])
+@pytest.mark.parametrize("blocks", [pytest.param(False, marks=pytest.mark.long), True])
 def test_it_answers_as_the_server_does(page: Page, blocks: bool) -> None:
     box = Obstacle(shape="box", half_extents_m=(0.3, 0.05), position_m=(0.0, 0.2))
     disc = Obstacle(shape="disc", radius_m=0.15)

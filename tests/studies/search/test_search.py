@@ -183,6 +183,7 @@ def test_a_trial_of_another_space_stays_in_the_race(begun: StudyFolder) -> None:
     assert found.standings[1].state == "finished"
 
 
+@pytest.mark.long
 def test_a_number_that_is_missing_is_left_out(begun: StudyFolder) -> None:
     for number in (1, 3):
         add_values(begun, number, {"ppo.learning_rate": 0.001 * number})
