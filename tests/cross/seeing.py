@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
+from hearing import told
 from numpy.typing import NDArray
 from stepper import Array, Bools, State, Stepper
 
@@ -15,6 +16,12 @@ _SLACK_M = 1e-5
 def check_sight(plain: Stepper, before: State, after: State) -> Counter[str]:
     """Hold what robots last saw after a step against what they can see; counts what was seen."""
     seen, unsure, hidden = in_sight(plain, after)
+    robots = len(plain.scenario.robots)
+    news = told(plain, after, seen[..., robots:])
+    if news.any():  # who is unsure may tell
+        unsure[..., robots:] |= unsure[..., robots:].any(1, keepdims=True)
+    own, seen = seen, seen.copy()
+    seen[..., robots:] |= news
     stays = after.victims["id"] == before.victims["id"]
     stays = np.concatenate([np.ones(after.positions.shape[:2], bool), stays], 1)[:, None]
     kept = np.where(stays, before.last_seen, -1)
@@ -23,7 +30,8 @@ def check_sight(plain: Stepper, before: State, after: State) -> Counter[str]:
     there = np.concatenate([plain.there(after), after.present], 1)[:, None]
     return Counter(
         {
-            "in sight": int(seen.sum()),
+            "in sight": int(own.sum()),
+            "told": int((seen & ~own).sum()),
             "out of sight": int((~seen & there).sum()),
             "remembered": int((~seen & (after.last_seen >= 0)).sum()),
             "hidden": int(hidden.sum()),

@@ -28,8 +28,8 @@ DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], dtype=np.float
 class State:
     """E worlds: places and velocities (E, R, 2), obstacles (E, O, 2), victims (E, V) and faults
     (E, R) structured, steps done (E,), charges and loads as shares (E, R), the steps at which
-    robots last saw each robot and each slot's victim (E, R, R + V), and headings and turn rates
-    (E, R)."""
+    robots last saw each robot and each slot's victim (E, R, R + V), headings and turn rates (E, R),
+    and who hears whom (E, R, R)."""
 
     positions: Array
     velocities: Array
@@ -42,6 +42,7 @@ class State:
     last_seen: NDArray[np.int64]
     headings: Array
     turn_rates: Array
+    heard: Bools
 
     @property
     def available(self) -> Bools:
@@ -388,6 +389,9 @@ class Stepper:
                     for values in self.seen(state)
                 )
                 teammates = np.concatenate([teammates * seen, seen, since], axis=-1)
+            if self.scenario.limits_communication:
+                heard = np.take_along_axis(state.heard, self.others[None], 2)[..., None]
+                teammates = np.concatenate([teammates, heard], axis=-1)
             blocks.append(np.where(dark, 0.0, teammates.reshape(envs, robots, -1)))
         victims, unsure = self._victims_seen(state)
         rows = np.concatenate([*blocks, np.where(dark, 0.0, victims)], axis=-1)

@@ -7,6 +7,7 @@ import numpy as np
 from innerattn.config import (
     Arrival,
     Battery,
+    Communication,
     Depot,
     Map,
     Obstacle,
@@ -259,6 +260,19 @@ def with_sight(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     ]
     occlusion = bool(scenario.obstacles) and rng.random() < 0.8
     return scenario.replace(robots=tuple(robots), occlusion=occlusion)
+
+
+def with_communication(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, whose robots hear only some of the others; without a delay they may tell what they
+    see."""
+    delay = int(rng.integers(1, 4)) if rng.random() < 0.3 else 0
+    radio = Communication(
+        range_m=float(rng.uniform(0.2, 2.0)) * scenario.arena_half_width_m,
+        delay_steps=delay,
+        loss=float(rng.uniform(0.1, 0.6)) if rng.random() < 0.5 else 0.0,
+        share="victims" if not delay and rng.random() < 0.8 else "nothing",
+    )
+    return scenario.replace(communication=radio)
 
 
 def with_rays(scenario: Scenario, rng: np.random.Generator) -> Scenario:

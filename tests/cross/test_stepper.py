@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from casting import check_rays, ray_columns
+from hearing import check_hearing
 from seeing import check_sight
 from stepper import State, Stepper
 from teams import (
@@ -13,6 +14,7 @@ from teams import (
     with_amounts,
     with_arrivals,
     with_batteries,
+    with_communication,
     with_layers,
     with_list,
     with_loads,
@@ -62,6 +64,7 @@ def state_of(env: BatchEnv) -> State:
         env.last_seen(),
         env.headings().astype(np.float64),
         env.turn_rates().astype(np.float64),
+        env.heard(),
     )
 
 
@@ -222,6 +225,8 @@ def compare(scenario: Scenario, seed: int, transitions: int, faulty: bool = Fals
 
         if scenario.has_limited_sight:
             seen.update(check_sight(plain, before, after))
+        if scenario.communication is not None:
+            seen.update(check_hearing(plain, after))
         ended = result.terminated | result.truncated
         assert (after.faults[~ended] == before.faults[~ended]).all()
         rays = ray_columns(env.observation_names())
@@ -501,3 +506,17 @@ def test_worlds_with_limited_sight_are_as_the_plain_stepper_says(chunk: int) -> 
     for what in ("in sight", "out of sight", "remembered", "hidden", "rescues", "appeared"):
         assert total[what] > 50, (what, total)
     assert total["unsure of sight"] < 0.001 * total["in sight"]
+
+
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_with_communication_are_as_the_plain_stepper_says(chunk: int) -> None:
+    rng = np.random.default_rng(1400 + chunk)
+
+    def changed(scenario: Scenario) -> Scenario:
+        leaves = ("stay", "leave")[rng.integers(2)]
+        scenario = with_sight(scenario, rng).replace(unavailable_robots=leaves)
+        return with_communication(scenario, rng)
+
+    total = compare_some(rng, changed)
+    for what in ("heard", "unheard", "told", "in sight", "remembered", "rescues"):
+        assert total[what] > 50, (what, total)
