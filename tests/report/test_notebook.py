@@ -21,7 +21,7 @@ from innerattn.evaluate import Evaluation
 from innerattn.experiments.run import FinishedRun
 from innerattn.report.notebook import MOST_EPISODES, html_of
 
-NOTEBOOK = Path(__file__).parents[2] / "examples" / "watch_a_team.ipynb"
+NOTEBOOK = Path(__file__).parents[2] / "examples" / "notebooks" / "watch_a_team.ipynb"
 
 
 def picture(html: str) -> np.ndarray:
