@@ -1,5 +1,7 @@
 """Exceptions that a user of innerattn can catch; each message is one line."""
 
+from __future__ import annotations
+
 import errno
 from collections.abc import Sequence
 
@@ -45,7 +47,7 @@ def _of_system(error: OSError) -> str:
 
 def lacked_memory(error: BaseException) -> bool:
     """Whether memory was lacking: also in PyTorch, and while a library was loaded."""
-    if isinstance(error, RuntimeError | ImportError):
+    if isinstance(error, (RuntimeError, ImportError)):
         signs = (
             "can't allocate memory",
             "cannot allocate memory",
@@ -64,7 +66,7 @@ class InnerattnError(Exception):
 
 def needs_no_traceback(error: Exception) -> bool:
     """Whether one line says all about an error: ours, a file's, or a lack of memory."""
-    return isinstance(error, InnerattnError | OSError) or lacked_memory(error)
+    return isinstance(error, (InnerattnError, OSError)) or lacked_memory(error)
 
 
 class ConfigError(InnerattnError, ValueError):
