@@ -162,7 +162,7 @@ def record(kind: type[Any], /, **readers: Read) -> Read:
         for name in found:
             if name not in readers:
                 known = ", ".join(readers)
-                raise ValueError(f"{_at(place, shown_key(name))}: is unknown; known are {known}")
+                raise ValueError(f"{_at(place, _shown_key(name))}: is unknown; known are {known}")
         for name in readers:
             if name in needed and name not in found:
                 raise ValueError(f"{_at(place, name)}: is missing")
@@ -172,7 +172,7 @@ def record(kind: type[Any], /, **readers: Read) -> Read:
     return read
 
 
-def shown_key(name: Any) -> str:
+def _shown_key(name: Any) -> str:
     """A name for a message, cut where it is long."""
     return shown(name)[1:-1] if isinstance(name, str) else shown(name)
 
