@@ -56,6 +56,12 @@ def the_command() -> None:
         assert done.returncode == 1, done
         assert done.stderr.endswith("pip install 'innerattn[train]'\n"), done.stderr
         assert done.stderr.count("\n") == 1, done.stderr
+        with TemporaryDirectory() as folder:
+            page = Path(folder) / "demo.html"
+            done = command("demo", "--no-open", "-o", str(page))
+            assert done.returncode == 0, done.stderr
+            assert "zoo:mixed (trained)" in done.stdout
+            assert page.stat().st_size > 1_000_000
 
 
 def views() -> None:

@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted(
     path
-    for folder in ("python", "examples")
+    for folder in ("python", "examples", "packages")
     for path in (ROOT / folder).rglob("*.py")
     if not any(part.startswith(".") for part in path.relative_to(ROOT).parts)  # environments
 )

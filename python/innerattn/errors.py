@@ -1,5 +1,7 @@
 """Exceptions that a user of innerattn can catch; each message is one line."""
 
+from __future__ import annotations
+
 import errno
 from collections.abc import Sequence
 
@@ -20,13 +22,19 @@ def plain(text: str) -> str:
 
 def one_line(error: BaseException) -> str:
     """What an error says, in one plain line; of one that lacked memory, first of all that."""
-    while isinstance(error, ImportError) and isinstance(error.__cause__, ImportError):
-        error = error.__cause__  # NumPy wraps the reason in a page of advice
+    while _wraps_its_reason(error):
+        error = error.__cause__  # type: ignore[assignment]
     text = _of_system(error) if isinstance(error, OSError) else str(error)
     text = plain(" ".join(text.split()))
     if lacked_memory(error):
         return f"out of memory: {text}" if text else "out of memory"
     return text
+
+
+def _wraps_its_reason(error: BaseException) -> bool:
+    """Whether a library could not be imported and tells a page of advice, as NumPy does."""
+    foreign = isinstance(error, ImportError) and not isinstance(error, InnerattnError)
+    return foreign and isinstance(error.__cause__, ImportError)
 
 
 def _of_system(error: OSError) -> str:
@@ -39,7 +47,7 @@ def _of_system(error: OSError) -> str:
 
 def lacked_memory(error: BaseException) -> bool:
     """Whether memory was lacking: also in PyTorch, and while a library was loaded."""
-    if isinstance(error, RuntimeError | ImportError):
+    if isinstance(error, (RuntimeError, ImportError)):
         signs = (
             "can't allocate memory",
             "cannot allocate memory",
@@ -58,7 +66,7 @@ class InnerattnError(Exception):
 
 def needs_no_traceback(error: Exception) -> bool:
     """Whether one line says all about an error: ours, a file's, or a lack of memory."""
-    return isinstance(error, InnerattnError | OSError) or lacked_memory(error)
+    return isinstance(error, (InnerattnError, OSError)) or lacked_memory(error)
 
 
 class ConfigError(InnerattnError, ValueError):
@@ -101,18 +109,16 @@ EXTRA_OF = {
     "PIL": "maps",
     "pettingzoo": "gym",
     "ray": "ray",
-    "rich": "train",
     "safetensors": "train",
     "tensordict": "torchrl",
     "torch": "train",
     "torchrl": "torchrl",
-    "tyro": "train",
     "yaml": "maps",
 }
 """The extra of this package that brings a library, by the library's module."""
 
 
-_REQUIRED = frozenset({"numpy", "pyarrow", "pydantic", "scipy", "tomli_w"})
+_REQUIRED = frozenset({"numpy", "pyarrow", "pydantic", "rich", "scipy", "tomli_w", "tyro"})
 """Modules that come with the package, unless somebody took them away."""
 
 

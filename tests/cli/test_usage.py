@@ -40,8 +40,8 @@ def printed(capsys: Captured, *arguments: str) -> str:
     ("line", "told"),
     [
         ("trian", "trian: unknown command, did you mean train?"),
-        ("frobnicate", "frobnicate: unknown command; commands are train, evaluate, "),
-        ("--seed 1", "--seed: a command must come first: train, evaluate, "),
+        ("frobnicate", "frobnicate: unknown command; commands are demo, train, evaluate, "),
+        ("--seed 1", "--seed: a command must come first: demo, train, evaluate, "),
         ("train --sede 1", "--sede: unknown option, did you mean --seed?"),
         ("train --train.sede 1", "--train.sede: unknown option, did you mean --train.seed?"),
         ("train --env-steps 9", "--env-steps: unknown option, did you mean --train.env-steps or"),

@@ -9,7 +9,8 @@ import pytest
 
 from innerattn.config import Scenario, load_run_config, read_toml, write_toml
 from innerattn.config.files import write_in_place, write_whole
-from innerattn.config.untrusted import parse_json, parse_toml, read_plain
+from innerattn.config.untrusted import parse_json, read_plain
+from innerattn.config.untrusted_toml import parse_toml
 from innerattn.errors import ConfigError, RunError
 
 TOML = {

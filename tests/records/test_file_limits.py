@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from innerattn.config.untrusted import MOST_TOML_BYTES, parse_json, parse_toml
+from innerattn.config.untrusted import MOST_TOML_BYTES, parse_json
+from innerattn.config.untrusted_toml import parse_toml
 from innerattn.errors import ConfigError, RunError, UnsealedRunWarning
 from innerattn.experiments.live import read_live
 from innerattn.records.logged import logged_lines

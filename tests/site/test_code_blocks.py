@@ -42,6 +42,7 @@ RUN_ELSEWHERE = {
 """The blocks of a language on a page, and the file that tests them."""
 
 SMALL = {
+    "demo": ("--no-open", "--episodes", "20"),
     "evaluate": ("--episodes", "2", "--score-episodes", "20", "--long-episodes", "2"),
     "replay": ("--episodes", "2"),
     "export": (),
@@ -235,13 +236,16 @@ def test_other_commands_name_what_is_there() -> None:
             match words:
                 case ["innerattn", *_]:
                     pass
+                case ["uvx", "innerattn", *rest]:
+                    _parse(rest)
                 case ["make", target, *_]:
                     assert target in targets, line
                 case ["pip", "install", "-e" | "-r", path]:
                     assert (ROOT / path).exists(), line
                 case ["pip", "install", what]:
                     name, _, extras = what.rstrip("]").partition("[")
-                    assert name == "innerattn" or f"{name}==" in pinned, line
+                    ours = name in ("innerattn", "innerattn-policies")
+                    assert ours or f"{name}==" in pinned, line
                     given = set(filter(None, extras.split(",")))
                     assert given <= set(project["optional-dependencies"]), line
                 case ["python", "-m", "robot", *_]:

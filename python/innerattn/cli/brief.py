@@ -34,6 +34,17 @@ _QUIET = ("-q, --quiet", "print warnings, errors and one line with the result on
 _JSON = ("--json FILE", "write the results to FILE too; - for standard output")
 
 BRIEF: Mapping[str, Brief] = {
+    "demo": Brief(
+        "[OPTIONS]",
+        (
+            ("-o, --output FILE", "page to write: .html ({output})"),
+            ("--no-open", "do not open the page in a browser"),
+            ("--episodes N", "episodes that rescues are averaged over ({episodes:,})"),
+            ("--seed N", "seed of the worlds ({seed})"),
+            _QUIET,
+        ),
+        ("", "--no-open -o team.html"),
+    ),
     "train": Brief(
         "[OPTIONS]",
         (

@@ -20,6 +20,7 @@ import tyro
 
 from innerattn.cli.brief import print_brief
 from innerattn.cli.completion import completion_script
+from innerattn.cli.demo import Demo
 from innerattn.cli.evaluate import Evaluate
 from innerattn.cli.export import Export
 from innerattn.cli.info import Info
@@ -56,6 +57,7 @@ _DESCRIPTION = (
 )
 
 COMMANDS: Mapping[str, Any] = {
+    "demo": Demo,
     "train": None,  # its options follow from what is chosen, see `_type_of`
     "evaluate": Evaluate,
     "replay": Replay,

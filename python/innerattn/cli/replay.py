@@ -228,13 +228,15 @@ def recorded(name: str) -> Record:
 
 def _play(name: str, scenario: Scenario, episodes: int, worlds: Record | int) -> Record:
     """Episodes of a script or a run, in the worlds of a record or of a seed."""
-    from innerattn.evaluate import load_trained, run_episodes, scripted_policy
+    from innerattn.evaluate import run_episodes, scripted_policy
     from innerattn.records import FIELDS
 
     seed, first = (worlds, 0) if isinstance(worlds, int) else (worlds.seed, worlds.first_episode)
     if name in SCRIPTS:
         policy = scripted_policy(name, scenario, seed)
     else:
+        from innerattn.evaluate import load_trained  # with torch, which scripts do without
+
         policy = load_trained(name, scenario)[1]
     return run_episodes(policy, scenario, episodes, seed, first_episode=first, record=FIELDS)
 

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from innerattn.config.near import did_you_mean
-from innerattn.config.untrusted import MOST_TOML_BYTES, parse_toml, read_plain
+from innerattn.config.untrusted import MOST_TOML_BYTES, read_plain
+from innerattn.config.untrusted_toml import parse_toml
 from innerattn.errors import ConfigError, RunError
 
 PRESETS = files("innerattn.config") / "presets"

@@ -1,4 +1,4 @@
-"""Files that may be damaged or hostile: plain ones of a bounded size, and JSON and TOML in them.
+"""Files that may be damaged or hostile: plain ones of a bounded size, and JSON in them.
 
 Every limit is checked before memory or time is spent on what lies beyond it. It knows no key.
 """
@@ -8,9 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
-import re
 import stat
-import tomllib
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -18,18 +16,13 @@ from innerattn.errors import RunError
 
 MOST_JSON_BYTES = 16 << 20
 MOST_TOML_BYTES = 1 << 20
-_MOST_DEPTH = 64
-_MOST_KEYS = 20_000
-_MOST_KEY_PARTS = 16
+MOST_DEPTH = 64
 _MOST_DIGITS = 40
 _FREE_BYTES = 16 << 20
 _MOST_MEMORY = 20
 """Most bytes of memory for each byte of a JSON text, past `_FREE_BYTES`."""
 _COSTS = {b"[": 72, b"{": 80, b",": 64, b":": 160}
 """Bytes of memory that a value costs at most beside its text, by the sign that comes with it."""
-
-_QUOTED = re.compile(r'"(?:[^"\\\n]|\\[^\n])*+"|\'[^\'\n]*+\'')
-_MANY_PARTS = re.compile(rf"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++){{{_MOST_KEY_PARTS},}}")
 
 
 def read_plain(path: Path, most_bytes: int, *, follow_link: bool = False) -> bytes:
@@ -87,27 +80,9 @@ def parse_json(text: str | bytes) -> Any:
             object_pairs_hook=_no_key_twice,
         )
     except RecursionError as error:
-        raise ValueError(f"is nested more than {_MOST_DEPTH} deep") from error
-    _refuse_deep(document)
+        raise ValueError(f"is nested more than {MOST_DEPTH} deep") from error
+    refuse_deep(document)
     return document
-
-
-def parse_toml(text: str) -> dict[str, Any]:
-    """The table in a TOML text.
-
-    Raises:
-        ValueError: it is no TOML, or larger in some way than any configuration is.
-    """
-    if any(text.count(sign) > _MOST_KEYS for sign in "=[,"):
-        raise ValueError(f"more than {_MOST_KEYS} keys, tables or values of lists")
-    if _MANY_PARTS.search(_QUOTED.sub("q", text)):
-        raise ValueError(f"a key of more than {_MOST_KEY_PARTS} parts")
-    try:
-        table = tomllib.loads(text)
-    except RecursionError as error:
-        raise ValueError(f"nested more than {_MOST_DEPTH} deep") from error
-    _refuse_deep(table)
-    return table
 
 
 def _not_plain(path: Path) -> RunError:
@@ -151,10 +126,10 @@ def _refuse_dense(text: str | bytes) -> None:
         )
 
 
-def _refuse_deep(document: Any) -> None:
+def refuse_deep(document: Any) -> None:
     """Refuse nesting and whole numbers that no document of ours has."""
     level = [document]
-    for _ in range(_MOST_DEPTH):
+    for _ in range(MOST_DEPTH):
         nested: list[Any] = []
         for value in level:
             if isinstance(value, dict):
@@ -166,4 +141,4 @@ def _refuse_deep(document: Any) -> None:
         if not nested:
             return
         level = nested
-    raise ValueError(f"is nested more than {_MOST_DEPTH} deep")
+    raise ValueError(f"is nested more than {MOST_DEPTH} deep")

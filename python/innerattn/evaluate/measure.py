@@ -14,7 +14,6 @@ from innerattn.config import EvaluateConfig, Scenario, refuse_late_faults
 from innerattn.config.files import write_whole
 from innerattn.errors import RunError
 from innerattn.evaluate.play import run_episodes
-from innerattn.evaluate.trained import load_trained
 from innerattn.measures.registry import needed_fields
 from innerattn.measures.summary import Summary, summarise
 from innerattn.policies import SCRIPTS, Policy, scripted_policy, scripts_of
@@ -22,7 +21,6 @@ from innerattn.records.parquet import write_records
 from innerattn.records.record import FIELDS, Record
 from innerattn.records.run_files import amend
 from innerattn.shown import Shown
-from innerattn.train.build import thread_count, torch_threads
 
 ProgressCall = Callable[[int, int], None]
 """Called with the episodes done and the episodes to do."""
@@ -150,6 +148,9 @@ def evaluate_run(
         RunError: there is no readable run at ``run``, or its policy does not fit ``scenario``.
         ConfigError: its configuration is not valid.
     """
+    from innerattn.evaluate.trained import load_trained  # with torch, which scripts do without
+    from innerattn.train.build import thread_count, torch_threads
+
     greedy = settings.greedy_actions if settings else None
     config, policy = load_trained(run, scenario, greedy=greedy)
     with torch_threads(thread_count(config)):

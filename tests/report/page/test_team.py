@@ -6,12 +6,9 @@ import pytest
 from fresh_run import make_run, run_config
 
 from innerattn.config import Scenario
-from innerattn.config.files import preset_names
-from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError, RunError
 from innerattn.report.page.page import page_document
-from innerattn.report.page.team import frame_columns, read_team
-from innerattn.train.columns import vector_columns
+from innerattn.report.page.team import read_team
 from innerattn.zoo import zoo_names
 
 
@@ -25,18 +22,6 @@ def test_every_team_of_the_zoo_but_the_one_for_any_team_is_taken() -> None:
         assert team.document["heads"] == 4
         assert len(team.document["rows"]) == team.config.scenario.num_robots
         assert team.weights.dtype == "float32"
-
-
-@pytest.mark.parametrize("name", preset_names("scenarios"))
-def test_the_same_columns_turn_as_in_training(name: str) -> None:
-    with BatchEnv(Scenario.preset(name), 1) as env:
-        names = env.observation_names()
-    ours, theirs = frame_columns(names), vector_columns(names)
-    assert (ours.vectors, ours.handed, ours.anchors) == (
-        theirs.vectors,
-        theirs.handed,
-        theirs.anchors,
-    )
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@
 It imports neither torch nor the worlds.
 """
 
+from __future__ import annotations
+
 from innerattn.policies.exported.decision import Decision
 from innerattn.policies.exported.team import Exported
 

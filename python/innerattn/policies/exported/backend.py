@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.errors import ExportError, MissingLibraryError, missing_library
+from innerattn.errors import ExportError, MissingLibraryError
 from innerattn.policies.exported.contract import Contract
 
 Backend = Literal["onnxruntime", "numpy"]
@@ -109,10 +109,10 @@ def _onnxruntime() -> Any:
 
         return onnxruntime
     except ModuleNotFoundError as error:
-        missing: MissingLibraryError | None = missing_library("backend = 'onnxruntime'", error)
-        if missing is None:
+        if error.name != "onnxruntime":
             raise
-        raise missing from error
+        text = "backend = 'onnxruntime' needs onnxruntime: pip install onnxruntime"
+        raise MissingLibraryError(text) from error
 
 
 def _first_line(error: Exception) -> str:

@@ -5,11 +5,23 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
-
-from pydantic import ConfigDict, Field, StringConstraints, TypeAdapter, ValidationError
+from typing import Any, Literal
 
 from innerattn.config.untrusted import parse_json
+from innerattn.policies.exported.plain_data import (
+    anything,
+    flag,
+    list_or_table,
+    many,
+    number,
+    one_of,
+    optional,
+    pair,
+    record,
+    table,
+    text,
+    whole,
+)
 
 FORMAT = "innerattn.export"
 VERSION = 1
@@ -18,22 +30,10 @@ WEIGHTS = "weights.safetensors"
 CONTINUOUS_OUTPUTS = 4
 """Of a policy over forces: mean x and y, then log standard deviation x and y, before tanh."""
 
-_Sha256 = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
-_Name = Annotated[str, StringConstraints(pattern="^[A-Za-z0-9_-]{1,200}$")]
-_File = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,200}\.(onnx|safetensors)$")]
-_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-_Amounts = dict[str, _Positive]
-_Share = Annotated[float, Field(ge=0, le=1)]
-_Number = Annotated[float, Field(allow_inf_nan=False)]
-_Index = Annotated[int, Field(ge=0, lt=2**20)]
-_STRICT = ConfigDict(extra="forbid", strict=True)
-
 
 @dataclass(frozen=True)
 class Column:
     """One number of an observation: its name, unit, frame, and what a robot takes it from."""
-
-    __pydantic_config__ = _STRICT
 
     name: str
     unit: str
@@ -45,11 +45,9 @@ class Column:
 class Action:
     """One action: its number, and the force [share of full force, x and y of the world]."""
 
-    __pydantic_config__ = _STRICT
-
-    number: _Index
+    number: int
     name: str
-    force: tuple[_Number, _Number]
+    force: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -60,11 +58,9 @@ class RangeRays:
     counterclockwise.
     """
 
-    __pydantic_config__ = _STRICT
-
-    rays: Annotated[int, Field(ge=1, le=360)]
-    range_m: _Positive
-    angles_rad: tuple[_Number, ...]
+    rays: int
+    range_m: float
+    angles_rad: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -87,27 +83,25 @@ class Member:
         load: its full load; it tells its ``load`` as a share of it.
     """
 
-    __pydantic_config__ = _STRICT
-
-    name: _Name
-    kind: _Name
-    abilities: tuple[str, ...] | _Amounts
-    max_speed_mps: _Positive
-    mass_kg: _Positive
-    radius_m: _Positive
-    drive_force_n: Annotated[float, Field(ge=0, allow_inf_nan=False)]
-    actor: _Name
+    name: str
+    kind: str
+    abilities: tuple[str, ...] | dict[str, float]
+    max_speed_mps: float
+    mass_kg: float
+    radius_m: float
+    drive_force_n: float
+    actor: str
     drive: Literal["force", "velocity", "unicycle", "differential"] = "force"
     actions: tuple[Action, ...] = ()
-    max_turn_rad_s: _Positive | None = None
-    acceleration_m_s2: _Positive | None = None
-    turn_acceleration_rad_s2: _Positive | None = None
-    track_m: _Positive | None = None
-    sight_m: _Positive | None = None
-    field_of_view_deg: _Positive | None = None
+    max_turn_rad_s: float | None = None
+    acceleration_m_s2: float | None = None
+    turn_acceleration_rad_s2: float | None = None
+    track_m: float | None = None
+    sight_m: float | None = None
+    field_of_view_deg: float | None = None
     range_sensor: RangeRays | None = None
-    battery_j: _Positive | None = None
-    load: Annotated[int, Field(ge=1)] | None = None
+    battery_j: float | None = None
+    load: int | None = None
 
     @property
     def has_wheels(self) -> bool:
@@ -125,24 +119,20 @@ class Member:
 class NeededAbilities:
     """One kind of victim: the abilities that it needs, from a robot of its own each, or as sums."""
 
-    __pydantic_config__ = _STRICT
-
     name: str
-    needs: tuple[str, ...] | _Amounts
+    needs: tuple[str, ...] | dict[str, float]
 
 
 @dataclass(frozen=True)
 class Entities:
     """Whose columns are whose: those of the robot, of each teammate, of each victim."""
 
-    __pydantic_config__ = _STRICT
-
-    own: _Index
-    teammates: _Index
-    teammate: _Index
-    victims: _Index
-    victim: _Index
-    present: _Index
+    own: int
+    teammates: int
+    teammate: int
+    victims: int
+    victim: int
+    present: int
 
 
 @dataclass(frozen=True)
@@ -153,35 +143,29 @@ class FrameColumns:
     takes the place of each.
     """
 
-    __pydantic_config__ = _STRICT
-
-    vectors: tuple[tuple[_Index, _Index], ...]
-    handed: tuple[_Index, ...]
-    anchors: Annotated[tuple[tuple[_Index, _Index], ...], Field(min_length=1)]
-    rays: tuple[_Index, ...] = ()
-    ray_turns: tuple[tuple[_Index, ...], ...] = ()
+    vectors: tuple[tuple[int, int], ...]
+    handed: tuple[int, ...]
+    anchors: tuple[tuple[int, int], ...]
+    rays: tuple[int, ...] = ()
+    ray_turns: tuple[tuple[int, ...], ...] = ()
 
 
 @dataclass(frozen=True)
 class LogStd:
     """Log standard deviations of outputs z: lowest + (highest - lowest) sigmoid(z + shift)."""
 
-    __pydantic_config__ = _STRICT
-
-    lowest: _Number
-    highest: _Number
-    shift: _Number
+    lowest: float
+    highest: float
+    shift: float
 
 
 @dataclass(frozen=True)
 class Network:
     """How the numbers of `weights.safetensors` make a policy; `log_std` of continuous actions."""
 
-    __pydantic_config__ = _STRICT
-
     encoder: Literal["flat", "entities"]
-    hidden_width: Annotated[int, Field(ge=1, le=4096)]
-    leaky_relu_slope: Annotated[float, Field(ge=0, lt=1)]
+    hidden_width: int
+    leaky_relu_slope: float
     entities: Entities | None
     frame: FrameColumns | None
     log_std: LogStd | None = None
@@ -191,23 +175,19 @@ class Network:
 class Checked:
     """What the check at the export found."""
 
-    __pydantic_config__ = _STRICT
-
-    observations: _Index
-    same_greedy_action: Annotated[int, Field(ge=0)]
-    near_ties: Annotated[int, Field(ge=0)]
-    largest_difference_onnx: _Number
-    largest_difference_numpy: _Number
+    observations: int
+    same_greedy_action: int
+    near_ties: int
+    largest_difference_onnx: float
+    largest_difference_numpy: float
 
 
 @dataclass(frozen=True)
 class FileEntry:
     """A file of the folder: its SHA-256 and size."""
 
-    __pydantic_config__ = _STRICT
-
-    sha256: _Sha256
-    bytes: Annotated[int, Field(ge=0, lt=2**40)]
+    sha256: str
+    bytes: int
 
 
 @dataclass(frozen=True)
@@ -245,36 +225,34 @@ class Contract:
         checked: what the check found.
     """
 
-    __pydantic_config__ = _STRICT
-
     format: Literal["innerattn.export"]
     version: Literal[1]
     about: dict[str, str]
     made_with: dict[str, str]
     run: dict[str, str | int | None]
     scenario: dict[str, Any]
-    scenario_sha256: _Sha256
-    control_period_s: _Positive
-    damping: _Share
-    arena_half_width_m: _Positive
+    scenario_sha256: str
+    control_period_s: float
+    damping: float
+    arena_half_width_m: float
     victim_order: Literal["relevant", "slot"]
-    victim_slots: _Index
+    victim_slots: int
     observe_faults: bool
-    max_age_s: _Positive
+    max_age_s: float
     greedy_actions: bool
     abilities: tuple[str, ...]
     tasks: tuple[NeededAbilities, ...]
-    robots: Annotated[tuple[Member, ...], Field(min_length=1, max_length=64)]
-    observation: Annotated[tuple[Column, ...], Field(min_length=1)]
+    robots: tuple[Member, ...]
+    observation: tuple[Column, ...]
     actions: tuple[Action, ...]
     network: Network
-    actors: dict[_Name, _File]
-    weights_sha256: _Sha256
-    files: dict[_File, FileEntry]
+    actors: dict[str, str]
+    weights_sha256: str
+    files: dict[str, FileEntry]
     checked: Checked | None
     action_kind: Literal["discrete", "continuous"] = "discrete"
-    stations: tuple[tuple[_Number, _Number], ...] = ()
-    depots: tuple[tuple[_Number, _Number], ...] = ()
+    stations: tuple[tuple[float, float], ...] = ()
+    depots: tuple[tuple[float, float], ...] = ()
 
     @property
     def outputs(self) -> int:
@@ -282,7 +260,116 @@ class Contract:
         return CONTINUOUS_OUTPUTS if self.action_kind == "continuous" else len(self.actions)
 
 
-_CHECK = TypeAdapter(Contract)
+_TEXT = text()
+_NAME = text("[A-Za-z0-9_-]{1,200}", "1 to 200 letters, digits, - or _")
+_FILE = text(r"[A-Za-z0-9_-]{1,200}\.(onnx|safetensors)", "NAME.onnx or NAME.safetensors")
+_SHA256 = text("[0-9a-f]{64}", "64 hexadecimal digits")
+_NUMBER = number()
+_POSITIVE = number(above=0)
+_INDEX = whole(0, 2**20)
+_INDICES = many(_INDEX)
+_PLACES = many(pair(_NUMBER))
+_AMOUNTS = list_or_table(many(_TEXT), table(_POSITIVE))
+
+
+def _origin(value: Any, place: str) -> str | int | None:
+    """A text, a whole number or none."""
+    if value is None or (isinstance(value, int) and not isinstance(value, bool)):
+        return value
+    found: str = _TEXT(value, place)
+    return found
+
+
+_COLUMN = record(Column, name=_TEXT, unit=_TEXT, frame=_TEXT, source=_TEXT)
+_ACTION = record(Action, number=_INDEX, name=_TEXT, force=pair(_NUMBER))
+_RAYS = record(RangeRays, rays=whole(1, 361), range_m=_POSITIVE, angles_rad=many(_NUMBER))
+_MEMBER = record(
+    Member,
+    name=_NAME,
+    kind=_NAME,
+    abilities=_AMOUNTS,
+    max_speed_mps=_POSITIVE,
+    mass_kg=_POSITIVE,
+    radius_m=_POSITIVE,
+    drive_force_n=number(least=0),
+    actor=_NAME,
+    drive=one_of("force", "velocity", "unicycle", "differential"),
+    actions=many(_ACTION),
+    max_turn_rad_s=optional(_POSITIVE),
+    acceleration_m_s2=optional(_POSITIVE),
+    turn_acceleration_rad_s2=optional(_POSITIVE),
+    track_m=optional(_POSITIVE),
+    sight_m=optional(_POSITIVE),
+    field_of_view_deg=optional(_POSITIVE),
+    range_sensor=optional(_RAYS),
+    battery_j=optional(_POSITIVE),
+    load=optional(whole(1)),
+)
+_ENTITIES = record(
+    Entities,
+    own=_INDEX,
+    teammates=_INDEX,
+    teammate=_INDEX,
+    victims=_INDEX,
+    victim=_INDEX,
+    present=_INDEX,
+)
+_FRAME = record(
+    FrameColumns,
+    vectors=many(pair(_INDEX)),
+    handed=_INDICES,
+    anchors=many(pair(_INDEX), 1),
+    rays=_INDICES,
+    ray_turns=many(_INDICES),
+)
+_NETWORK = record(
+    Network,
+    encoder=one_of("flat", "entities"),
+    hidden_width=whole(1, 4097),
+    leaky_relu_slope=number(least=0, below=1),
+    entities=optional(_ENTITIES),
+    frame=optional(_FRAME),
+    log_std=optional(record(LogStd, lowest=_NUMBER, highest=_NUMBER, shift=_NUMBER)),
+)
+_CHECKED = record(
+    Checked,
+    observations=_INDEX,
+    same_greedy_action=whole(0),
+    near_ties=whole(0),
+    largest_difference_onnx=_NUMBER,
+    largest_difference_numpy=_NUMBER,
+)
+_CONTRACT = record(
+    Contract,
+    format=one_of(FORMAT),
+    version=one_of(VERSION),
+    about=table(_TEXT),
+    made_with=table(_TEXT),
+    run=table(_origin),
+    scenario=table(anything),
+    scenario_sha256=_SHA256,
+    control_period_s=_POSITIVE,
+    damping=number(least=0, most=1),
+    arena_half_width_m=_POSITIVE,
+    victim_order=one_of("relevant", "slot"),
+    victim_slots=_INDEX,
+    observe_faults=flag,
+    max_age_s=_POSITIVE,
+    greedy_actions=flag,
+    abilities=many(_TEXT),
+    tasks=many(record(NeededAbilities, name=_TEXT, needs=_AMOUNTS)),
+    robots=many(_MEMBER, 1, 64),
+    observation=many(_COLUMN, 1),
+    actions=many(_ACTION),
+    network=_NETWORK,
+    actors=table(_FILE, _NAME),
+    weights_sha256=_SHA256,
+    files=table(record(FileEntry, sha256=_SHA256, bytes=whole(0, 2**40)), _FILE),
+    checked=optional(_CHECKED),
+    action_kind=one_of("discrete", "continuous"),
+    stations=_PLACES,
+    depots=_PLACES,
+)
 
 
 def digest_of(document: Any) -> str:
@@ -322,12 +409,7 @@ def contract_in(data: bytes) -> Contract:
 
 
 def _checked(document: dict[str, Any]) -> Contract:
-    try:
-        contract = _CHECK.validate_json(json.dumps(document))
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        raise ValueError(f"{place}: {first['msg']}") from error
+    contract: Contract = _CONTRACT(document, "")
     for robot in contract.robots:
         _check_member(robot, len(contract.actions))
     discrete = contract.action_kind == "discrete"

@@ -77,10 +77,8 @@ def twist_command(
         speed = _approached(speed, shares[0] * most, gain)
         turn = _approached(turn, shares[1] * most_turn, turn_gain)
     else:
-        left, right = (
-            _approached(wheel, share * most, gain)
-            for wheel, share in zip(wheel_speeds(robot, twist), shares, strict=True)
-        )
+        wheels = wheel_speeds(robot, twist)
+        left, right = (_approached(wheels[side], shares[side] * most, gain) for side in (0, 1))
         left, right = np.clip(left, -most, most), np.clip(right, -most, most)
         half = np.float32(0.5)
         speed, turn = half * (left + right), half * (right - left) / _arm(robot)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from innerattn.policies.exported.contract import Contract, FrameColumns
 
 _ELEMENTS = 8
-_ODD = [element.bit_count() % 2 == 1 for element in range(_ELEMENTS)]
+_ODD = [bin(element).count("1") % 2 == 1 for element in range(_ELEMENTS)]
 """Which elements turn left into right: one mirror or the swap does, two of them do not."""
 _SWAPPED = [1, 0, 3, 2]
 """Outputs of a policy over vectors in their order once both parts are swapped."""

@@ -134,7 +134,7 @@ def layout_of(contract: Contract) -> Layout:
     expected = list(layout.names(len(contract.robots) - 1, contract.victim_slots))
     if len(names) != len(expected) or bool(layout.faults) != contract.observe_faults:
         raise ValueError(f"observation: has {len(names)} columns: must have {len(expected)}")
-    for column, (found, wanted) in enumerate(zip(names, expected, strict=True)):
+    for column, (found, wanted) in enumerate(zip(names, expected)):
         if found != wanted:
             raise ValueError(f"observation: column {column} is {found!r}: must be {wanted!r}")
     _check_bodies(contract, layout)

@@ -93,7 +93,7 @@ class RowBuilder:
         row = np.zeros(len(self._names), np.float32)
         own, mates = self._blocks(row)
         healthy = [1.0 if one in _HEALTHY_AT_ONE else 0.0 for one in layout.faults]
-        for block, member in zip((own, *mates), (self._own, *self._mates), strict=True):
+        for block, member in zip((own, *mates), (self._own, *self._mates)):
             offered = member.abilities
             if not isinstance(offered, Mapping):
                 offered = dict.fromkeys(offered, 1.0)
@@ -264,7 +264,7 @@ class RowBuilder:
         layout = self._layout
         available = body.get("available", True)
         if available is not True:
-            if not isinstance(available, bool | np.bool_):
+            if not isinstance(available, (bool, np.bool_)):
                 raise ReadingError(
                     f"{place}.available", f"is {shown(available)}: must be True or False"
                 )
@@ -361,7 +361,7 @@ class RowBuilder:
             far = (squares[:, 0] + squares[:, 1]).tolist()
             order.sort(key=lambda i: (self._cannot_help[tasks[i]], far[i]))
             targets = list(range(len(tasks)))
-        for target, index in zip(targets, order, strict=True):
+        for target, index in zip(targets, order):
             blocks[target, : layout.place] = self._needs[tasks[index]]
             place_and_shares = [*relative[index], *shares[index]]
             blocks[target, layout.place : layout.place + len(place_and_shares)] = place_and_shares

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,9 +29,16 @@ from innerattn.policies.exported.frame import frame_of
 from innerattn.policies.exported.network import NumpyActor, probabilities_of
 from innerattn.policies.exported.readings import RowBuilder
 from innerattn.policies.exported.tensors import tensors_in
-from innerattn.policies.policy import PolicyInput
 
 _NOTHING = np.zeros(0, np.float32)
+
+
+class Seen(Protocol):
+    """What a team sees of whole worlds."""
+
+    @property
+    def obs(self) -> NDArray[np.float32]:
+        """(E, R, D) float32, the robots' observations."""
 
 
 class Exported:
@@ -215,8 +222,11 @@ class Exported:
         """
         return wheel_speeds(self._member(robot, "differential"), _two(twist, "twist"))
 
-    def act(self, view: PolicyInput) -> NDArray[Any]:
+    def act(self, view: Seen) -> NDArray[Any]:
         """Choose the actions of whole worlds, (E, R) or (E, R, 2); see `Policy.act`.
+
+        Args:
+            view: as of `PolicyInput`; its ``obs`` (E, R, D) float32 alone is looked at.
 
         Raises:
             ReadingError: the observations are not those of this team, or not finite.
@@ -323,6 +333,6 @@ def _actors(found: ExportFolder, backend: Backend) -> list[Actor]:
 def _refuse_not_finite(contract: Contract, actors: list[Actor]) -> None:
     """Refuse policies that give no finite numbers even where all that they see is 0."""
     row = np.zeros((1, len(contract.observation)), np.float32)
-    for robot, actor in zip(contract.robots, actors, strict=True):
+    for robot, actor in zip(contract.robots, actors):
         if not np.isfinite(actor.logits(row)).all():
             raise ValueError(f"{robot.actor}: gives numbers that are not finite; it is damaged")

@@ -33,7 +33,7 @@ def listed(value: Any, place: str) -> Sequence[Any]:
     """A list, or what is like one."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
-    if type(value) is list or (isinstance(value, Sequence) and not isinstance(value, str | bytes)):
+    if type(value) is list or (isinstance(value, Sequence) and not isinstance(value, (str, bytes))):
         return value
     raise ReadingError(place, f"is {type(value).__name__}: must be a list")
 
