@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from innerattn.evaluate.training_score import training_rescues
 from innerattn.experiments.run import FinishedRun, read_metrics, read_rescues
-from innerattn.records.logged import unit_of_rescues
+from innerattn.records.logged import counts_as_evaluated, unit_of_rescues
 from innerattn.stats.seeds import SeedCurve, seed_curve
 
 Array = NDArray[np.float64]
@@ -93,8 +93,7 @@ def _curve(
 
 def _scripts(run: FinishedRun) -> dict[str, float]:
     config = run.config
-    longer = config.train.episode_steps not in (None, config.scenario.episode_steps)
-    if longer or config.training_scenario.ends_early:
+    if not counts_as_evaluated(config):
         return {name: training_rescues(config, name, EPISODES, None) for name in SCRIPTS}
     scripted = run.summary["scripted"]
     return {name: float(scripted[name]["mean"]) for name in SCRIPTS if name in scripted}
