@@ -103,6 +103,29 @@ def a_team() -> None:
                 assert team.decide("food_0", [0.0] * 44).action in range(5)
 
 
+def a_map_and_a_proposal() -> None:
+    """Read a map as ROS stores it, and ask Optuna for the first trial of a search."""
+    from innerattn.studies.search.optuna import propose
+    from innerattn.studies.space import Search
+
+    search = Search.model_validate({"ppo": {"epochs": {"low": 1, "high": 4}}})
+    assert propose(search, [], 1)["ppo.epochs"] in range(1, 5)
+    from PIL import Image
+
+    with TemporaryDirectory() as folder:
+        picture = Image.new("L", (40, 40), 254)
+        picture.paste(0, (10, 20, 20, 30))
+        picture.save(Path(folder) / "map.png")
+        (Path(folder) / "map.yaml").write_text(
+            "image: map.png\nresolution: 0.05\norigin: [-1.0, -1.0, 0.0]\nnegate: 0\n"
+            "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+        )
+        world = Path(folder) / "world.toml"
+        world.write_text('map = { file = "map.yaml" }\n')
+        done = command("info", "--scenario", str(world))
+        assert done.returncode == 0, done.stderr
+
+
 def missing_views() -> None:
     said = "nothing"
     try:
@@ -123,4 +146,6 @@ if __name__ == "__main__":
     (views if "gym" in EXTRAS else missing_views)()
     if "train" in EXTRAS:
         a_team()
+    if {"maps", "search"} <= set(EXTRAS):
+        a_map_and_a_proposal()
     print(f"command{', views' if 'gym' in EXTRAS else ''}; import innerattn.envs: {seconds:.3f} s")

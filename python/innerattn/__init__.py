@@ -1,4 +1,4 @@
-"""Inner attention for teams of unlike robots: rescue worlds, learners and their evaluation.
+"""Inner attention for teams of different robots: rescue worlds, learners and their evaluation.
 
 Importing this package loads nothing heavy; take what you need from `innerattn.envs`,
 `innerattn.learn`, `innerattn.train` and `innerattn.evaluate`. It makes the environment

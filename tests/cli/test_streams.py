@@ -1,6 +1,7 @@
 """Commands whose output, errors or input were closed before they began."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -67,6 +68,25 @@ def test_other_commands_end_as_with_them(closed: str, tmp_path: Path) -> None:
     assert run(START_EACH, [json.dumps(list(OTHERS))], closed, tmp_path) == 0
     codes = json.loads((tmp_path / "codes.json").read_text())
     assert dict(zip(OTHERS, codes, strict=True)) == OTHERS
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is full")
+@pytest.mark.parametrize("buffered", ["", "1"])
+@pytest.mark.parametrize("words", [["--version"], ["train", "--help"], ["new", "scenario", "x"]])
+def test_a_standard_output_that_is_full_is_named(
+    words: list[str], buffered: str, tmp_path: Path
+) -> None:
+    done = subprocess.run(
+        ["bash", "-c", 'exec "$0" -c "$@" >/dev/full', sys.executable, START, *words],
+        env={**os.environ, "PYTHONUNBUFFERED": buffered},
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 1
+    assert done.stderr == "innerattn: error: standard output: No space left on device\n"
 
 
 @pytest.mark.slow

@@ -96,6 +96,12 @@ def test_a_need_of_nobody_is_named(need: str, meant: str) -> None:
     )
 
 
+def test_a_team_without_any_ability_is_said_to_have_none() -> None:
+    robots = [one.replace(abilities=()) for one in Scenario().robots]
+    with pytest.raises(ConfigError, match=r"abilities of the team are none$"):
+        Scenario().replace(robots=robots)
+
+
 def test_too_few_robots_for_a_need_are_told_as_before() -> None:
     with pytest.raises(ConfigError, match="the team has no distinct able robot for each need"):
         Scenario().replace(tasks=[{"name": "flood", "needs": ["food"] * 3}])

@@ -141,6 +141,16 @@ def test_helpers_of_different_layers_meet_however_large() -> None:
     assert doubt in scenario_words(Scenario(robots=tuple(robots)))
     flying = [robot.replace(layer="air") for robot in robots[:2]]
     assert doubt not in scenario_words(Scenario(robots=(*flying, *robots[2:])))
+    assert doubt not in scenario_words(Scenario(robots=tuple(robots), engine="none"))
+
+
+@pytest.mark.parametrize(("radius_m", "rare"), [(0.15, True), (0.13, True), (0.12, False)])
+def test_helpers_that_touch_where_they_reach_a_victim_hardly_meet(
+    radius_m: float, rare: bool
+) -> None:
+    """Of bodies as large as the reach nobody is ever rescued: two touch with the victim between."""
+    robots = [one.replace(radius_m=radius_m) for one in Scenario().robots]
+    assert ("task_1: helpers hardly meet" in scenario_words(Scenario(robots=tuple(robots)))) == rare
 
 
 def test_what_is_doubtful() -> None:
@@ -164,7 +174,8 @@ def test_what_is_doubtful() -> None:
         "beam: lift (2 of a, b), together within 0.28 m",
         "b: cannot move, its drive_force_n is 0",
         "c: has no ability that a task needs",
-        "beam: helpers hardly meet; without overlap of bodies rescue_radius_m must be at least 0.3",
+        "beam: helpers hardly meet; without overlap of bodies rescue_radius_m must be above 0.3, "
+        "and 0.45 gives them room",
         "victims in a corner: a robot as large as the largest cannot reach them; "
         "wall_clearance_m = 0.3 would do",
         "a: has 30 % of its force from step 20 on",

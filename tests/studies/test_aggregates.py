@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from made_run import LOGGED, made_run
 
 from innerattn.config import RunConfig
+from innerattn.evaluate.training_score import training_rescues
 from innerattn.report.study.exports import marl_eval_document, rliable_document
 from innerattn.report.study.page import aggregates_table, algorithm_names, means_table
 from innerattn.report.table import markdown
@@ -114,6 +115,26 @@ def test_raw_data_of_marl_eval(tmp_path: Path) -> None:
         for step in steps:
             (rescues,) = of_run[step]["rescues"]
             assert of_run[step]["score"] == [pytest.approx((rescues - scripts["random"]) / span)]
+
+
+def test_scores_of_longer_training_episodes_are_between_scripts_in_such(tmp_path: Path) -> None:
+    """Rescues in 50 steps, beside scripts in 25, would score up to 2."""
+    run = made_run(tmp_path / "made", "mixed", "td-inner", 0)
+    train = run.config.train.replace(episode_steps=50, engine="discs")
+    config = run.config.model_copy(update={"train": train})
+    planned = PlannedRun({"scenario": "mixed"}, 0, config, "")
+    (tmp_path / planned.key).symlink_to(run.folder)
+    found = [Result(planned, run.summary)]
+    names = algorithm_names(aggregate(found, "standard"))
+    document: Any = marl_eval_document(names, found, tmp_path)
+    ((of_run,),) = (one.values() for one in document["innerattn"]["mixed"].values())
+    low, high = (training_rescues(config, name, 500, None) for name in ("random", "hungarian"))
+    assert high > 1.5 * run.summary["scripted"]["hungarian"]["mean"]
+    for name, step in of_run.items():
+        if name == "absolute_metrics":
+            assert step["score"] == [pytest.approx(run.summary["score"]["mean"])]
+        else:
+            assert step["score"] == [pytest.approx((step["rescues"][0] - low) / (high - low))]
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,13 @@
 """Learning curves against plain loops over the lines of metrics."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from reseal import reseal
 from small_study import run_in
 
 from innerattn.envs import BatchEnv
@@ -94,6 +96,28 @@ def test_scripts_play_episodes_as_long_as_those_of_training(runs: list[FinishedR
             obs, rescues = step.obs, rescues + len(step.rescues)
     assert curve.scripts["hungarian"] == rescues / EPISODES
     assert curve.scripts["hungarian"] > 1.5 * run.summary["scripted"]["hungarian"]["mean"]
+
+
+def test_where_rescues_end_episodes_all_env_steps_count(
+    runs: list[FinishedRun], tmp_path: Path
+) -> None:
+    """The episodes that ended are the lucky ones: the first has as many rescues as there can be."""
+    run = next(run for run in runs if run.method == "td-inner")
+    scenario = run.config.scenario.replace(end_when_rescued=2, engine="discs")
+    lines = [
+        {"env_steps": 100 * number, "seconds": 1.0, "rescues_per_episode": 2.0}
+        | {"rescues_per_env_step": 0.01 * number}
+        for number in range(1, 4)
+    ]
+    folder = Path(shutil.copytree(run.folder, tmp_path / "run"))
+    (folder / "metrics.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+    reseal(folder)
+    config = run.config.model_copy(update={"scenario": scenario})
+    (curve,) = curves_of(replace(run, config=config, folder=folder))
+    np.testing.assert_allclose(curve.env_steps, [75.0, 225.0])
+    np.testing.assert_allclose(curve.rescues.mean, [0.25, 0.625])  # 25 steps of 0.01, 0.02 and 0.03
+    assert curve.unit == f"{scenario.episode_steps} steps"
+    assert curve.scripts["hungarian"] > 2.0  # an episode would have 2 at most
 
 
 def test_runs_in_which_no_episode_ended_have_no_curve(finished_study: Path) -> None:

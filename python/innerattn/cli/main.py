@@ -34,6 +34,7 @@ from innerattn.cli.report import Report
 from innerattn.cli.reproduce import Reproduce
 from innerattn.cli.robustness import Robustness
 from innerattn.cli.seal import Seal
+from innerattn.cli.streams import named_output
 from innerattn.cli.study import Study
 from innerattn.cli.train import command_type
 from innerattn.cli.usage import parse, refuse, words_of
@@ -94,7 +95,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # better a "?" than no table at all
     let_waiting_threads_sleep()
     try:
-        with requests_handled_by(interrupt), _plain_warnings():
+        with requests_handled_by(interrupt), _plain_warnings(), named_output():
             command = _parse(argv)
             with escaped_output():
                 return int(command.run())

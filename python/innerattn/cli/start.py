@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from innerattn.cli.streams import fill_missing_streams
+from innerattn.cli.streams import fill_missing_streams, named_output
 from innerattn.errors import lacked_memory, missing_library, one_line
 from innerattn.signals import (
     end_at_once,
@@ -35,7 +35,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments == ["--version"]:
         from innerattn import __version__
 
-        print(f"innerattn {__version__}")
+        try:
+            with named_output():
+                print(f"innerattn {__version__}")
+        except OSError as error:
+            print(f"innerattn: error: {one_line(error)}", file=sys.stderr)
+            return 1
         return 0
     try:
         from innerattn.cli.main import main as run

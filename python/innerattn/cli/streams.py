@@ -1,4 +1,4 @@
-"""Output that nobody may read any more: what cannot be written is dropped, and the work goes on."""
+"""Output that cannot be written: it is dropped, or an error names the stream."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import Any, TextIO
+from typing import Any, TextIO, cast
 
 
 class Droppable:
@@ -39,9 +39,51 @@ class Droppable:
             write()
         except OSError:  # the reader has left, the terminal is gone, or the disk is full
             self.lost = True
-            # What waits in the stream's buffer would fail again at the end of the process.
-            with suppress(OSError, ValueError):
-                os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+            _drop_what_waits(self._stream)
+
+
+class Named:
+    """A text stream whose errors name it as a file's errors name the file."""
+
+    def __init__(self, stream: TextIO, name: str) -> None:
+        """Write to ``stream``, which is called ``name``."""
+        self._stream, self._name = stream, name
+
+    def write(self, text: str) -> int:
+        """Write.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        with self._named():
+            return self._stream.write(text)
+
+    def flush(self) -> None:
+        """Flush.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        with self._named():
+            self._stream.flush()
+
+    def __getattr__(self, name: str) -> Any:
+        """Everything else is that of the stream."""
+        return getattr(self._stream, name)
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            _drop_what_waits(self._stream)
+            raise OSError(error.errno, error.strerror, self._name) from error
+
+
+def _drop_what_waits(stream: TextIO) -> None:
+    """Write to nowhere from now on: what is in the buffer would fail again as the process ends."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def fill_missing_streams() -> None:
@@ -62,6 +104,26 @@ def fill_missing_streams() -> None:
             mode = "r" if name == "stdin" else "w"
             stream = open(number, mode, encoding="utf-8", errors="replace", closefd=False)  # noqa: SIM115
             setattr(sys, name, stream)
+
+
+@contextmanager
+def named_output() -> Iterator[None]:
+    """Inside the block, an error of the standard output names it; all is written at its end.
+
+    Raises:
+        OSError: something cannot be written.
+    """
+    before = sys.stdout
+    sys.stdout = cast(TextIO, Named(before, "standard output"))
+    try:
+        try:
+            yield
+        except SystemExit:  # after help
+            sys.stdout.flush()
+            raise
+        sys.stdout.flush()
+    finally:
+        sys.stdout = before
 
 
 @contextmanager

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json, read_plain
-from innerattn.errors import ConfigError, RunError, missing_library
+from innerattn.errors import ConfigError, RunError, missing_library, one_line
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -84,7 +84,7 @@ def _read(given: dict[str, Any], folder: Path, half: Any) -> dict[str, Any]:
             raise missing from error
         raise
     except (OSError, RunError) as error:
-        raise ConfigError(f"map.file: cannot read {path}: {error}") from error
+        raise ConfigError(f"map.file: cannot read {one_line(error)}") from error
     solid, width_m = _square(grid, cells, path, crop=path.suffix != ".json")
     rows = ["".join("#" if cell else "." for cell in row) for row in solid.tolist()]
     found: dict[str, Any] = {"rows": rows}
@@ -191,7 +191,9 @@ def _opened(path: Path) -> Image:
             flat = Image.new("RGBA", picture.size, "white")  # what is see-through is free
             flat.alpha_composite(picture.convert("RGBA"))
             return flat.convert("L")
-    except (UnidentifiedImageError, Image.DecompressionBombError, SyntaxError, ValueError) as error:
+    except UnidentifiedImageError as error:
+        raise ConfigError(f"map.file: {path} is no picture that Pillow can read") from error
+    except (Image.DecompressionBombError, SyntaxError, ValueError) as error:
         raise ConfigError(f"map.file: {path} is no picture: {error}") from error
 
 

@@ -242,12 +242,13 @@ def _default_tasks() -> tuple[Task, ...]:
 def _need_of_nobody(robots: tuple[Robot, ...], tasks: tuple[Task, ...]) -> str:
     """What to say of the first need that no robot can serve; empty where there is none."""
     abilities = list(dict.fromkeys(one for robot in robots for one in robot.abilities))
+    given = ", ".join(abilities) or "none"
     for index, task in enumerate(tasks):
         for need in task.needs:
             if need not in abilities:
                 return (
                     f"scenario.tasks[{index}].needs: task {task.name!r} needs {need!r}, which no "
-                    f"robot of the team can do; abilities of the team are {', '.join(abilities)}"
+                    f"robot of the team can do; abilities of the team are {given}"
                     f"{did_you_mean(need, abilities, repr)}"
                 )
     return ""

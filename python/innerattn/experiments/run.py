@@ -7,25 +7,27 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from innerattn.config import RunConfig, Scenario
 from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json
 from innerattn.errors import RunError
 from innerattn.experiments.plan import Case
 from innerattn.measures.summary import SCHEMA_VERSION
-from innerattn.records.logged import METRICS, MOST_METRICS_BYTES, logged_lines
+from innerattn.records.logged import METRICS, MOST_METRICS_BYTES, logged_lines, logged_rescues
 from innerattn.records.parquet import RECORD_FILES, read_records
 from innerattn.records.record import Record
 from innerattn.records.run_files import AlteredFileError, RunFiles
 from innerattn.records.run_folder import RunInfo, config_of
 from innerattn.records.tables import MOST_FILE_BYTES, refuse_damaged
 from innerattn.shown import Shown
+
+Found = TypeVar("Found")
 
 
 class NotMeasuredError(RunError):
@@ -157,10 +159,23 @@ def read_metrics(run: FinishedRun, *names: str) -> list[tuple[Any, ...]]:
     Raises:
         RunError: its ``metrics.jsonl`` is missing, as with an archived run, empty or damaged.
     """
+    return _of_lines(run, lambda line: tuple(line[name] for name in names))
+
+
+def read_rescues(run: FinishedRun) -> list[tuple[int, float | None]]:
+    """Env-steps, and rescues as `logged_rescues` counts them, of each line that a run logged.
+
+    Raises:
+        RunError: as of `read_metrics`.
+    """
+    return _of_lines(run, lambda line: (line["env_steps"], logged_rescues(run.config, line)))
+
+
+def _of_lines(run: FinishedRun, of: Callable[[Mapping[str, Any]], Found]) -> list[Found]:
     path = run.folder / METRICS
     try:
         data = RunFiles(run.folder).read(path.name, MOST_METRICS_BYTES)
-        found = [tuple(line[name] for name in names) for line in logged_lines(data)]
+        found = [of(line) for line in logged_lines(data)]
     except AlteredFileError:
         raise
     except (RunError, ValueError, KeyError, TypeError) as error:

@@ -53,6 +53,12 @@ def logged_rescues(config: RunConfig, line: Mapping[str, Any]) -> float | None:
     return float(rate) * config.training_scenario.episode_steps
 
 
+def counts_as_evaluated(config: RunConfig) -> bool:
+    """Whether `logged_rescues` counts over as much as an evaluation's standard episodes have."""
+    longer = config.train.episode_steps not in (None, config.scenario.episode_steps)
+    return not longer and not config.training_scenario.ends_early
+
+
 def still_rises(rescues: Sequence[float]) -> bool:
     """Whether a course of training has not come to its end.
 

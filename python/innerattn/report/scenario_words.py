@@ -83,6 +83,8 @@ def _stores(scenario: Scenario) -> Iterator[str]:
             yield f"{robot.name}: helps with {rescues}, then {until}"
 
 
+_HARDLY, _EASILY = 1.2, 1.5
+"""Rescue radii, as shares of that at which two helpers touch: up to the first they rarely meet."""
 _WHEELS = {
     "unicycle": "the speed along a heading and the turn rate",
     "differential": "the speeds of two wheels",
@@ -208,12 +210,12 @@ def _doubts(scenario: Scenario) -> Iterator[str]:
     for task in scenario.tasks:
         able = [robot for robot in scenario.robots if set(task.needs) & set(robot.abilities)]
         least = sum(sorted(robot.radius_m for robot in able)[:2]) / 2.0
-        overlap = len({robot.layer for robot in able}) > 1
+        overlap = len({robot.layer for robot in able}) > 1 or scenario.engine == "none"
         several = _needs_several(task, scenario) and not overlap
-        if several and scenario.rescue_radius_m < least:
+        if several and scenario.rescue_radius_m < _HARDLY * least:
             yield (
                 f"{task.name}: helpers hardly meet; without overlap of bodies rescue_radius_m "
-                f"must be at least {least:g}"
+                f"must be above {least:g}, and {_EASILY * least:.3g} gives them room"
             )
     largest = max(robot.radius_m for robot in scenario.robots)
     beyond = math.sqrt(2.0) * max(0.0, largest - scenario.wall_clearance_m)

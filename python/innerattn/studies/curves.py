@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.evaluate.training_score import training_rescues
-from innerattn.experiments.run import FinishedRun, read_metrics
+from innerattn.experiments.run import FinishedRun, read_metrics, read_rescues
+from innerattn.records.logged import counts_as_evaluated, unit_of_rescues
 from innerattn.stats.seeds import SeedCurve, seed_curve
 
 Array = NDArray[np.float64]
@@ -19,7 +20,7 @@ PARTS = 40
 SCRIPTS = ("hungarian", "greedy")
 """The scripted policies that a curve is shown beside."""
 EPISODES = 500
-"""Episodes of each script that are played where no evaluation has episodes as long."""
+"""Episodes of each script that are played where no evaluation counts rescues alike."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +32,10 @@ class LearningCurve:
         method: what was trained, by name.
         env_steps: (P,) in the middle of each part.
         seconds: (P,) of training until then, with what compiling took; means over runs.
-        rescues: (P,) per training episode, over runs; NaN where no episode ended.
-        scripts: rescues per episode of `SCRIPTS` by name, in episodes as long as those of training:
-            in the worlds of the evaluation of the situation's first run, or in worlds as those it
-            trained in.
+        rescues: (P,) as `logged_rescues` counts them, over runs; NaN where no episode ended.
+        unit: what they are counted over, see `unit_of_rescues`.
+        scripts: rescues of `SCRIPTS` by name, counted alike: in the worlds of the evaluation of the
+            situation's first run, or in worlds as those it trained in.
     """
 
     situation: str
@@ -42,6 +43,7 @@ class LearningCurve:
     env_steps: Array
     seconds: Array
     rescues: SeedCurve
+    unit: str
     scripts: dict[str, float]
 
 
@@ -84,13 +86,14 @@ def _curve(
         env_steps=middles,
         seconds=np.mean([_seconds_at(run, middles) for run in group], axis=0),
         rescues=seed_curve(np.stack([in_parts(steps, values, edges) for steps, values in courses])),
+        unit=unit_of_rescues(group[0].config),
         scripts=scripts[situation],
     )
 
 
 def _scripts(run: FinishedRun) -> dict[str, float]:
     config = run.config
-    if config.train.episode_steps not in (None, config.scenario.episode_steps):
+    if not counts_as_evaluated(config):
         return {name: training_rescues(config, name, EPISODES, None) for name in SCRIPTS}
     scripted = run.summary["scripted"]
     return {name: float(scripted[name]["mean"]) for name in SCRIPTS if name in scripted}
@@ -117,9 +120,9 @@ def in_parts(steps: Array, values: Array, edges: Array) -> Array:
 
 
 def _course(run: FinishedRun) -> tuple[Array, Array]:
-    """Env-steps and rescues per training episode, of the times at which episodes had ended."""
-    found = read_metrics(run, "env_steps", "rescues_per_episode")
-    known = np.array([both for both in found if both[1] is not None], np.float64).reshape(-1, 2)
+    """Env-steps and rescues, of the times at which episodes had ended."""
+    found = [both for both in read_rescues(run) if both[1] is not None]
+    known = np.array(found, np.float64).reshape(-1, 2)
     return known[:, 0], known[:, 1]
 
 

@@ -8,8 +8,8 @@ use innerattn_env::error::Error;
 use innerattn_env::rng::Stream;
 use innerattn_env::rules::Rules;
 use innerattn_env::scenario::{
-    Actions, Communication, DriveMode, Engine, MAX_TRAVEL_RADII, Obstacle, Robot, Scenario, Shape, Share,
-    Situation, Task,
+    Actions, Communication, DriveMode, Engine, MAX_TRAVEL_RADII, Map, Obstacle, Robot, Scenario, Shape,
+    Share, Situation, Task,
 };
 use innerattn_env::world::World;
 
@@ -131,8 +131,17 @@ fn extreme(source: &mut Stream) -> Scenario {
         engine,
         actions: one_of(source, &[Actions::Discrete, Actions::Continuous]),
         communication: communication(source),
+        map: (source.below(3) == 0).then(|| map(source)),
         ..Scenario::default()
     }
+}
+
+/// A map with few or many solid cells, large or small ones.
+fn map(source: &mut Stream) -> Map {
+    let side = one_of(source, &[2, 3, 5, 10, 50, 200]);
+    let solid = one_of(source, &[0.02, 0.1, 0.3, 0.6]);
+    let mut row = || (0..side).map(|_| if real(source) < solid { '#' } else { '.' }).collect();
+    Map { rows: (0..side).map(|_| row()).collect(), layers: None }
 }
 
 /// A radio of some sort, or none.

@@ -97,12 +97,12 @@ def test_it_tells_what_was_trained(page: str, mixed: list[FinishedRun]) -> None:
 def test_plots_hold_the_courses_of_the_runs(page: str) -> None:
     plots = {plot["title"]: plot for plot in plots_of(page)}
     assert list(plots) == [
-        "Rescues per training episode: mixed",
+        "Rescues per episode of training: mixed",
         "Attention entropy: td-inner, mixed",
         "Attention around handoffs: td-inner, mixed",
         "Retention under faults",
     ]
-    curve = plots["Rescues per training episode: mixed"]
+    curve = plots["Rescues per episode of training: mixed"]
     assert curve["levels"].keys() == {"hungarian", "greedy"}
     assert [line["name"] for line in curve["lines"]] == ["td-inner", "td-uniform"]
     assert len(curve["lines"][0]["low"]) == len(curve["lines"][0]["x"])  # a band over three runs
@@ -172,8 +172,8 @@ def test_scenarios_and_settings_of_every_kind_stand_side_by_side(
         "ppo-inner on mixed as in slow, ppo-inner on mixed as in fast"
     )
     titles = [plot["title"] for plot in plots_of(page)]
-    assert "Rescues per training episode: single" in titles
-    assert "Rescues per training episode: mixed as in wide" in titles
+    assert "Rescues per episode of training: single" in titles
+    assert "Rescues per episode of training: mixed as in wide" in titles
     assert "; and 2 more" in page
     assert "Shown, since a replay holds up to 4 runs of the same worlds: " in page
 

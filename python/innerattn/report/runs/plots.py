@@ -74,17 +74,17 @@ def line_colour(index: int) -> dict[str, Any]:
 
 
 def curves_plot(curves: Sequence[LearningCurve]) -> Plot:
-    """Rescues per training episode against env-steps, of curves in the same worlds."""
+    """Rescues in training against env-steps, of curves in the same worlds."""
     first = curves[0]
     return Plot(
-        title=f"Rescues per training episode: {first.situation}",
+        title=f"Rescues per {first.unit} of training: {first.situation}",
         note=f"{_bands([curve.rescues for curve in curves])} Dashed: scripts in the same worlds.",
         lines=[
             _banded(curve.method, curve.env_steps.tolist(), curve.rescues, **line_colour(index))
             for index, curve in enumerate(curves)
         ],
         x="env-steps",
-        y="rescues per episode",
+        y=f"rescues per {first.unit}",
         levels=dict(first.scripts),
     )
 

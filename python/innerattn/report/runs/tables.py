@@ -143,7 +143,8 @@ def _script_cells(part: Mapping[str, Any], name: str) -> tuple[str, str]:
 
 def curve_table(curves: Sequence[LearningCurve]) -> Table:
     """The numbers of the training curves."""
-    heads = columns(["method", "situation"], ["env-steps", "rescues per episode", "runs"])
+    unit = " or ".join(dict.fromkeys(curve.unit for curve in curves))
+    heads = columns(["method", "situation"], ["env-steps", f"rescues per {unit}", "runs"])
     rows = []
     for curve in curves:
         found = curve.rescues

@@ -7,10 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from innerattn.errors import RunError
+from innerattn.evaluate.training_score import ScriptedRescues, scripted_rescues
 from innerattn.policies import best_script
-from innerattn.records.logged import METRICS, MOST_METRICS_BYTES, logged_lines, logged_rescues
+from innerattn.records.logged import (
+    METRICS,
+    MOST_METRICS_BYTES,
+    counts_as_evaluated,
+    logged_lines,
+    logged_rescues,
+)
 from innerattn.records.run_files import RunFiles
 from innerattn.studies.aggregates import TASK, Aggregate, algorithm_of
+from innerattn.studies.curves import EPISODES
 from innerattn.studies.results import Result
 
 ENVIRONMENT = "innerattn"
@@ -43,7 +51,8 @@ def marl_eval_document(
 
     Metrics are ``rescues`` per episode and ``score``. Its steps are lines of the training's log,
     whose score is that of the rescues in training between those of the scripts as they were
-    measured; ``absolute_metrics`` are those of the evaluation.
+    measured, or, where training counts them over other episodes, in such worlds;
+    ``absolute_metrics`` are those of the evaluation.
 
     Args:
         found: algorithms by name.
@@ -66,25 +75,27 @@ def marl_eval_document(
 def _of_run(one: Result, folder: Path) -> dict[str, Any]:
     scripts = one.summary["scripted"]
     low, high = (float(scripts[name]["mean"]) for name in ("random", best_script(scripts)))
+    config, evaluated = one.run.config, ScriptedRescues(low, high)
+    trained = evaluated if counts_as_evaluated(config) else scripted_rescues(config, EPISODES)
 
-    def metrics(rescues: float) -> dict[str, list[float]]:
-        span = high - low
-        return {"rescues": [rescues]} | ({"score": [(rescues - low) / span]} if span > 0.0 else {})
+    def metrics(rescues: float, scripts: ScriptedRescues) -> dict[str, list[float]]:
+        score = scripts.score(rescues)
+        return {"rescues": [rescues]} | ({} if score is None else {"score": [score]})
 
     try:
         data = RunFiles(folder).read(METRICS, MOST_METRICS_BYTES)
         logged = [
             (int(line["env_steps"]), rescues)
             for line in logged_lines(data)
-            if (rescues := logged_rescues(one.run.config, line)) is not None
+            if (rescues := logged_rescues(config, line)) is not None
         ]
     except (ValueError, KeyError, TypeError) as error:
         raise RunError(f"{folder / METRICS}: not the metrics of a run") from error
     every = max(1, -(-len(logged) // _MOST_STEPS))
     kept = logged[::-1][::every][::-1]  # the last line is among them
     steps = {
-        f"step_{number}": {"step_count": env_steps, **metrics(rescues)}
+        f"step_{number}": {"step_count": env_steps, **metrics(rescues, trained)}
         for number, (env_steps, rescues) in enumerate(kept, 1)
     }
     measured = float(one.summary["rescues_per_episode"]["mean"])
-    return {**steps, "absolute_metrics": metrics(measured)}
+    return {**steps, "absolute_metrics": metrics(measured, evaluated)}

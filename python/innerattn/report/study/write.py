@@ -160,7 +160,8 @@ def _draw(folder: ReportFolder, found: Found) -> dict[str, str]:
             )
             for one in curves
         ]
-        folder.draw(name, draw_curves(lines, "rescues per episode of training") if lines else None)
+        unit = " or ".join(dict.fromkeys(one.unit for one in curves))
+        folder.draw(name, draw_curves(lines, f"rescues per {unit} of training") if lines else None)
         if lines:
             figures[title] = f"{name}.png"
     return figures
