@@ -151,7 +151,7 @@ BRIEF: Mapping[str, Brief] = {
     "page": Brief(
         "[OPTIONS] RUN|POLICY",
         (
-            ("RUN|POLICY", "a run (also zoo:NAME), or a script that a page can compute: random"),
+            ("RUN|POLICY", "a run (also zoo:NAME), or random, greedy, hungarian"),
             ("-o, --output FILE", "page to write: .html ({output})"),
             ("--preset NAME", "built-in scenario to play in (that of the run, or mixed)"),
             ("--scenario FILE", "TOML file with the scenario to play in, instead"),

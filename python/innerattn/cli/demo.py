@@ -86,11 +86,13 @@ class Demo(LongCommand):
 
     def _write_page(self) -> None:
         from innerattn.report.page.page import worlds_page
+        from innerattn.report.page.scripts import page_scripts
         from innerattn.report.page.team import read_team
 
         team = read_team(TEAM)
-        name = TEAM.partition(":")[2]
-        page = worlds_page(name, team.config.scenario, {name: team, "random": None}, self.seed)
+        scenario, name = team.config.scenario, TEAM.partition(":")[2]
+        policies = {name: team, **dict.fromkeys(page_scripts(scenario))}
+        page = worlds_page(name, scenario, policies, self.seed)
         write_whole(self.output, page.encode(errors="backslashreplace"))
 
 

@@ -23,7 +23,7 @@ class Page(Command):
     """Write one HTML file in which a team acts live, to play with: no server and no network."""
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
-    """A run, or a script that a page can compute: random."""
+    """A run, or a script that a page can compute: random, greedy, hungarian."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("page.html")
     """File to write."""
     preset: str | None = None
@@ -44,7 +44,8 @@ class Page(Command):
             OSError: the file cannot be written.
         """
         self._check()
-        from innerattn.report.page.page import SCRIPTED, worlds_page
+        from innerattn.report.page.page import worlds_page
+        from innerattn.report.page.scripts import page_scripts
         from innerattn.report.page.team import read_team
 
         worlds = self._worlds()
@@ -56,14 +57,12 @@ class Page(Command):
             name = Path(self.policy).resolve().name
             name = f"{name} (run)" if name in SCRIPTS else name
             policies[name] = team
-        scripts = SCRIPTED if policies else dict.fromkeys([self.policy, *SCRIPTED])
+        worlds = worlds or Scenario.preset("mixed")
+        scripts = page_scripts(worlds)
+        if not policies:
+            scripts = tuple(dict.fromkeys([self.policy, *scripts]))
         seed = settings.seed if self.seed is None else self.seed
-        page = worlds_page(
-            name,
-            worlds or Scenario.preset("mixed"),
-            policies | dict.fromkeys(scripts),
-            seed,
-        )
+        page = worlds_page(name, worlds, policies | dict.fromkeys(scripts), seed)
         write_whole(self.output, page.encode(errors="backslashreplace"))
         print(f"{self.output}: {name}, {self.output.stat().st_size / 1e6:.1f} MB")
         return 0

@@ -22,6 +22,7 @@ from innerattn.evaluate.interactive import InteractiveWorld, endless
 from innerattn.evaluate.trained import load_trained
 from innerattn.policies import Exported, PolicyInput, scripted_policy
 from innerattn.report.page.page import page_document, worlds_page
+from innerattn.report.page.scripts import page_scripts
 from innerattn.report.page.team import read_team
 from innerattn.report.play.sessions import Sessions
 from innerattn.train import load_policy
@@ -292,6 +293,40 @@ def test_it_shows_worlds_of_every_sort_as_the_server_does(page: Page, name: str)
         page.evaluate(ANSWER, [given, messages]), served(make, messages), strict=True
     ):
         like(one, other, name)
+
+
+def plain_worlds() -> dict[str, Scenario]:
+    """Worlds in which a page computes all its scripts."""
+    mixed = Scenario.preset("mixed")
+    swift = [robot.replace(drive="velocity") for robot in mixed.robots]
+    many = mixed.replace(max_victims=8)
+    return {
+        **{name: Scenario.preset(name) for name in ("mixed", "mixed-8", "mixed-sight")},
+        "continuous": mixed.replace(actions="continuous"),
+        "velocity": mixed.replace(robots=swift),
+        "more needs than robots": many,
+    }
+
+
+@pytest.mark.parametrize("name", plain_worlds())
+def test_its_scripts_do_what_those_of_python_do(page: Page, name: str) -> None:
+    scenario = plain_worlds()[name]
+    scripts = ("hungarian", "greedy")
+    assert page_scripts(scenario) == ("random", "greedy", "hungarian")
+
+    def make() -> InteractiveWorld:
+        worlds = endless(scenario)
+        found = {one: scripted_policy(one, worlds) for one in scripts}
+        return InteractiveWorld(worlds, found, SEED)
+
+    messages: list[dict[str, Any]] = [{"do": "step"}] * 150
+    messages += [{"do": "policy", "name": "greedy"}, *messages]
+    given = page_document(scenario, dict.fromkeys(scripts), SEED)
+    theirs, ours = served(make, messages), page.evaluate(ANSWER, [given, messages])
+    for step, (one, other) in enumerate(zip(ours, theirs, strict=True)):
+        like(one, other, f"answer {step}")
+    assert theirs[150]["rescued"] > 10
+    assert theirs[-1]["rescued"] > theirs[150]["rescued"] + 5
 
 
 @pytest.mark.parametrize("size", [WIDE, PHONE])

@@ -45,7 +45,7 @@ def test_what_a_page_cannot_compute_is_refused(
 def test_other_worlds_and_scripts_are_refused() -> None:
     with pytest.raises(RunError, match="zoo:mixed: was trained for other observations"):
         read_team("zoo:mixed", Scenario.preset("mixed-8"))
-    with pytest.raises(ConfigError, match="oracle: a page has no such script; must be random"):
+    with pytest.raises(ConfigError, match="oracle: a page has no such script here; must be random"):
         page_document(Scenario.preset("mixed"), {"oracle": None}, 1)
 
 

@@ -13,20 +13,17 @@ from innerattn.config import Scenario
 from innerattn.config.streams import stream_seed
 from innerattn.envs import BatchEnv
 from innerattn.envs.senses import ray_columns
-from innerattn.errors import ConfigError
 from innerattn.evaluate.interactive import endless
 from innerattn.report.html import json_text
+from innerattn.report.page.scripts import script_document
 from innerattn.report.page.team import PageTeam
 from innerattn.report.play.page import filled_page
 from innerattn.report.play.state import playable_worlds
 
 WORLDS = "worlds.wasm"
 """The compiled worlds, beside this file; `make wasm` makes them."""
-SCRIPTED = ("random",)
-"""Scripts that a page can compute."""
-
 _FOLDER = files("innerattn.report.page")
-_SCRIPTS = ("rust.js", "team.js", "engine.js")
+_SCRIPTS = ("rust.js", "team.js", "scripts.js", "engine.js")
 _POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline' 'wasm-unsafe-eval'"
 )
@@ -44,7 +41,7 @@ def worlds_page(
         seed: of the worlds, 0 to 2**63 - 1.
 
     Raises:
-        ConfigError: a page has no such script.
+        ConfigError: a page cannot compute such a script in these worlds.
     """
     code = (_FOLDER / WORLDS).read_bytes()
     packed = base64.b64encode(gzip.compress(code, 9, mtime=0)).decode()
@@ -70,13 +67,11 @@ def page_document(
         "worlds": playable_worlds(worlds),
         "slots": [list(worlds.slots_of(task)) for task in range(len(worlds.tasks))],
         "rays": rays,
-        "policies": [_policy(name, team) for name, team in policies.items()],
+        "policies": [_policy(name, team, worlds) for name, team in policies.items()],
     }
 
 
-def _policy(name: str, team: PageTeam | None) -> dict[str, Any]:
+def _policy(name: str, team: PageTeam | None, worlds: Scenario) -> dict[str, Any]:
     if team is not None:
         return {"name": name, "team": team.document, "weights": team.base64}
-    if name not in SCRIPTED:
-        raise ConfigError(f"{name}: a page has no such script; must be {' or '.join(SCRIPTED)}")
-    return {"name": name}
+    return {"name": name} | script_document(name, worlds)

@@ -72,7 +72,8 @@ class Engine {
     this.begin();
   }
 
-  policyOf({ name, team, weights }) {
+  policyOf({ name, team, weights, motion }) {
+    if (motion) return new (name === "greedy" ? Greedy : Hungarian)(name, motion, this.continuous);
     if (!team) return new Chance(name, this.size, this.continuous);
     return new Team(name, team, new Float32Array(bytesOf(weights).buffer));
   }
@@ -202,9 +203,15 @@ class Engine {
   choose() {
     const policy = this.policies.get(this.policy);
     this.obs = this.world.take("observations");
-    this.actions = policy.act(this.obs);
+    this.actions = policy.act(this.obs, () => this.scene());
     if (this.steered !== null) this.actions[this.steered] = this.steeredAction();
     this.attention = policy.attention(this.obs, this.actions);
+  }
+
+  /** What scripts see. */
+  scene() {
+    const [positions, velocities] = [this.world.take("positions"), this.world.take("velocities")];
+    return { positions, velocities, victims: this.victims() };
   }
 
   steeredAction() {

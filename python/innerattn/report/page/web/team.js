@@ -1,4 +1,4 @@
-// Policies that act in the page: a trained team, with its critic's attention, and chance.
+// A trained team that acts in the page, and its critic's attention.
 
 const SLOPE = 0.01; // of leaky ReLU
 const HIDDEN = -1e30;
@@ -19,29 +19,6 @@ class Draws {
     let mixed = Math.imul(this.state ^ (this.state >>> 15), 1 | this.state);
     mixed = (mixed + Math.imul(mixed ^ (mixed >>> 7), 61 | mixed)) ^ mixed;
     return (((mixed ^ (mixed >>> 14)) >>> 0) + 0.5) / 4294967296;
-  }
-}
-
-/** Every robot draws every action, all with the same chance. */
-class Chance {
-  constructor(name, robots, continuous) {
-    Object.assign(this, { name, robots, continuous });
-    this.reset(0);
-  }
-
-  reset(seed) {
-    this.draws = new Draws(seed);
-  }
-
-  act() {
-    const share = () => 2 * this.draws.next() - 1;
-    return Array.from({ length: this.robots }, () => (
-      this.continuous ? [share(), share()] : Math.floor(5 * this.draws.next())
-    ));
-  }
-
-  attention() {
-    return null;
   }
 }
 

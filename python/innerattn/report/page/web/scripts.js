@@ -1,0 +1,171 @@
+// Scripts that act in the page: chance, and those that drive straight to victims as
+// innerattn.policies.scripted does.
+
+const FORBIDDEN = 1e7; // cost of a pair that cannot be, s
+const OWN_SHARE = 0.3;
+const NEVER_S = 1e4;
+const PUSHES = [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]];
+
+/** Every robot draws every action, all with the same chance. */
+class Chance {
+  constructor(name, robots, continuous) {
+    Object.assign(this, { name, robots, continuous });
+    this.reset(0);
+  }
+
+  reset(seed) {
+    this.draws = new Draws(seed);
+  }
+
+  act() {
+    const share = () => 2 * this.draws.next() - 1;
+    return Array.from({ length: this.robots }, () => (
+      this.continuous ? [share(), share()] : Math.floor(5 * this.draws.next())
+    ));
+  }
+
+  attention() {
+    return null;
+  }
+}
+
+/** Targets first, anew in every step, and then actions. It takes all robots to be healthy. */
+class Dispatcher {
+  /** `motion` is of innerattn.report.page.scripts. */
+  constructor(name, motion, continuous) {
+    Object.assign(this, { name, continuous }, motion);
+  }
+
+  reset() {}
+
+  /** The actions of all robots; `scene` gives positions, velocities and victims by slot. */
+  act(obs, scene) {
+    const seen = scene(), chosen = this.choose(seen);
+    return this.robots.map((robot, index) => {
+      const victim = seen.victims[chosen[index]], [x, y] = victim ? [victim.x, victim.y] : [0, 0];
+      const at = 2 * index, way = [x - seen.positions[at], y - seen.positions[at + 1]];
+      const speed = [seen.velocities[at], seen.velocities[at + 1]];
+      return this.continuous ? this.pushed(robot, way, speed) : this.moved(robot, way, speed);
+    });
+  }
+
+  /** The action after which the robot, coasting for a period more, is nearest to its target. */
+  moved(robot, way, speed) {
+    const reach = this.dt * (1 + robot.keep);
+    const left = PUSHES.map((push) => {
+      const after = speed.map((one, axis) => robot.keep * one + push[axis] * robot.push);
+      const share = Math.min(1, robot.limit / Math.max(lengthOf(after), 1e-12));
+      const [x, y] = way.map((one, axis) => one - reach * (after[axis] * share));
+      return x * x + y * y;
+    });
+    return left.indexOf(Math.min(...left));
+  }
+
+  /** The push that brings it there if it is strong enough, else a full one that way. */
+  pushed(robot, way, speed) {
+    const reach = this.dt * (1 + robot.keep);
+    const wish = way.map((one, axis) => (one / reach - robot.keep * speed[axis]) / Math.max(robot.push, 1e-12));
+    const length = Math.max(lengthOf(wish), 1);
+    return wish.map((one) => Math.fround(one / length));
+  }
+
+  /** Whether a robot gives a need of a victim; beyond a task's last need there is none. */
+  gives(robot, victim, need) {
+    const ability = this.needs[victim.task][need];
+    return Boolean(victim.present) && ability >= 0 && robot.able[ability];
+  }
+
+  attention() {
+    return null;
+  }
+}
+
+/** Every robot goes to the nearest victim that it can help, whatever the others do. */
+class Greedy extends Dispatcher {
+  choose({ positions, victims }) {
+    return this.robots.map((robot, index) => {
+      const away = victims.map((victim) => {
+        if (!this.needs[0].some((_, need) => this.gives(robot, victim, need))) return Infinity;
+        const [x, y] = [victim.x - positions[2 * index], victim.y - positions[2 * index + 1]];
+        return x * x + y * y;
+      });
+      const least = Math.min(...away);
+      return least < Infinity ? away.indexOf(least) : -1;
+    });
+  }
+}
+
+/** Robots are assigned to needs at the least total cost in arrival times. */
+class Hungarian extends Dispatcher {
+  choose({ positions, velocities, victims }) {
+    const needs = this.needs[0].length, times = this.robots.map((robot, index) => {
+      const two = (values) => values.subarray(2 * index, 2 * index + 2);
+      return victims.map((victim) => this.arrival(robot, two(positions), two(velocities), victim));
+    });
+    const costs = this.robots.map(() => Array(victims.length * needs).fill(FORBIDDEN));
+    victims.forEach((victim, slot) => {
+      const givers = Array.from({ length: needs }, (_, need) => (
+        this.robots.flatMap((robot, index) => (this.gives(robot, victim, need) ? [index] : []))
+      ));
+      const soonest = givers.map((some) => (some.length ? Math.min(...some.map((one) => times[one][slot])) : 0));
+      const last = Math.max(...soonest);
+      givers.forEach((some, need) => some.forEach((one) => {
+        costs[one][slot * needs + need] = Math.max(times[one][slot], last) + OWN_SHARE * times[one][slot];
+      }));
+    });
+    return cheapest(costs).map((need, robot) => (
+      need >= 0 && costs[robot][need] < FORBIDDEN ? Math.floor(need / needs) : -1
+    ));
+  }
+
+  /** When a robot could be within the rescue radius of a victim, s. */
+  arrival(robot, [x, y], [vx, vy], victim) {
+    const way = [victim.x - x, victim.y - y], distance = lengthOf(way), gap = distance - this.radius;
+    if (gap <= 0) return 0;
+    const towards = (way[0] * vx + way[1] * vy) / Math.max(distance, 1e-9), speed = Math.max(robot.speed, 1e-9);
+    return Math.min(gap / speed + Math.max(robot.lag * (1 - towards / speed), 0), NEVER_S);
+  }
+}
+
+/** The column of each row, -1 for none: as many pairs as there can be, at the least total cost. */
+function cheapest(costs) {
+  const rows = costs.length, columns = costs[0].length;
+  if (rows > columns) {
+    const rowOf = cheapest(costs[0].map((_, column) => costs.map((row) => row[column])));
+    return costs.map((_, row) => rowOf.indexOf(row));
+  }
+  // Shortest augmenting paths with potentials; row 0 and column 0 stand for none.
+  const high = Array(rows + 1).fill(0), low = Array(columns + 1).fill(0), rowOf = Array(columns + 1).fill(0);
+  for (let row = 1; row <= rows; row++) {
+    const least = Array(columns + 1).fill(Infinity), from = Array(columns + 1).fill(0);
+    const done = Array(columns + 1).fill(false);
+    let at = 0;
+    rowOf[0] = row;
+    while (rowOf[at]) {
+      done[at] = true;
+      let next = 0, step = Infinity;
+      for (let column = 1; column <= columns; column++) {
+        if (done[column]) continue;
+        const left = costs[rowOf[at] - 1][column - 1] - high[rowOf[at]] - low[column];
+        if (left < least[column]) [least[column], from[column]] = [left, at];
+        if (least[column] < step) [step, next] = [least[column], column];
+      }
+      for (let column = 0; column <= columns; column++) {
+        if (done[column]) {
+          high[rowOf[column]] += step;
+          low[column] -= step;
+        } else {
+          least[column] -= step;
+        }
+      }
+      at = next;
+    }
+    while (at) {
+      rowOf[at] = rowOf[from[at]];
+      at = from[at];
+    }
+  }
+  return costs.map((_, row) => rowOf.indexOf(row + 1, 1) - 1).map((column) => Math.max(column, -1));
+}
+
+const lengthOf = ([x, y]) => Math.sqrt(x * x + y * y);
