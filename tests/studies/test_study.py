@@ -152,6 +152,11 @@ train.threads = 2
             ASKED + "a = {method = 'td-inner'}\nb = {method = 'td-uniform'}\nmeasure = 'scor'",
             "measure = 'scor': must be one of score",
         ),
+        (
+            "[grid]\nscenarios = ['mixed', 'air-ground']",
+            "grid (scenario = air-ground, method = ppo-inner, budget = fast): "
+            "scenario.obstacles[0]: network.symmetry must be 'none' where an obstacle has a fixed",
+        ),
     ],
 )
 def test_bad_files_are_refused_in_one_line(text: str, message: str, folder: Path) -> None:

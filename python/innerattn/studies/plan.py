@@ -13,6 +13,7 @@ from typing import Any
 
 from innerattn.config import SCENARIOS, RunConfig, load_run_config
 from innerattn.config.run import digest_of
+from innerattn.config.turning import check_frames
 from innerattn.errors import ConfigError
 from innerattn.experiments.plan import Case, of_seed
 from innerattn.measures.registry import MEASURES
@@ -208,6 +209,7 @@ def _places(
         given = {**chosen, **changes.get(variant, {})}
         try:
             config = _config(scenario, find, method, budget, {**of_seed(grid.numbers[0]), **given})
+            check_frames(config)
         except ConfigError as error:
             named = ", ".join(f"{key} = {value}" for key, value in place.items() if value != "")
             raise ConfigError(f"grid ({named}): {error}") from error

@@ -1,0 +1,77 @@
+"""Which worlds frames can turn and mirror (`network.symmetry`)."""
+
+from __future__ import annotations
+
+from innerattn.config.range_sensor import RangeSensor
+from innerattn.config.run import RunConfig
+from innerattn.config.scenario import Robot, Scenario
+from innerattn.errors import ConfigError
+
+
+def check_frames(config: RunConfig) -> None:
+    """Refuse a run whose frames cannot turn its worlds.
+
+    Raises:
+        ConfigError: the message names the key of the scenario.
+    """
+    if config.network.symmetry != "none" and not config.algorithm.for_any_team:
+        check_turning(config.scenario)
+
+
+def check_turning(scenario: Scenario) -> None:
+    """Refuse worlds that frames cannot turn.
+
+    Raises:
+        ConfigError: What has a place makes a turned world another one, which no robot could see, or
+            rays of robots are not those of a turned world.
+    """
+    found = turning_hindrance(scenario)
+    if found is not None:
+        key, what = found
+        raise ConfigError(
+            f"scenario.{key}: network.symmetry must be 'none' where {what}; "
+            "--network.symmetry none sets it, or take another budget"
+        )
+
+
+def turning_hindrance(scenario: Scenario) -> tuple[str, str] | None:
+    """The first key because of which frames cannot turn worlds, and what it says."""
+    place = _place(scenario)
+    if place is not None:
+        key, what = place
+        return key, f"{what}, because a turned world would be another one"
+    sensing = range_sensors(scenario)
+    for index, robot, sensor in sensing:
+        key = f"robots[{index}].range_sensor"
+        _, first, other = sensing[0]
+        alike = (sensor.rays, sensor.field_of_view_deg) == (other.rays, other.field_of_view_deg)
+        if not alike or robot.has_wheels != first.has_wheels:
+            return key, "range sensors differ, in rays or field of view, or in having a heading"
+        if not robot.has_wheels and sensor.rays % 4:
+            return f"{key}.rays", "rays of robots without a heading are no multiple of 4"
+    return None
+
+
+def _place(scenario: Scenario) -> tuple[str, str] | None:
+    """The first key that gives something a place, and what it says."""
+    for index, obstacle in enumerate(scenario.obstacles):
+        sides = obstacle.half_extents_m
+        if obstacle.position_m is not None or (sides is not None and sides[0] != sides[1]):
+            return f"obstacles[{index}]", "an obstacle has a fixed place or is an oblong box"
+    if scenario.map is not None:
+        return "map", "solid cells have fixed places"
+    for index, robot in enumerate(scenario.robots):
+        if robot.start_m is not None:
+            return f"robots[{index}].start_m", "a robot has a fixed start"
+    if scenario.victim_places_m:
+        return "victim_places_m", "victims have fixed places"
+    area = scenario.victim_area_m
+    if area is not None and len({-area[0], -area[1], area[2], area[3]}) > 1:
+        return "victim_area_m", "the area is no square around the centre"
+    return None
+
+
+def range_sensors(scenario: Scenario) -> list[tuple[int, Robot, RangeSensor]]:
+    """Robots with a range sensor, with their indices."""
+    robots = enumerate(scenario.robots)
+    return [(at, one, one.range_sensor) for at, one in robots if one.range_sensor is not None]
