@@ -46,7 +46,7 @@ sys.exit(main(["train", "--train.env-steps", "512", "--run-dir", sys.argv[2]]))
 """
 
 
-@pytest.mark.parametrize("megabytes", [150, 300, 600])
+@pytest.mark.parametrize("megabytes", [150, 300, pytest.param(600, marks=pytest.mark.long)])
 def test_no_lack_of_memory_ends_in_a_traceback(
     megabytes: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

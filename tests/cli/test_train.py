@@ -307,7 +307,7 @@ def test_existing_folder_is_refused(
     assert {file: file.stat().st_mtime_ns for file in run_dir.rglob("*")} == before
 
 
-@pytest.mark.parametrize("rises", [False, True])
+@pytest.mark.parametrize("rises", [pytest.param(False, marks=pytest.mark.long), True])
 def test_the_score_is_the_last_thing_on_the_screen(
     rises: bool,
     tiny: list[str],

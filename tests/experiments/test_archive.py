@@ -80,6 +80,7 @@ def test_a_study_takes_archived_runs_for_runs(
     assert read_results(study).left_out[0][1].startswith("unreadable: ")
 
 
+@pytest.mark.long
 def test_archived_runs_give_the_same_report(
     crossed: tuple[Path, list[FinishedRun]], tmp_path: Path
 ) -> None:

@@ -72,6 +72,7 @@ def read_apart(path: Path) -> tuple[str, int]:
     return said, int(grown)
 
 
+@pytest.mark.long
 def test_one_long_text_in_many_rows_is_not_written_out(tmp_path: Path) -> None:
     path = tmp_path / "table"
     written(pa.table({"c": pa.array(["x" * (1 << 20)] * 500)}), path)

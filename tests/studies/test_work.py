@@ -169,6 +169,7 @@ def test_two_workers_share_the_runs(tiny_file: Path, tmp_path: Path) -> None:
     assert len(digests) == 6
 
 
+@pytest.mark.long
 def test_studies_share_the_runs_of_a_pool(tiny_file: Path, tmp_path: Path) -> None:
     pool = tmp_path / "pool"
     first = begin_study(tiny_file, tmp_path / "first", pool=pool)

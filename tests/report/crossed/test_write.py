@@ -52,6 +52,7 @@ def test_files_are_the_same_twice_and_say_what_they_are_of(crossed: Crossed) -> 
     assert "Left out" not in text
 
 
+@pytest.mark.long
 def test_every_run_has_a_line(crossed: Crossed) -> None:
     out, runs = crossed
     write_crossed(runs, out, "quick")
@@ -79,6 +80,7 @@ def test_every_run_has_a_line(crossed: Crossed) -> None:
     assert len(scores) == 18  # else runs could be taken for one another
 
 
+@pytest.mark.long
 def test_the_page_opens_with_its_figure_and_links_the_rest(short: Short) -> None:
     out, situation = short
     text = (out / "crossed.md").read_text()
@@ -93,6 +95,7 @@ def test_the_page_opens_with_its_figure_and_links_the_rest(short: Short) -> None
     assert len(text.split()) < 2_500
 
 
+@pytest.mark.long
 def test_verdicts_of_situations_stand_below_one_another(short: Short) -> None:
     _, mixed = short
     rows = rows_of(markdown(claims_table([mixed, replace(mixed, name="double")])))[1:]
@@ -102,6 +105,7 @@ def test_verdicts_of_situations_stand_below_one_another(short: Short) -> None:
     assert [row[2:] for row in rows[::2]] == [row[2:] for row in rows[1::2]]
 
 
+@pytest.mark.long
 def test_the_long_tables_hold_every_arm_and_effect(short: Short) -> None:
     out, situation = short
     rows = rows_of((out / "crossed_tables.md").read_text())

@@ -308,7 +308,13 @@ def plain_worlds() -> dict[str, Scenario]:
     }
 
 
-@pytest.mark.parametrize("name", plain_worlds())
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.long if name.startswith("mixed-") else ())
+        for name in plain_worlds()
+    ],
+)
 def test_its_scripts_do_what_those_of_python_do(page: Page, name: str) -> None:
     scenario = plain_worlds()[name]
     scripts = ("hungarian", "greedy")

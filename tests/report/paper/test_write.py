@@ -45,6 +45,7 @@ def test_all_files_are_written_and_the_same_twice(
         assert json.loads(path.read_text())["schema_version"] == version
 
 
+@pytest.mark.long
 def test_the_report_opens_with_one_row_for_each_claim(folder: Path) -> None:
     text = (folder / "report.md").read_text()
     opening = text.split("\n## ")[0]
@@ -85,6 +86,7 @@ def test_without_metrics_there_is_no_figure(runs: list[FinishedRun], tmp_path: P
     assert "No run has attention that chooses" in (tmp_path / "report.md").read_text()
 
 
+@pytest.mark.long
 def test_all_else_is_linked(runs: list[FinishedRun], folder: Path) -> None:
     text = (folder / "report.md").read_text()
     linked = {name for name in ALL if f"({name})" in text}
@@ -217,6 +219,7 @@ def test_it_is_said_where_all_seeds_were_measured_in_the_same_worlds(
         refuse_unlike([moved[1], other])
 
 
+@pytest.mark.long
 def test_both_attentions_are_compared_where_both_are_there(folder: Path) -> None:
     text = (folder / "report.md").read_text()
     compared = text.split("## Learnt attention beside uniform")[1].split("## ")[0]

@@ -34,6 +34,7 @@ def test_a_gif_has_two_frames_for_each_step() -> None:
     assert both[0].shape[1] > 1.5 * found[0].shape[1]
 
 
+@pytest.mark.long
 def test_arrows_are_of_the_robots_that_were_asked_for() -> None:
     without, record = watched(SHORT, heads=0), watched(SHORT)
     painted = {
@@ -49,6 +50,7 @@ def test_arrows_are_of_the_robots_that_were_asked_for() -> None:
     assert 100 < one < everybody
 
 
+@pytest.mark.long
 def test_a_video() -> None:
     data = moving_picture([watched(SHORT, episodes=1)], ["a"], ".mp4")
     assert data[4:8] == b"ftyp"

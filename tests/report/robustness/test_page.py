@@ -82,6 +82,7 @@ def test_tables_of_a_situation(place: int, whole: Robustness) -> None:
     ]
 
 
+@pytest.mark.long
 def test_training_and_teams() -> None:
     whole = made("training", "teams")
     text = robustness_page(whole, "short", ["faults of mixed-s9: not measured"])
