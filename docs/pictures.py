@@ -14,11 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from innerattn.cli.main import main
-from innerattn.config import Robot, Scenario, Task
+from innerattn.config import Robot, RunConfig, Scenario, Task
 from innerattn.envs import BatchEnv
 from innerattn.envs.render import paint_figure
+from innerattn.experiments.archive import read_archive
+from innerattn.experiments.run import FinishedRun
 
 IMAGES = Path(__file__).parent / "images"
+RECORDS = Path(__file__).parent / "records"
 RIGHT, LEFT = 1, 2  # actions
 SCRIPT = ("hungarian", "--seed", "99")
 INK, GREY, BLUE, ORANGE = "#1f2933", "#7b8794", "#2b6cb0", "#c05621"
@@ -138,9 +141,44 @@ def score() -> Figure:
     return figure
 
 
+def sight() -> Figure:
+    """What short sight costs, and what talking gives back: runs of examples/studies/sight.toml."""
+    runs: dict[str, list[FinishedRun]] = {}
+    for run in read_archive(RECORDS / "sight.parquet"):
+        runs.setdefault(_how_it_sees(run.config), []).append(run)
+    figure, axes = figure_of(7.2, 2.9)
+    names = ["all is seen", "0.8 m, silent", "0.8 m, learnt messages", "0.8 m, told of victims"]
+    for row, name in enumerate(names):
+        found = [run.summary["rescues_per_episode"]["mean"] for run in runs[name]]
+        axes.barh(row, np.mean(found), height=0.55, color=BLUE, alpha=0.35)
+        axes.plot(found, [row] * len(found), "o", color=BLUE, ms=4)
+        axes.text(0.05, row, f"{np.mean(found):.2f}", va="center", fontsize=9, color=INK)
+        script = runs[name][0].summary["scripted"].get("greedy-seen")
+        if script is not None:
+            axes.plot(script["mean"], row, "|", ms=22, mew=2, color=ORANGE)
+    axes.plot([], [], "o", color=BLUE, ms=4, label="a trained team (a seed)")
+    axes.plot([], [], "|", ms=10, mew=2, color=ORANGE, label="script of like sight")
+    best = runs[names[0]][0].summary["scripted"]["hungarian"]["mean"]
+    axes.axvline(best, color=GREY, lw=1.2, ls="--", label="hungarian, which sees all")
+    axes.set(
+        yticks=range(len(names)), yticklabels=names, xlabel="rescues per episode", xlim=(0, 3.4)
+    )
+    axes.invert_yaxis()
+    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
+    return figure
+
+
+def _how_it_sees(config: RunConfig) -> str:
+    if config.scenario.robots[0].sight_m is None:
+        return "all is seen"
+    if config.scenario.communication is not None:
+        return "0.8 m, told of victims"
+    return "0.8 m, learnt messages" if config.network.message_width else "0.8 m, silent"
+
+
 if __name__ == "__main__":
     code = main(["replay", *(sys.argv[1:] or SCRIPT), "-o", str(IMAGES / "rescue.gif")])
     if not sys.argv[1:]:
-        for draw in (world, contacts, critic, score):
+        for draw in (world, contacts, critic, score, sight):
             draw().savefig(IMAGES / f"concept_{draw.__name__}.png")
     sys.exit(code)

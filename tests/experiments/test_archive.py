@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from made_run import made_run
 from reseal import reseal
 from small_study import begin_small
 
@@ -45,6 +46,17 @@ def test_what_is_written_is_read_but_for_steps(runs: list[FinishedRun], tmp_path
     before = path.read_bytes()
     write_archive(runs, path)
     assert path.read_bytes() == before
+
+
+def test_worlds_may_need_unlike_numbers_of_helpers(runs: list[FinishedRun], tmp_path: Path) -> None:
+    one = ({"name": "one", "needs": ("food",)},)
+    alone = made_run(tmp_path / "made", "mixed", "td-inner", 3, keys={"scenario.tasks": one})
+    for given in ([alone, runs[0]], [runs[0], alone]):
+        write_archive(given, tmp_path / FILE)
+        for run, copy in zip(given, read_archive(tmp_path / FILE), strict=True):
+            for mine, its in zip(copy.scored, run.scored, strict=True):
+                assert mine.rescues.dtype == its.rescues.dtype
+                assert mine.rescues.tobytes() == its.rescues.tobytes()
 
 
 def test_a_study_takes_archived_runs_for_runs(

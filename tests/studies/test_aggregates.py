@@ -52,11 +52,15 @@ def test_places_of_grids_that_set_other_keys_stand_in_one_table() -> None:
     values: dict[tuple[str, Length], Values] = {("score", "standard"): Values({0: 0.5}, None)}
     found = [
         Mean({"scenario": scenario, **keys}, (0,), values, {"standard": 25})
-        for scenario, keys in (("mixed", {}), ("office", {"network.hidden_width": 128}))
+        for scenario, keys in (
+            ("mixed", {}),
+            ("office", {"network.hidden_width": 128, "train.warm_start": "hungarian"}),
+        )
     ]
     table = markdown(means_table(found))
-    assert "| mixed | default |" in table
-    assert "| office | 128 |" in table
+    assert "| scenario | keys | seeds |" in table
+    assert "| mixed |  | 0 |" in table
+    assert "| office | hidden_width = 128, warm_start = hungarian | 0 |" in table
 
 
 def test_algorithms_over_their_tasks() -> None:

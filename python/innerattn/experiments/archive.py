@@ -56,7 +56,8 @@ def write_archive(runs: Iterable[FinishedRun], path: Path) -> None:
     names = {tuple(row.pop("reward_names")) for row in rows}
     if len(names) > 1:
         raise RunError(f"{path}: runs have the reward components {sorted(names)}: must be the same")
-    columns = {key: pa.array([row[key] for row in rows], _type(key)) for key in _keys(rows)}
+    # Victims of some worlds have more helpers than those of others.
+    columns = {key: pa.array([row.get(key, ()) for row in rows], _type(key)) for key in _keys(rows)}
     head = {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,

@@ -26,6 +26,7 @@ from innerattn.studies.aggregates import THRESHOLDS, Aggregate
 from innerattn.studies.curves import EPISODES, LearningCurve
 from innerattn.studies.folder import Rules, StudyFolder
 from innerattn.studies.ledger import State
+from innerattn.studies.plan import TRAIN_SECONDS
 from innerattn.studies.results import RULES, Compared, Mean, Results, Values
 from innerattn.studies.shown import CONTRASTS, DATED_RULES, OVER_ALL, StudyTable
 from innerattn.studies.space import Length, Value
@@ -217,21 +218,29 @@ def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:
         found: at least one.
         seeds: whether the value of each seed is shown; then means are bold, for Markdown.
     """
-    varied = varied_in([one.place for one in found]) or ["method"]
+    places = [one.place for one in found]
+    varied = varied_in(places) or ["method"]
+    partly = [key for key in varied if any(key not in place for place in places)]
+    always = [key for key in varied if key not in partly]
     rows = []
     for one in found:
         cells = [value_cell(x) if seeds else plus_minus(x.mean) for x in one.values.values()]
-        rows.append([*_named(one.place, varied), format_seeds(one.seeds), *cells])
+        named = _named(one.place, always) + ([_set_there(one.place, partly)] if partly else [])
+        rows.append([*named, format_seeds(one.seeds), *cells])
     heads = []
     for measure, length in found[0].values:
         if measure.startswith(RETAINED):  # its episodes have a length of their own
             kind = measure.removeprefix(RETAINED).replace("_", " ").strip()
             heads.append(f"{RETAINED}, {kind}" if kind else RETAINED)
             continue
+        if measure == TRAIN_SECONDS:
+            heads.append("training [s]")
+            continue
         steps = {one.episode_steps[length] for one in found}
         which = f"{steps.pop()} steps" if len(steps) == 1 else f"{length} episodes"
         heads.append(f"{_IN_WORDS.get(measure, measure.replace('_', ' '))}, {which}")
-    return plain_table(columns(varied, ["seeds", *heads]), rows)
+    named = [*always, "keys"] if partly else always
+    return plain_table(columns(named, ["seeds", *heads]), rows)
 
 
 _IN_WORDS = {"rescues_per_episode": "rescues"}
@@ -333,6 +342,11 @@ def _sides(compared: Sequence[Compared]) -> list[tuple[str, str]]:
 def _named(place: Mapping[str, Value], varied: Sequence[str]) -> list[str]:
     """What differs of a place; a grid may leave out what another one sets."""
     return [str(place.get(key, "default")) for key in varied]
+
+
+def _set_there(place: Mapping[str, Value], keys: Sequence[str]) -> str:
+    """Those of some keys that a place sets, by the last part of their names."""
+    return ", ".join(f"{key.rpartition('.')[2]} = {place[key]}" for key in keys if key in place)
 
 
 def varied_in(places: Sequence[Mapping[str, Value]]) -> list[str]:
