@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 from innerattn.config.untrusted import parse_json
@@ -103,12 +104,12 @@ class Member:
     battery_j: float | None = None
     load: int | None = None
 
-    @property
+    @cached_property
     def has_wheels(self) -> bool:
         """Whether it drives along a heading."""
         return self.drive in ("unicycle", "differential")
 
-    @property
+    @cached_property
     def stores(self) -> tuple[str, ...]:
         """What it has of ``charge`` and ``load``."""
         found = {"charge": self.battery_j, "load": self.load}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 from innerattn.policies.exported.contract import Contract
 
@@ -45,42 +46,42 @@ class Layout:
     hears: bool
     times: tuple[str, ...]
 
-    @property
+    @cached_property
     def available(self) -> int:
         """Column of availability in a robot's block; faults follow, and then `stores`."""
         return 4 + len(self.abilities)
 
-    @property
+    @cached_property
     def stores_from(self) -> int:
         """First column of `stores` in a robot's block."""
         return self.available + 1 + len(self.faults)
 
-    @property
+    @cached_property
     def heading(self) -> int:
         """First column of the heading in a robot's block."""
         return self.stores_from + len(self.stores)
 
-    @property
+    @cached_property
     def robot(self) -> int:
         """Columns of a robot's block."""
         return self.heading + 2 * self.headings
 
-    @property
+    @cached_property
     def own(self) -> int:
         """Columns of the robot's own block and of the ways, the turn rate and the rays behind."""
         return self.robot + 2 * len(self.spots) + self.headings + self.rays
 
-    @property
+    @cached_property
     def mate(self) -> int:
         """Columns of a teammate: a robot's, whether it is seen, since when not, if it is heard."""
         return self.robot + 2 * self.sight + self.hears
 
-    @property
+    @cached_property
     def place(self) -> int:
         """First column of the place in a victim's block."""
         return 1 + len(self.abilities)
 
-    @property
+    @cached_property
     def victim(self) -> int:
         """Columns of a victim."""
         return self.place + 2 + len(self.times) + self.sight + 2 * self.headings
