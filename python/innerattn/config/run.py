@@ -165,6 +165,7 @@ class RunConfig(Model):
             self._check_continuous()
         refuse_late_faults(self.scenario, self.evaluate)
         self._check_swap()
+        self._check_masks()
         self._check_potential()
         self._check_workers()
         self._check_any_team()
@@ -282,6 +283,21 @@ class RunConfig(Model):
             raise ValueError(
                 f"network.message_width = {width}: train.warm_start = {train.warm_start!r} "
                 "imitates robots that say nothing; must be 'none'"
+            )
+
+    def _check_masks(self) -> None:
+        """Refuse masks of actions for what has none."""
+        if not self.network.mask_actions:
+            return
+        key, train = "network.mask_actions = true", self.train
+        if self.algorithm.for_any_team:
+            raise ValueError(f"{key}: train.method = {train.method!r} has no masks; must be false")
+        if self.scenario.actions != "discrete":
+            raise ValueError(f"{key}: scenario.actions must be 'discrete'")
+        if train.warm_start != "none":
+            raise ValueError(
+                f"{key}: train.warm_start = {train.warm_start!r} imitates robots that cannot act, "
+                "too; must be 'none'"
             )
 
     def _check_potential(self) -> None:

@@ -46,6 +46,11 @@ class NetworkConfig(Model):
         description="none: every robot has its own actor, encoders and critic; kind: robots of a "
         "kind share them, except a critic without attention",
     )
+    mask_actions: Annotated[bool, ADDED_LATER] = Field(
+        False,
+        description="let a robot that cannot act, because it is unavailable or has no charge, stay "
+        "for certain, so that nothing is learnt from actions without an effect",
+    )
     swapped_robots: Annotated[tuple[str, str] | None, ADDED_LATER] = Field(
         None,
         description="names of two robots of a kind that swap their initial weights, to see what "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pkgutil import resolve_name
+from typing import Any
 
 import torch
 from torch import nn
@@ -19,6 +20,7 @@ from innerattn.nn import (
     Hearing,
     JointCritic,
     ListeningActor,
+    MaskedActor,
     Memory,
     Messages,
     OracleAttention,
@@ -61,7 +63,8 @@ def draw_networks(
         ValueError: `network.encoder` is "entities" and `team.entities` are not the columns of an
             observation, or `network.parameter_sharing` is "kind" and `team.kinds` are not those of
             the team, or `network.attention` is "oracle" and `team.partners` is missing, or
-            `network.message_width` is not 0 and `team.hearing` is missing.
+            `network.message_width` is not 0 and `team.hearing` is missing, or
+            `network.mask_actions` is set and `team.able` is missing.
     """
     entities = _entities(team) if network.encoder == "entities" else None
     kinds = _kinds(team) if network.parameter_sharing == "kind" else None
@@ -70,7 +73,7 @@ def draw_networks(
     sizes = robots, obs_width, team.actions.outputs, width
     actor: AnyActor
     if network.attention == "none":
-        actor = Actor(*sizes, generator, entities, heard + remembered)
+        actor = _actor(team, network, *sizes, generator, entities, heard + remembered)
         outputs = critic_outputs or num_actions
         joint = CentralCritic if network.joint_critic == "central" else JointCritic
         critic: nn.Module = joint(robots, obs_width + remembered, outputs, width, generator)
@@ -79,7 +82,7 @@ def draw_networks(
         attention = kind(width, network.attention_heads, generator)
         if isinstance(attention, OracleAttention):
             attention.partners = _partners(team)
-        actor = Actor(*sizes, generator, entities, heard + remembered)
+        actor = _actor(team, network, *sizes, generator, entities, heard + remembered)
         form = VectorCritic if team.action_width else Critic
         inputs = team.action_width or num_actions
         critic = form(
@@ -116,6 +119,17 @@ def draw_networks(
         for net in (actor, critic):
             swap_robots(net, *team.swapped)
     return actor, critic
+
+
+def _actor(team: Team, network: NetworkConfig, *given: Any) -> Actor:
+    """The policies of all robots; ``given`` are the arguments of `Actor`."""
+    if not network.mask_actions:
+        return Actor(*given)
+    if not team.able:
+        raise ValueError("able = (): network.mask_actions needs the columns that tell who can act")
+    actor = MaskedActor(*given)
+    actor.able = team.able
+    return actor
 
 
 def _entities(team: Team) -> EntityColumns:

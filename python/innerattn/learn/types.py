@@ -42,6 +42,8 @@ class Team(NamedTuple):
         terminates: Whether an episode may terminate, so that a policy decides how long it lasts.
         hearing: How observations say whom a robot hears; needed only where `network.message_width`
             is not 0.
+        able: Columns of a robot's observation that are all above 0 where it can act; needed only
+            where `network.mask_actions` is set.
     """
 
     num_robots: int
@@ -56,6 +58,7 @@ class Team(NamedTuple):
     swapped: tuple[int, int] | None = None
     terminates: bool = False
     hearing: Hearing | None = None
+    able: tuple[int, ...] = ()
 
     @property
     def actions(self) -> Actions:

@@ -5,7 +5,7 @@ product. Networks know no environment, no loss and no file.
 """
 
 from innerattn.nn.actions import Actions, DiscreteActions, SquashedActions
-from innerattn.nn.actor import Actor, action_noise, sample_actions
+from innerattn.nn.actor import Actor, MaskedActor, action_noise, sample_actions
 from innerattn.nn.attention import (
     Attended,
     FrozenAttention,
@@ -41,6 +41,7 @@ __all__ = [
     "InnerAttention",
     "JointCritic",
     "ListeningActor",
+    "MaskedActor",
     "MaxAttention",
     "Memory",
     "Messages",

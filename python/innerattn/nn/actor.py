@@ -53,6 +53,24 @@ class Actor(nn.Module):
         return self.output.batch_last(hidden)
 
 
+class MaskedActor(Actor):
+    """Policies that stay for certain, with action 0, where a robot cannot act.
+
+    Attributes:
+        able: Columns of an observation that are all above 0 where the robot can act.
+    """
+
+    able: tuple[int, ...]
+
+    def forward(self, obs: Tensor) -> Tensor:
+        """Map observations (R, B, D) to action logits (R, A, B)."""
+        logits = super().forward(obs)
+        unable = (obs[:, :, list(self.able)] <= 0.0).any(2)
+        moves = torch.arange(logits.shape[1], device=obs.device) > 0
+        hidden = unable.unsqueeze(1) & moves.view(1, -1, 1)
+        return logits.masked_fill(hidden, torch.finfo(logits.dtype).min)
+
+
 def action_noise(
     shape: tuple[int, ...], generator: torch.Generator, dtype: torch.dtype = torch.float32
 ) -> Tensor:

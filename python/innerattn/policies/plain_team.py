@@ -147,6 +147,7 @@ def beyond_numpy(config: RunConfig) -> str | None:
         (network.encoder != "flat", f"network.encoder = {network.encoder!r}"),
         (network.memory_width > 0, f"network.memory_width = {network.memory_width}"),
         (network.message_width > 0, f"network.message_width = {network.message_width}"),
+        (network.mask_actions, "network.mask_actions = true"),
         (scenario.actions != "discrete", f"scenario.actions = {scenario.actions!r}"),
         (turns and scenario.has_wheels, "network.symmetry = 'canonical' with robots on wheels"),
         (

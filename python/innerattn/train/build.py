@@ -21,7 +21,13 @@ from innerattn.learn.framed import FramedLearner
 from innerattn.learn.networks import draw_networks
 from innerattn.learn.types import Learner, LearnerClass, Team
 from innerattn.nn import SquareSymmetry
-from innerattn.train.columns import entity_columns, hearing, partner_columns, state_columns
+from innerattn.train.columns import (
+    able_columns,
+    entity_columns,
+    hearing,
+    partner_columns,
+    state_columns,
+)
 from innerattn.train.frames import turning_columns
 from innerattn.train.teams.learner import team_networks, team_section
 from innerattn.train.teams.policy import TeamPolicy
@@ -101,6 +107,7 @@ def team_of(config: RunConfig, env: BatchEnv) -> Team:
         swapped=_swapped(config),
         terminates=env.scenario.ends_early,
         hearing=hearing(names, delay) if config.network.message_width else None,
+        able=able_columns(names) if config.network.mask_actions else (),
     )
 
 

@@ -12,6 +12,11 @@ _HANDED = (".fault.heading_bias", ".turn_rate", ".left")
 """Ends of names of columns that change their sign in a mirrored world."""
 
 
+def able_columns(names: Sequence[str]) -> tuple[int, ...]:
+    """The columns that are all above 0 where a robot can act: it is available and has charge."""
+    return tuple(names.index(one) for one in ("own.available", "own.charge") if one in names)
+
+
 def entity_columns(names: Sequence[str]) -> EntityColumns:
     """Numbers of columns of the robot itself, of its teammates and of the victims.
 
