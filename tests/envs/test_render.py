@@ -7,6 +7,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.patches import Wedge
 from numpy.typing import NDArray
 
 from innerattn.config import Obstacle, Scenario
@@ -107,6 +108,30 @@ def test_robots_on_wheels_have_a_nose() -> None:
         found, legend = noses(scenario, given)
         assert not found
         assert "heading" not in legend
+
+
+def test_sight_is_drawn_as_far_and_as_wide_as_it_is() -> None:
+    plain = Scenario.preset("mixed-wheels")
+    first, second, third, last = plain.robots
+    robots = (
+        first.replace(sight_m=0.5, field_of_view_deg=90.0),
+        second,
+        third.replace(sight_m=0.3),
+        last,
+    )
+    figure, victims = Figure(), np.array([(1, 0, 0.0, 0.0)], VICTIM)
+    angles = np.array([np.pi / 2, 0.0, 0.0, 0.0], np.float32)
+    rest = np.zeros_like(PLACES), victims, np.zeros((0, 2), np.float32), angles
+    paint_figure(figure, plain.replace(robots=robots), PLACES, *rest)
+    fan, circle = (one for one in figure.axes[0].patches if isinstance(one, Wedge))
+    assert (fan.center, fan.r) == (pytest.approx(PLACES[0]), 0.5)
+    assert (fan.theta1, fan.theta2) == (pytest.approx(45.0), pytest.approx(135.0))
+    assert (circle.center, circle.r) == (pytest.approx(PLACES[2]), 0.3)
+    assert circle.theta2 - circle.theta1 == 360.0
+    assert "sight" in [text.get_text() for text in figure.legends[0].get_texts()]
+    assert len({one.get_facecolor()[:3] for one in (fan, circle)}) == 2
+    paint_figure(figure := Figure(), plain, PLACES, *rest)
+    assert not [one for one in figure.axes[0].patches if isinstance(one, Wedge)]
 
 
 def test_layers_are_told_apart_with_a_legend() -> None:

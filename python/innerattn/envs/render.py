@@ -83,7 +83,7 @@ def paint_figure(
     axes = figure.add_axes((0.1, 0.1, 0.63, 0.84))
     axes.set_title(title)
     legend = paint_world(axes, scenario, positions, velocities, victims, obstacles, headings)
-    low = 0.6 - 0.08 * (len(scenario.layers) - 1 + scenario.has_wheels)
+    low = 0.6 - 0.08 * (len(scenario.layers) - 1 + scenario.has_wheels + ("sight" in legend))
     figure.legend(legend.values(), legend.keys(), loc=(0.74, low), frameon=False, labelspacing=0.9)
 
 
@@ -106,7 +106,8 @@ def paint_world(
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
     _paint_arena(axes, scenario, obstacles)
-    legend = _paint_victims(axes, scenario, victims)
+    legend = _paint_sight(axes, scenario, positions, headings)
+    legend |= _paint_victims(axes, scenario, victims)
     legend |= _paint_robots(axes, scenario, positions, velocities)
     return legend | _paint_noses(axes, scenario, positions, headings)
 
@@ -145,6 +146,35 @@ def _paint_arena(axes: Axes, scenario: Scenario, obstacles: NDArray[np.float32])
         else:
             width, height = shape.half_extents_m or (0.0, 0.0)
             axes.add_patch(Rectangle((x - width, y - height), 2 * width, 2 * height, **style))
+
+
+def _paint_sight(
+    axes: Axes,
+    scenario: Scenario,
+    positions: NDArray[np.float32],
+    headings: NDArray[np.float32] | None,
+) -> dict[str, Artist]:
+    """How far robots see, and within which angle, in their colours; below all else."""
+    from matplotlib.colors import to_rgb
+    from matplotlib.patches import Patch, Rectangle, Wedge
+
+    side = 2.0 * scenario.arena_half_width_m
+    inside = Rectangle((-side / 2, -side / 2), side, side, transform=axes.transData)
+    far = 1.5 * side  # beyond all that there is to see
+    ahead = np.zeros(len(positions)) if headings is None else np.degrees(headings)
+    looks = robot_looks(robot.kind for robot in scenario.robots)
+    legend: dict[str, Artist] = {}
+    for robot, look, (x, y), angle in zip(scenario.robots, looks, positions, ahead, strict=True):
+        field = robot.field_of_view_deg
+        if (robot.sight_m is None and field >= 360.0) or np.isnan(x):
+            continue
+        radius, half = robot.sight_m or far, field / 2.0
+        wedge = Wedge((float(x), float(y)), radius, angle - half, angle + half, zorder=0.5)
+        wedge.set(facecolor=(*to_rgb(look.colour), 0.07), edgecolor=(*to_rgb(look.colour), 0.4))
+        axes.add_patch(wedge)
+        wedge.set_clip_path(inside)
+        legend["sight"] = Patch(facecolor=(0, 0, 0, 0.07), edgecolor=(0, 0, 0, 0.4))
+    return legend
 
 
 def _paint_victims(axes: Axes, scenario: Scenario, victims: NDArray[np.void]) -> dict[str, Artist]:

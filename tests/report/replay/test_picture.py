@@ -6,12 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from watched import watched
 
-from innerattn.config import Scenario
+from innerattn.config import RangeSensor, Scenario
 from innerattn.errors import MissingLibraryError, RunError
-from innerattn.report.replay.picture import moving_picture
+from innerattn.report.replay.picture import _paint, moving_picture
 
 SHORT = Scenario.preset("mixed").replace(episode_steps=4)
 
@@ -32,6 +33,29 @@ def test_a_gif_has_two_frames_for_each_step() -> None:
     assert all((one != other).any() for one, other in pairwise(found))
     both = frames(moving_picture([record, record], ["a", "b"], ".gif", episode=1))
     assert both[0].shape[1] > 1.5 * found[0].shape[1]
+
+
+def test_rays_of_the_chosen_robot_end_where_they_meet_something() -> None:
+    sensor = RangeSensor(rays=8, range_m=0.8)
+    first, *others = SHORT.robots
+    scenario = SHORT.replace(robots=(first.replace(range_sensor=sensor), *others))
+    record = watched(scenario)
+    axes = Figure().add_subplot()
+    places = np.zeros((0, 2), np.float32)
+    _paint(axes, record, "a", 0, 1.0, places, ("food_0",))
+    lines = [one.get_xydata() for one in axes.lines if len(one.get_xydata()) == 2]
+    readings, at = record.steps["rays"][0, 1, 0], record.steps["positions"][0, 1, 0]
+    assert len(lines) == 8
+    assert readings.any()
+    for ray, (line, reading) in enumerate(zip(lines, readings, strict=True)):
+        np.testing.assert_allclose(line[0], at, atol=1e-6)
+        angle, far = 2 * np.pi * ray / 8, (1 - reading) * 0.8
+        np.testing.assert_allclose(
+            line[1] - at, far * np.array([np.cos(angle), np.sin(angle)]), atol=1e-5
+        )
+    axes = Figure().add_subplot()
+    _paint(axes, record, "a", 0, 1.0, places, ("food_1",))
+    assert not [one for one in axes.lines if len(one.get_xydata()) == 2]
 
 
 @pytest.mark.long

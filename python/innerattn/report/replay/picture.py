@@ -6,11 +6,12 @@ import io
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from innerattn.config import Robot
 from innerattn.envs.render import paint_world, positions_of
 from innerattn.errors import MissingLibraryError, RunError
 from innerattn.measures.moments import handoffs_of_all_robots, obstacle_places
@@ -29,7 +30,7 @@ PIXELS = 400
 _FRAMES_PER_STEP = 2
 _FRAME_MS = 100
 _LAST_MS = 1500
-_COLOURS = 64
+_COLOURS = 128
 _WIDEST_PT = 14.0  # an arrow for a weight of 1
 _VIDEO_FPS = 1000 // _FRAME_MS
 
@@ -126,7 +127,9 @@ def _frames(
         figure.legend(
             legend.values(),
             legend.keys(),
-            loc=(len(records) * share, 0.5),
+            loc="upper left",
+            bbox_to_anchor=(len(records) * share, 0.97),
+            borderaxespad=0.0,
             frameon=False,
             labelspacing=0.9,
         )
@@ -135,9 +138,9 @@ def _frames(
             where = (len(records) + 0.03) * share
             figure.text(
                 where,
-                0.38,
+                0.05,
                 f"wide arrows: attention\nof {_plain(whose)}",
-                va="top",
+                va="bottom",
             )
         canvas.draw()  # type: ignore[no-untyped-call]
         pixels = canvas.buffer_rgba()  # type: ignore[no-untyped-call]
@@ -174,6 +177,12 @@ def _paint(
     axes.set_title(f"{_plain(name)}: {now * record.scenario.dt_s:.1f} s, {count}", fontsize=13)
     for event in events[events["step"] == now]:
         _paint_rescue(axes, record, kept["victims"][event["slot"]])
+    if "rays" in kept:
+        for one in robots:
+            index = record.robot_names.index(one)
+            ahead = 0.0 if headings is None else float(headings[index])
+            at, rays, colour = positions[index], kept["rays"][index], discs[index].get_facecolor()
+            _paint_rays(axes, record.scenario.robots[index], at, ahead, rays, colour)
     if "attention" in kept and record.scenario.num_robots > 1:
         for one in robots:
             index = record.robot_names.index(one)
@@ -192,6 +201,25 @@ def _paint_rescue(axes: Axes, record: Record, victim: np.void) -> None:
 
     place = float(victim["x"]), float(victim["y"])
     axes.add_patch(Circle(place, record.scenario.rescue_radius_m, color="#D55E00", alpha=0.35))
+
+
+def _paint_rays(
+    axes: Axes,
+    robot: Robot,
+    place: NDArray[np.float32],
+    ahead: float,
+    readings: NDArray[np.float32],
+    colour: Any,
+) -> None:
+    """A robot's rays, each up to what it meets; one that meets nothing is pale."""
+    sensor = robot.range_sensor
+    if sensor is None or np.isnan(place).any():
+        return
+    for angle, reading in zip(sensor.angles_rad(), readings.tolist(), strict=False):
+        far = (1.0 - reading) * sensor.range_m
+        end = place + far * np.array([np.cos(ahead + angle), np.sin(ahead + angle)])
+        line = np.array([place, end]).T
+        axes.plot(*line, color=colour, alpha=0.75 if reading > 0.0 else 0.2, lw=0.9, zorder=2.2)
 
 
 def _paint_attention(
