@@ -113,7 +113,7 @@ def test_only_what_exists_is_offered(capsys: pytest.CaptureFixture[str]) -> None
         main(["--help"])
     offered = f"{{{','.join(COMMANDS)}}}"
     assert offered in "".join(capsys.readouterr().out.split())
-    assert list(COMMANDS)[:2] == ["train", "evaluate"]
+    assert list(COMMANDS)[:3] == ["demo", "train", "evaluate"]
 
 
 def test_light_imports() -> None:

@@ -31,7 +31,9 @@ def test_a_team_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert size < 3_000_000
     assert capsys.readouterr().out == f"{out}: mixed-faults, {size / 1e6:.1f} MB\n"
     found = given(out)
-    assert [one["name"] for one in found["policies"]] == ["mixed-faults", "random"]
+    assert [one["name"] for one in found["policies"]] == [
+        *("mixed-faults", "random", "greedy", "hungarian")
+    ]
     assert found["seed"] == str(2**63 + 3)
     scenario = json.loads(found["scenario"])
     assert scenario["faults"]
@@ -74,6 +76,7 @@ def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
         (2, ["random", "-o", "page.gif"], "-o page.gif: must end in .html"),
         (1, ["random", "-o", str(tmp_path / "none" / "page.html")], "none: no such folder"),
         (1, ["random", "--preset", "mxied"], "mxied"),
+        (1, ["greedy", "--preset", "air-ground"], "greedy: a page has no such script here"),
         (1, ["random", "--scenario", "none.toml"], "none.toml"),
         (2, ["random", "--preset", "mixed", "--scenario", str(other)], "only one of them"),
         (1, [str(run_dir), "--scenario", str(other)], "was trained for other observations"),
