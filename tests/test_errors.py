@@ -17,6 +17,10 @@ ERRORS = {
     "a text": (OSError("the disk is gone"), "the disk is gone"),
     "memory": (MemoryError(), "out of memory"),
     "memory of the system": (OSError(errno.ENOMEM, "no"), "out of memory: no"),
+    "memory of code in C": (
+        SystemError("error return without exception set"),
+        "out of memory: error return without exception set",
+    ),
     "a library": (
         ImportError("libtorch_cpu.so: failed to map segment from shared object"),
         "out of memory: libtorch_cpu.so: failed to map segment from shared object",
@@ -29,6 +33,10 @@ def test_an_error_is_one_line(what: str) -> None:
     error, text = ERRORS[what]
     assert one_line(error) == text
     assert needs_no_traceback(error)
+
+
+def test_another_fault_of_the_system_is_told_in_full() -> None:
+    assert not needs_no_traceback(SystemError("bad argument to internal function"))
 
 
 def test_a_second_file_that_was_taken_away_is_not_named() -> None:

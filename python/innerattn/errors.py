@@ -46,7 +46,12 @@ def _of_system(error: OSError) -> str:
 
 
 def lacked_memory(error: BaseException) -> bool:
-    """Whether memory was lacking: also in PyTorch, and while a library was loaded."""
+    """Whether memory was lacking: also in PyTorch, and while a library was loaded.
+
+    Code in C that cannot even make a MemoryError leaves a SystemError "without exception set".
+    """
+    if isinstance(error, SystemError):
+        return "without exception set" in str(error)
     if isinstance(error, (RuntimeError, ImportError)):
         signs = (
             "can't allocate memory",

@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print(f"innerattn: error: {missing}", file=sys.stderr)
         return 1
-    except (ImportError, MemoryError) as error:
+    except (ImportError, MemoryError, SystemError) as error:
         if not lacked_memory(error):
             raise
         print(f"innerattn: error: {one_line(error)}", file=sys.stderr)
