@@ -64,19 +64,30 @@ def marl_eval_document(
     """
     names = {tuple(one.algorithm.items()): name for name, one in found.items()}
     tasks: dict[str, Any] = {}
+    played: dict[tuple[str, int], ScriptedRescues] = {}
     for one in results:
         name = names.get(tuple(algorithm_of(one).items()))
         if name is not None:
             task = tasks.setdefault(str(one.run.place[TASK]), {})
-            task.setdefault(name, {})[f"seed_{one.run.seed}"] = _of_run(one, runs / one.run.key)
+            task.setdefault(name, {})[f"seed_{one.run.seed}"] = _of_run(
+                one, runs / one.run.key, played
+            )
     return {ENVIRONMENT: tasks}
 
 
-def _of_run(one: Result, folder: Path) -> dict[str, Any]:
+def _of_run(
+    one: Result, folder: Path, played: dict[tuple[str, int], ScriptedRescues]
+) -> dict[str, Any]:
+    """The numbers of one run; scripts that are ``played`` serve all runs of the same worlds."""
     scripts = one.summary["scripted"]
     low, high = (float(scripts[name]["mean"]) for name in ("random", best_script(scripts)))
     config, evaluated = one.run.config, ScriptedRescues(low, high)
-    trained = evaluated if counts_as_evaluated(config) else scripted_rescues(config, EPISODES)
+    trained = evaluated
+    if not counts_as_evaluated(config):
+        worlds = config.training_scenario.model_dump_json(), config.train.seed
+        if worlds not in played:
+            played[worlds] = scripted_rescues(config, EPISODES)
+        trained = played[worlds]
 
     def metrics(rescues: float, scripts: ScriptedRescues) -> dict[str, list[float]]:
         score = scripts.score(rescues)
