@@ -72,13 +72,8 @@ def test_its_numbers_are_those_of_an_evaluation(
 
 
 @pytest.mark.long
-def test_it_takes_less_than_twenty_seconds_of_a_core_and_scores_what_the_card_says(
-    tmp_path: Path,
-) -> None:
-    resource = pytest.importorskip("resource")
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+def test_it_scores_what_the_card_says(tmp_path: Path) -> None:
     done = without_torch(tmp_path, "demo", "--no-open", "--quiet")
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
     (mean,) = (
         one["rescues_per_episode"]["mean"]
         for one in read_card("mixed")["lengths"]
@@ -86,7 +81,6 @@ def test_it_takes_less_than_twenty_seconds_of_a_core_and_scores_what_the_card_sa
     )
     wanted = rf"zoo:mixed: {mean:.2f} ± 0\.05 rescues per episode of 25 steps\n"
     assert re.fullmatch(wanted, done.stdout), done.stderr
-    assert after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime < 20.0
 
 
 def test_it_opens_the_page_where_there_is_a_display(
