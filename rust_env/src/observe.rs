@@ -1,6 +1,7 @@
 //! Observations: world → one row of numbers for each robot, with named columns.
 
 mod headings;
+mod nearest;
 mod radio;
 mod rays;
 mod sight;
@@ -18,6 +19,7 @@ use crate::tasks::order::Order;
 use crate::tasks::service::Service;
 use crate::tasks::{Needs, Victim};
 use crate::wheels::{Heading, Wheels};
+use nearest::Nearest;
 use stores::Stores;
 
 /// The true state of a world, as far as robots can see it.
@@ -73,8 +75,13 @@ pub struct Senses<'a> {
 pub struct Layout {
     abilities: Vec<String>,
     robots: usize,
+    /// Teammates in a row.
+    mates: usize,
+    /// Victims in a row.
     victims: usize,
     sorted: VictimOrder,
+    /// Whence rows with the nearest teammates are taken; none where rows have all, in team order.
+    nearest: Option<Nearest>,
     /// Whether each robot's block has the faults in effect.
     faults: bool,
     /// For each task, how many of each ability it needs.
@@ -134,19 +141,22 @@ impl Layout {
         let amounts =
             |needs: &Needs| (0..abilities.len() as u32).map(|ability| needs.amount(ability)).collect();
         let needs = tasks.iter().map(amounts).collect();
+        let teammates = scenario.robots.len() - 1;
         let mut layout = Self {
             robots: scenario.robots.len(),
-            victims: scenario.num_victims(),
+            mates: scenario.observed_teammates.map_or(teammates, |most| most.min(teammates)),
+            victims: scenario.observed_victims.unwrap_or(MAX_VICTIMS).min(scenario.num_victims()),
             sorted: scenario.victim_order,
+            nearest: None,
             faults: scenario.observe_faults,
             services: Some(Service::of_tasks(scenario)).filter(|_| scenario.has_services()),
             deadlines: Deadlines::new(scenario),
             order: Order::new(scenario),
             stores: Stores::new(scenario),
             wheels: Wheels::new(scenario),
-            sight,
-            radio,
-            rays,
+            sight: sight.clone(),
+            radio: radio.clone(),
+            rays: rays.clone(),
             hears: scenario.communication.is_some_and(|one| one.limits()),
             plain: false,
             widths: Widths::default(),
@@ -156,7 +166,12 @@ impl Layout {
         };
         layout.plain = layout.stores.is_none() && layout.sight.is_none() && layout.wheels.is_none();
         layout.widths = layout.count_columns();
-        layout.fixed = layout.fixed_columns(scenario);
+        if scenario.observed_teammates.is_some() {
+            let all = Scenario { observed_teammates: None, ..scenario.clone() };
+            layout.nearest = Some(Nearest::of(Self::new(&all, tasks, sight, radio, rays)));
+        } else {
+            layout.fixed = layout.fixed_columns(scenario);
+        }
         layout
     }
 
@@ -205,7 +220,7 @@ impl Layout {
         let rays = self.rays.as_ref().map_or(0, Rays::width);
         let ways = stores.map_or(0, Stores::ways_width) + usize::from(self.wheels.is_some()) + rays;
         let mate = robot + 2 * limited + usize::from(self.hears);
-        let victims_from = robot + ways + (self.robots - 1) * mate;
+        let victims_from = robot + ways + self.mates * mate;
         let row = victims_from + self.victims * victim;
         Widths { robot, ways, rays, mate, victims_from, victim, times, heading, row }
     }
@@ -213,7 +228,7 @@ impl Layout {
     /// The blocks of the robot itself and of its teammates.
     fn blocks<'a>(&self, row: &'a mut [f32]) -> impl Iterator<Item = &'a mut [f32]> {
         let (own, rest) = row.split_at_mut(self.widths.robot);
-        let mates = (self.robots - 1) * self.widths.mate;
+        let mates = self.mates * self.widths.mate;
         let mates = &mut rest[self.widths.ways..][..mates];
         std::iter::once(own).chain(mates.chunks_exact_mut(self.widths.mate))
     }
@@ -230,7 +245,7 @@ impl Layout {
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let mut names = Vec::with_capacity(self.width());
-        for robot in 0..self.robots {
+        for robot in 0..=self.mates {
             let (who, relative) = if robot == 0 {
                 ("own".to_string(), "")
             } else {
@@ -280,6 +295,9 @@ impl Layout {
 
     /// Writes the rows of all robots of one world into `rows` (R × D), as healthy robots see it.
     pub fn write(&self, scene: Scene, rows: &mut [f32]) {
+        if let Some(nearest) = &self.nearest {
+            return nearest.write(self, scene, rows);
+        }
         rows.copy_from_slice(&self.fixed);
         for (own, row) in rows.chunks_exact_mut(self.width()).enumerate() {
             self.write_row(scene, own, Vec2::zeros(), Vec2::zeros(), row);
@@ -297,6 +315,9 @@ impl Layout {
 
     /// Writes what robot `own` sees through its `senses` into `row` (D).
     pub fn write_through(&self, scene: Scene, own: usize, senses: &Senses, row: &mut [f32]) {
+        if let Some(nearest) = &self.nearest {
+            return nearest.write_through(self, scene, own, senses, row);
+        }
         row.copy_from_slice(&self.fixed[own * self.width()..][..self.width()]);
         self.write_row(scene, own, senses.position_error, senses.velocity_error, row);
         if senses.absent >> own & 1 == 1 {

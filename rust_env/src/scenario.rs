@@ -337,6 +337,10 @@ pub struct Scenario {
     pub lost_cost: f64,
     /// The order in which a robot sees the victims.
     pub victim_order: VictimOrder,
+    /// Teammates in an observation, the nearest first; all, in team order, if absent.
+    pub observed_teammates: Option<usize>,
+    /// Victims in an observation, the first in order; all if absent.
+    pub observed_victims: Option<usize>,
     /// What goes wrong with which robot, and when.
     pub faults: Vec<Fault>,
     /// Whether observations have columns for the faults in effect.
@@ -410,6 +414,8 @@ impl Default for Scenario {
             action_cost: 0.0,
             lost_cost: 0.0,
             victim_order: VictimOrder::Relevant,
+            observed_teammates: None,
+            observed_victims: None,
             faults: vec![],
             observe_faults: false,
             unavailable_robots: Unavailable::Stay,

@@ -39,6 +39,8 @@ def test_every_key_stands_in_it_with_its_meaning() -> None:
         "victim_area_m",
         "victim_places_m",
         "communication",
+        "observed_teammates",
+        "observed_victims",
         "start_m",
         "obstacles",
         "faults",

@@ -255,6 +255,8 @@ ADDED_SINCE = {
         "map",
         "occlusion",
         "communication",
+        "observed_teammates",
+        "observed_victims",
     ),
     "network": (
         *("swapped_robots", "shared_gradients", "joint_critic", "symmetry", "memory_width"),

@@ -348,7 +348,7 @@ class Stepper:
         }
 
     def observations(self, state: State) -> tuple[Array, Bools]:
-        """Rows of all robots without rays, (E, R, D); where rounding may order victims, (E, R)."""
+        """Rows of all robots without rays, (E, R, D); where rounding may order them, (E, R)."""
         envs, robots = state.positions.shape[:2]
         given = np.broadcast_to(self.given, (envs, *self.given.shape)).astype(np.float64)
         flags = [given, state.available[..., None]]
@@ -365,6 +365,7 @@ class Stepper:
         deaf = (state.faults["lost_communication"] == 1)[..., None]
         motion = np.concatenate([state.positions, state.velocities], axis=-1)
         blocks = [np.where(dark, 0.0, motion), known]
+        tied = np.zeros((envs, robots), dtype=bool)
         ahead = np.zeros((envs, robots, 0))
         if self.rolls.any():
             ahead = np.stack([np.cos(state.headings), np.sin(state.headings)], -1)
@@ -392,10 +393,32 @@ class Stepper:
             if self.scenario.limits_communication:
                 heard = np.take_along_axis(state.heard, self.others[None], 2)[..., None]
                 teammates = np.concatenate([teammates, heard], axis=-1)
+            if self.scenario.observed_teammates is not None:
+                teammates, tied = self._nearest(teammates, known.shape[-1] + ahead.shape[-1] + 4)
             blocks.append(np.where(dark, 0.0, teammates.reshape(envs, robots, -1)))
         victims, unsure = self._victims_seen(state)
         rows = np.concatenate([*blocks, np.where(dark, 0.0, victims)], axis=-1)
-        return rows * there, unsure & there[..., 0]
+        return rows * there, (unsure | tied) & there[..., 0]
+
+    def _nearest(self, teammates: Array, seen: int) -> tuple[Array, Bools]:
+        """The nearest of the teammates (E, R, T, C), unknown ones last; where two are as near.
+
+        Args:
+            teammates: Their columns.
+            seen: Which of the columns says whether one is seen, if sight is limited.
+        """
+        most = self.scenario.observed_teammates
+        limited = self.scenario.has_limited_sight
+        found, tied = [], []
+        for row in teammates.reshape(-1, *teammates.shape[2:]):
+            far = np.hypot(row[:, 0], row[:, 1])
+            known = [bool(one[seen] if limited else one.any()) for one in row]
+            order = sorted(range(len(row)), key=lambda k: (not known[k], far[k] if known[k] else 0))
+            found.append(row[order[:most]])
+            steps = np.diff([far[k] for k in order if known[k]])
+            tied.append(bool((steps < 1e-5).any()))
+        shape = teammates.shape[:2]
+        return np.array(found).reshape(*shape, -1, teammates.shape[-1]), np.reshape(tied, shape)
 
     def _victims_seen(self, state: State) -> tuple[Array, Bools]:
         envs, robots = state.positions.shape[:2]
@@ -435,6 +458,7 @@ class Stepper:
             bearing = np.stack([cos * x + sin * y, cos * y - sin * x], -1)
             bearing = bearing * self.rolls[:, None, None]
         blocks = np.concatenate([blocks, since, bearing], axis=-1)
+        blocks = blocks[:, :, : self.scenario.observed_victims]
         return blocks.reshape(envs, robots, -1), unsure
 
     def _times_seen(self, state: State) -> list[Array]:

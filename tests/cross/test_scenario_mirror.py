@@ -260,19 +260,23 @@ def test_every_value_survives_the_way_there_and_back() -> None:
         "action_cost": 0.2,
         "lost_cost": 0.3,
         "victim_order": "slot",
+        "observed_teammates": 0,
         "faults": [{**FAULT, "onset_step": 3, "onset_rate_hz": 0.5, "duration_steps": 7}],
         "observe_faults": True,
         "unavailable_robots": "leave",
     }
-    # Friction needs one engine, an area excludes a list of places, and a rate one of arrivals
-    # and its end.
-    others = {"engine", "victim_places_m", "arrivals", "end_when_done"}
+    # Friction needs one engine, an area excludes a list of places, a rate one of arrivals and its
+    # end, and the order of slots a number of victims.
+    others = {"engine", "victim_places_m", "arrivals", "end_when_done", "observed_victims"}
     assert changed.keys() == Scenario.model_fields.keys() - others
     scenario = Scenario.model_validate(changed)
     default = Scenario()
     for key in changed:
         assert getattr(scenario, key) != getattr(default, key)
     assert compiled(changed) == scenario.model_dump(mode="json")
+    few = {**changed, "victim_order": "relevant", "observed_victims": 1}
+    assert compiled(few) == Scenario.model_validate(few).model_dump(mode="json")
+    assert compiled(few)["observed_victims"] == 1
     del changed["victim_area_m"]
     listed = {**changed, "max_victims": 1, "victim_places_m": [[0.5, 0.25], [-1.5, 0.0]]}
     assert compiled(listed) == Scenario.model_validate(listed).model_dump(mode="json")

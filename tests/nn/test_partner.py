@@ -75,6 +75,20 @@ def test_the_right_partner_beside_plain_loops(preset: str, masked: bool) -> None
     assert alone > batch * robots / 4  # the loop has seen partners
 
 
+def test_rows_of_teammates_tell_who_the_right_partner_is() -> None:
+    """Where a robot's row has no teammates, or only near ones, as where it has all of them."""
+    scenario = Scenario.preset("mixed-8")
+    obs, columns = seen(scenario)
+    short, _ = seen(scenario.replace(observed_teammates=1))
+    with BatchEnv(scenario.replace(observed_teammates=1), 1) as env:
+        shared = partner_columns(env.observation_names(), teammates_in_order=False)
+    assert short.shape[2] < obs.shape[2]
+    drawn = torch.rand(obs.shape[1::-1], generator=torch.Generator().manual_seed(1)) > 0.4
+    for available in (None, drawn):
+        found = right_partners(short, shared, available)
+        assert torch.equal(found, right_partners(obs, columns, available))
+
+
 def test_a_victim_with_three_needs_asks_for_two_partners() -> None:
     mixed = Scenario.preset("mixed-8")
     needs = tuple(sorted({ability for robot in mixed.robots for ability in robot.abilities}))

@@ -58,7 +58,7 @@ def readings_of(team: Exported, robot: str, env: BatchEnv, world: int) -> dict[s
                 victims[slot]["since_seen"] = time
             else:
                 victims[slot] = _unseen(time)
-    if scenario.limits_communication:
+    if "teammate_0.heard" in env.observation_names():
         heard = env.heard()[world, number]
         found["heard"] = [name for name, one in zip(names, heard, strict=True) if one]
     return found

@@ -22,6 +22,8 @@ _HEAD = """\
 """
 _EXAMPLES: dict[str, Any] = {
     "end_when_rescued": 10,
+    "observed_teammates": 2,
+    "observed_victims": 1,
     "victim_area_m": [-0.5, -0.5, 0.5, 0.5],
     "victim_places_m": [[0.5, 0.5], [-0.5, 0.5], [0.0, -0.5]],
     "communication": {"range_m": 0.8, "delay_steps": 2},

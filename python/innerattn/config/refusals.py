@@ -16,8 +16,11 @@ def refuse_stores_drives_and_senses(scenario: Scenario, who: str) -> None:
 
     Raises:
         ConfigError: a robot has a battery, a load, a range sensor or a limited sight, actions set
-            no force, or something limits who hears whom.
+            no force, or something limits who hears whom or what is in an observation.
     """
+    for key in ("observed_teammates", "observed_victims"):
+        if (most := getattr(scenario, key)) is not None:
+            raise ConfigError(f"scenario.{key} = {most}: must be left out; {who} see everything")
     for index, robot in enumerate(scenario.robots):
         _refuse_robot(robot, f"scenario.robots[{index}]", who)
     if scenario.occlusion:

@@ -171,6 +171,7 @@ class RunConfig(Model):
         self._check_any_team()
         self._check_memory()
         self._check_messages()
+        self._check_observed_teammates()
         gamma, world = self.algorithm.gamma, self.scenario
         if world.shaping == "potential" and self.train.schedule.gamma is not None:
             raise ValueError(
@@ -283,6 +284,22 @@ class RunConfig(Model):
             raise ValueError(
                 f"network.message_width = {width}: train.warm_start = {train.warm_start!r} "
                 "imitates robots that say nothing; must be 'none'"
+            )
+
+    def _check_observed_teammates(self) -> None:
+        """Refuse what has to know which teammate is which where rows have the nearest ones."""
+        if (most := self.scenario.observed_teammates) is None:
+            return
+        network, key = self.network, f"scenario.observed_teammates = {most}"
+        if network.message_width:
+            raise ValueError(
+                f"{key}: must be left out where robots have messages (network.message_width = "
+                f"{network.message_width}), which come from teammates in team order"
+            )
+        if network.attention == "oracle" and network.symmetry != "none":
+            raise ValueError(
+                f"network.symmetry = {network.symmetry!r}: must be 'none' where the attention is "
+                f"'oracle' and {key}; robots compare their places, which frames turn"
             )
 
     def _check_masks(self) -> None:

@@ -385,6 +385,13 @@ class Scenario(Model, Shown):
         "relevant",
         description="order of victims in an observation; relevant: helpable first, then nearest",
     )
+    observed_teammates: Annotated[Count | None, ADDED_LATER, Told(0, 63)] = Field(
+        None,
+        description="teammates in an observation, the nearest first; None: all, in team order",
+    )
+    observed_victims: Annotated[Count | None, ADDED_LATER, Told(1, 32)] = Field(
+        None, description="victims in an observation, the first in victim_order; None: all"
+    )
     faults: Annotated[tuple[Fault, ...], Told(0, 256)] = Field(
         (), description="what goes wrong with which robot, and when"
     )

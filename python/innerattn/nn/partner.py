@@ -20,11 +20,14 @@ class PartnerColumns:
 
     Attributes:
         abilities: (A,) own abilities.
-        teammate_abilities: (T, A) those of each teammate.
-        teammate_places: (T, 2) x and y of each teammate, relative to the robot.
+        teammate_abilities: (T, A) those of each teammate, in team order; none where the rows of
+            teammates tell.
+        teammate_places: (T, 2) x and y of each teammate, relative to the robot; likewise.
         victim_present: Whether there is a first victim.
         victim_needs: (A,) what it needs of each ability.
         victim_place: (2,) x and y, relative to the robot.
+        own_place: (2,) x and y of the robot itself, in one frame for all robots; None where
+            columns of teammates tell.
     """
 
     abilities: tuple[int, ...]
@@ -33,6 +36,7 @@ class PartnerColumns:
     victim_present: int
     victim_needs: tuple[int, ...]
     victim_place: tuple[int, int]
+    own_place: tuple[int, int] | None = None
 
 
 def right_partners(obs: Tensor, columns: PartnerColumns, available: Tensor | None) -> Tensor:
@@ -52,7 +56,7 @@ def right_partners(obs: Tensor, columns: PartnerColumns, available: Tensor | Non
         (B, R, R) bool: whether robot i may attend to robot j.
     """
     robots, batch, _ = obs.shape
-    teammates = len(columns.teammate_places)
+    teammates = robots - 1
     others = ~torch.eye(robots, dtype=torch.bool, device=obs.device)
     there = others.expand(batch, -1, -1)
     if available is not None:
@@ -63,13 +67,10 @@ def right_partners(obs: Tensor, columns: PartnerColumns, available: Tensor | Non
     needs = obs[:, :, list(columns.victim_needs)]
     helps = ((own > 0.0) & (needs > 0.0)).any(2) & (obs[:, :, columns.victim_present] > 0.5)
     missing = needs - own > 0.0
-    flat = [column for one in columns.teammate_abilities for column in one]
-    has = obs[:, :, flat].view(robots, batch, teammates, -1) > 0.0
+    has, place = _teammates_of(obs, columns)
     numbers = _teammates(robots, obs.device)  # (R, T)
     there_by_teammate = there.gather(2, numbers.expand(batch, -1, -1)).transpose(0, 1)
     useful = has & missing.unsqueeze(2) & there_by_teammate.unsqueeze(3)  # (R, B, T, A)
-    flat = [column for one in columns.teammate_places for column in one]
-    place = obs[:, :, flat].view(robots, batch, teammates, 2)
     away = (place - obs[:, :, list(columns.victim_place)].unsqueeze(2)).square().sum(3)
     nearest = away.unsqueeze(3).masked_fill(~useful, torch.inf).argmin(2)  # (R, B, A)
     found = useful.any(2)
@@ -77,6 +78,20 @@ def right_partners(obs: Tensor, columns: PartnerColumns, available: Tensor | Non
     chosen = (functional.one_hot(robot, robots).bool() & found.unsqueeze(3)).any(2)  # (R, B, R)
     known = (helps & found.any(2)).unsqueeze(2)
     return torch.where(known, chosen, there.transpose(0, 1)).transpose(0, 1)
+
+
+def _teammates_of(obs: Tensor, columns: PartnerColumns) -> tuple[Tensor, Tensor]:
+    """What each robot's teammates have, (R, B, T, A) bool, and where they are, (R, B, T, 2)."""
+    robots, batch, _ = obs.shape
+    if columns.own_place is None:
+        flat = [column for one in columns.teammate_abilities for column in one]
+        has = obs[:, :, flat].view(robots, batch, robots - 1, -1) > 0.0
+        flat = [column for one in columns.teammate_places for column in one]
+        return has, obs[:, :, flat].view(robots, batch, robots - 1, 2)
+    numbers = _teammates(robots, obs.device)
+    has = (obs[:, :, list(columns.abilities)] > 0.0)[numbers].transpose(1, 2)
+    places = obs[:, :, list(columns.own_place)]
+    return has, places[numbers].transpose(1, 2) - places.unsqueeze(2)
 
 
 def _teammates(robots: int, device: torch.device) -> Tensor:

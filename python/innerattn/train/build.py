@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from pkgutil import resolve_name
@@ -20,7 +20,7 @@ from innerattn.errors import ConfigError, RunError
 from innerattn.learn.framed import FramedLearner
 from innerattn.learn.networks import draw_networks
 from innerattn.learn.types import Learner, LearnerClass, Team
-from innerattn.nn import SquareSymmetry
+from innerattn.nn import PartnerColumns, SquareSymmetry
 from innerattn.train.columns import (
     able_columns,
     entity_columns,
@@ -101,7 +101,7 @@ def team_of(config: RunConfig, env: BatchEnv) -> Team:
         kinds=tuple(robot.kind for robot in config.scenario.robots),
         availability_column=names.index("own.available"),
         entities=entity_columns(names) if config.network.encoder == "entities" else None,
-        partners=partner_columns(names) if config.network.attention == "oracle" else None,
+        partners=_partners(config, names),
         action_width=2 if env.continuous else 0,
         state_width=len(env.state_names()) if config.algorithm.needs_afterstates else 0,
         swapped=_swapped(config),
@@ -109,6 +109,12 @@ def team_of(config: RunConfig, env: BatchEnv) -> Team:
         hearing=hearing(names, delay) if config.network.message_width else None,
         able=able_columns(names) if config.network.mask_actions else (),
     )
+
+
+def _partners(config: RunConfig, names: Sequence[str]) -> PartnerColumns | None:
+    if config.network.attention != "oracle":
+        return None
+    return partner_columns(names, config.scenario.observed_teammates is None)
 
 
 def _swapped(config: RunConfig) -> tuple[int, int] | None:

@@ -112,17 +112,20 @@ def state_columns(names: Sequence[str]) -> VectorColumns:
     )
 
 
-def partner_columns(names: Sequence[str]) -> PartnerColumns:
+def partner_columns(names: Sequence[str], teammates_in_order: bool = True) -> PartnerColumns:
     """The columns that tell who can help whom: abilities, places, and the first victim's needs.
 
     Args:
         names: Of all columns, as the worlds name them.
+        teammates_in_order: Whether a row has all teammates in team order. If not, the rows of
+            the teammates tell where they are and what they can do.
     """
     place = {name: column for column, name in enumerate(names)}
     abilities = [
         name.removeprefix("own.ability.") for name in names if name.startswith("own.ability.")
     ]
-    teammates = _teammates(names)
+    teammates = _teammates(names) if teammates_in_order else []
+    own_place = place["own.position.x"], place["own.position.y"]
 
     def at(who: str) -> tuple[int, int]:
         return place[f"{who}.relative_position.x"], place[f"{who}.relative_position.y"]
@@ -136,6 +139,7 @@ def partner_columns(names: Sequence[str]) -> PartnerColumns:
         victim_present=place["victim_0.present"],
         victim_needs=tuple(place[f"victim_0.need.{one}"] for one in abilities),
         victim_place=at("victim_0"),
+        own_place=None if teammates_in_order else own_place,
     )
 
 

@@ -6,7 +6,7 @@ use super::check::{broken, counts, named, within};
 use super::{
     AMOUNTS, Abilities, Engine, MAX_ABILITIES, MAX_FAULTS, MAX_MASS_RATIO, MAX_MASS_RATIO_RAPIER, MAX_NEEDS,
     MAX_OBSTACLES, MAX_PLACES, MAX_ROBOTS, MAX_TIME_S, MAX_TRAVEL_RADII, MAX_VICTIMS, Robot, START_GAP_M,
-    Scenario, Shape, Task, Unavailable,
+    Scenario, Shape, Task, Unavailable, VictimOrder,
 };
 use crate::error::Result;
 use crate::fault::{Fault, Kind, Spec};
@@ -59,6 +59,16 @@ impl Scenario {
         counts("episode_steps", self.episode_steps as usize, 1, 1_000_000)?;
         counts("substeps", self.substeps as usize, 1, 1000)?;
         counts("max_victims", self.max_victims, 1, MAX_VICTIMS)?;
+        if let Some(most) = self.observed_teammates {
+            counts("observed_teammates", most, 0, MAX_ROBOTS - 1)?;
+        }
+        if let Some(most) = self.observed_victims {
+            counts("observed_victims", most, 1, MAX_VICTIMS)?;
+            if self.victim_order == VictimOrder::Slot {
+                let rule = "must be none where victim_order = \"slot\", which does not say who comes first";
+                return broken("observed_victims", &most, rule);
+            }
+        }
         if let Some(rescues) = self.end_when_rescued {
             counts("end_when_rescued", rescues as usize, 1, 1_000_000)?;
         }

@@ -161,6 +161,16 @@ def test_rows_of_robots_that_are_told_of_victims_are_those_of_the_worlds() -> No
     )
 
 
+@pytest.mark.parametrize("radio", [None, Communication(range_m=0.9, delay_steps=1)])
+@pytest.mark.parametrize("teammates", [0, 2, 9])
+def test_rows_of_the_nearest_are_those_of_the_worlds(
+    teammates: int, radio: Communication | None
+) -> None:
+    short = {"observed_teammates": teammates, "observed_victims": 1}
+    check(scenario_with_everything(communication=radio, **short), seed=7)
+    check(Scenario.preset("mixed-8").replace(communication=radio, **short), seed=8)
+
+
 @pytest.mark.parametrize("actions", ["discrete", "continuous"])
 def test_commands_are_what_the_worlds_do(actions: str) -> None:
     scenario = Scenario(

@@ -80,6 +80,13 @@ def test_continuous_actions_are_refused() -> None:
         TeamSheet(scenario, BatchEnv(scenario, 1).observation_names())
 
 
+@pytest.mark.parametrize("key", ["observed_teammates", "observed_victims"])
+def test_rows_without_all_robots_and_victims_are_refused(key: str) -> None:
+    scenario = Scenario().replace(**{key: 1})
+    with pytest.raises(ConfigError, match=f"scenario.{key} = 1: must be left out; policies for"):
+        TeamSheet(scenario, BatchEnv(scenario, 1).observation_names())
+
+
 @pytest.mark.parametrize("each", [False, True])
 def test_a_robot_that_never_comes_changes_nothing(each: bool) -> None:
     alone = Scenario.preset("mixed").replace(engine="discs", unavailable_robots="leave")

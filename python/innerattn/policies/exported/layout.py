@@ -132,7 +132,7 @@ def layout_of(contract: Contract) -> Layout:
         hears="teammate_0.heard" in known,
         times=tuple(one for one in TIMES if f"victim_0.{one}" in known),
     )
-    expected = list(layout.names(len(contract.robots) - 1, contract.victim_slots))
+    expected = list(layout.names(observed_teammates(contract), observed_victims(contract)))
     if len(names) != len(expected) or bool(layout.faults) != contract.observe_faults:
         raise ValueError(f"observation: has {len(names)} columns: must have {len(expected)}")
     for column, (found, wanted) in enumerate(zip(names, expected)):
@@ -140,6 +140,21 @@ def layout_of(contract: Contract) -> Layout:
             raise ValueError(f"observation: column {column} is {found!r}: must be {wanted!r}")
     _check_bodies(contract, layout)
     return layout
+
+
+def observed_teammates(contract: Contract) -> int:
+    """Teammates in an observation."""
+    return _at_most(contract.scenario.get("observed_teammates"), len(contract.robots) - 1)
+
+
+def observed_victims(contract: Contract) -> int:
+    """Victims in an observation."""
+    return _at_most(contract.scenario.get("observed_victims"), contract.victim_slots)
+
+
+def _at_most(wanted: object, there: int) -> int:
+    """What a scenario wants in an observation of what is there; None: all."""
+    return min(wanted, there) if isinstance(wanted, int) else there
 
 
 def _check_bodies(contract: Contract, layout: Layout) -> None:

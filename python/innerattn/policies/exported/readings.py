@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from innerattn.errors import ReadingError, StaleReadingError
 from innerattn.policies.exported.contract import Contract, Member
 from innerattn.policies.exported.layout import layout_of
+from innerattn.policies.exported.observed import Observed
 from innerattn.policies.exported.values import (
     given,
     listed,
@@ -85,12 +86,14 @@ class RowBuilder:
         places = {"station": contract.stations, "depot": contract.depots}
         self._spots = [np.array(places[spot], np.float32) for spot in layout.spots]
         self._victims_from = layout.own + len(self._mates) * layout.mate
+        self._observed = Observed.of(contract, layout)
         self._fixed = self._fixed_row()
 
     def _fixed_row(self) -> NDArray[np.float32]:
         """What holds until a reading says other: abilities, healthy, available, full, unseen."""
         layout = self._layout
-        row = np.zeros(len(self._names), np.float32)
+        width = self._victims_from + self._slots * layout.victim
+        row = np.zeros(width, np.float32)
         own, mates = self._blocks(row)
         healthy = [1.0 if one in _HEALTHY_AT_ONE else 0.0 for one in layout.faults]
         for block, member in zip((own, *mates), (self._own, *self._mates)):
@@ -146,7 +149,7 @@ class RowBuilder:
         victims = given(readings, "victims")
         self._refuse_stale(readings, "victims_time", now, "victims_time")
         self._write_victims(victims, motion[:2], row)
-        return row
+        return self._observed.row(row)
 
     def dark_row(self, own: Mapping[str, Any]) -> NDArray[np.float32]:
         """The row (D,) float32 of a robot whose sensors give nothing, as under `blackout`.
@@ -162,7 +165,7 @@ class RowBuilder:
         """
         known = frozenset({"available", "faults", *self._own.stores})
         refuse_unknown(own, known, "own.")
-        row = np.zeros_like(self._fixed)
+        row = np.zeros(len(self._names), np.float32)
         row[4 : self._layout.heading] = self._fixed[4 : self._layout.heading]
         self._flags(own, self._own, "own", row[: self._layout.robot])
         return row
@@ -174,11 +177,11 @@ class RowBuilder:
             ReadingError: another shape or dtype, or a value that is not finite.
         """
         found = np.asarray(row)
-        if found.dtype.kind not in "fiu" or found.shape != self._fixed.shape:
+        width = len(self._names)
+        if found.dtype.kind not in "fiu" or found.shape != (width,):
             raise ReadingError(
                 "row",
-                f"has dtype {found.dtype} and shape {found.shape}: must hold "
-                f"{len(self._fixed)} numbers",
+                f"has dtype {found.dtype} and shape {found.shape}: must hold {width} numbers",
             )
         finite = np.abs(found) <= np.finfo(np.float32).max
         if not finite.all():

@@ -80,6 +80,16 @@ _ABOUT_STORES = {
     "leaves the own charge and load.",
 }
 
+_ABOUT_NEAREST = {
+    "nearest": "teammate_k is the k-th nearest teammate, not the k-th in the order of `robots`: "
+    "build the columns of all teammates, sort them by the length of relative_position (ties in "
+    "the order of `robots`; those that are not heard, or where sight is limited not seen, come "
+    "last), and keep scenario.observed_teammates of them.",
+}
+_ABOUT_FIRST = {
+    "first": "Of the victims in their order, the first scenario.observed_victims are kept.",
+}
+
 
 def about(scenario: Scenario) -> dict[str, str]:
     """The rules by subject: those of every team, and those of what this one has."""
@@ -94,4 +104,8 @@ def about(scenario: Scenario) -> dict[str, str]:
         found = found | _ABOUT_RADIO
     if any(robot.battery is not None or robot.load is not None for robot in scenario.robots):
         found = found | _ABOUT_STORES
+    if scenario.observed_teammates is not None:
+        found = found | _ABOUT_NEAREST
+    if scenario.observed_victims is not None:
+        found = found | _ABOUT_FIRST
     return found
