@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from rich.console import Console
 
-from innerattn.config import Scenario
+from innerattn.config import Scenario, Task
 from innerattn.evaluate import Estimate, Performance, Summary
 from innerattn.experiments.score_means import seed_scores
 from innerattn.measures.measure import Value
@@ -160,6 +160,15 @@ def test_cooperation_has_counts_and_shares() -> None:
     assert rows["task"] == ["food_0", "food_1"]
     assert rows["task_1 (food + medicine)"] == ["30 (75%)", "10 (25%)"]
     assert rows["task_2 (food + information)"] == ["0", "0"]
+
+
+def test_cooperation_in_many_tasks_is_their_sum() -> None:
+    tasks = [Task(name=f"site_{k}", needs=("food", "medicine")) for k in range(5)]
+    counts = {one.name: {"food_0": 10, "food_1": 30} for one in tasks}
+    found = printed(summary(cooperation=counts), Scenario().replace(tasks=tasks))
+    rows = {row[0]: row[1:] for row in found if row}
+    assert rows["task"] == ["food_0", "food_1"]
+    assert rows["all 5 tasks"] == ["50 (25%)", "150 (75%)"]
 
 
 def test_attention_has_nats_and_shares() -> None:

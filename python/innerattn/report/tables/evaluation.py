@@ -215,14 +215,19 @@ def _scripted_cells(measured: Performance, name: str) -> tuple[str, str]:
 
 
 def _cooperation(summary: Summary, scenario: Scenario) -> Table:
-    counts = summary.cooperation
+    counts = {
+        f"{task.name} ({' + '.join(in_words(task.needs))})": summary.cooperation[task.name]
+        for task in scenario.tasks
+    }
     robots = list(dict.fromkeys(name for of_task in counts.values() for name in of_task))
+    if len(counts) > _MOST_COLUMNS:
+        together = {robot: sum(one.get(robot, 0) for one in counts.values()) for robot in robots}
+        counts = {f"all {len(counts)} tasks": together}
     rows = [["task", *robots]]
-    for task in scenario.tasks:
-        of_task = counts[task.name]
+    for task, of_task in counts.items():
         total = sum(of_task.values())
         cells = [_with_share(of_task[robot], total) if robot in of_task else "" for robot in robots]
-        rows.append([f"{task.name} ({' + '.join(in_words(task.needs))})", *cells])
+        rows.append([task, *cells])
     if len(robots) > _MOST_COLUMNS:
         rows = [list(column) for column in zip(*rows, strict=True)]
         rows[0][0] = "robot"
