@@ -5,7 +5,7 @@ use crate::blocks::Blocks;
 use crate::geometry::{Solid, Vec2};
 use crate::rng::Stream;
 use crate::robot::Body;
-use crate::scenario::{self, Scenario};
+use crate::scenario::{self, Scenario, Task};
 
 /// Most draws for one place.
 pub const DRAWS: usize = 512;
@@ -71,7 +71,10 @@ pub struct Placing {
     arena: f32,
     spawn_clearance: f32,
     wall_clearance: f32,
+    /// Where victims appear whose task has no area of its own.
     victims: Region,
+    /// Where those of each other task appear.
+    own: Vec<Option<Region>>,
     /// Solid cells of the map, if there is one.
     blocks: Option<Blocks>,
 }
@@ -83,13 +86,28 @@ impl Placing {
         let (arena, wall) = (scenario.arena_half_width_m as f32, scenario.wall_clearance_m as f32);
         let reach = arena - wall;
         let inside = |x: f64, y: f64| Vec2::new(x as f32, y as f32).map(|value| value.clamp(-reach, reach));
+        let within =
+            |[left, bottom, right, top]: [f64; 4]| Region::Area(inside(left, bottom), inside(right, top));
+        let places = &scenario.victim_places_m;
         let victims = match scenario.victim_area_m {
-            Some([left, bottom, right, top]) => Region::Area(inside(left, bottom), inside(right, top)),
-            None if scenario.victim_places_m.is_empty() => Region::square(reach),
-            None => Region::OneOf(scenario.victim_places_m.iter().map(|at| inside(at[0], at[1])).collect()),
+            Some(corners) => within(corners),
+            None if places.is_empty() => Region::square(reach),
+            None => Region::OneOf(places.iter().map(|at| inside(at[0], at[1])).collect()),
         };
-        let spawn_clearance = scenario.spawn_clearance_m as f32;
-        Self { arena, spawn_clearance, wall_clearance: wall, victims, blocks: Blocks::of(scenario) }
+        let own = |task: &Task| {
+            let held = places.iter().filter(|at| task.holds(at)).map(|at| inside(at[0], at[1]));
+            task.area_m.map(
+                |corners| if places.is_empty() { within(corners) } else { Region::OneOf(held.collect()) },
+            )
+        };
+        Self {
+            arena,
+            spawn_clearance: scenario.spawn_clearance_m as f32,
+            wall_clearance: wall,
+            victims,
+            own: scenario.tasks.iter().map(own).collect(),
+            blocks: Blocks::of(scenario),
+        }
     }
 
     /// How much more than `gap` a place is away from the map's solid cells, m: negative if it is less, and
@@ -128,7 +146,7 @@ impl Placing {
         self.arena - self.wall_clearance
     }
 
-    /// Whether a victim may be there.
+    /// Whether a victim may be there: anywhere where one could appear, as callers may move it out of its area.
     #[must_use]
     pub fn may_be_victim(&self, at: Vec2) -> bool {
         at.amax() <= self.victim_reach()
@@ -158,17 +176,26 @@ impl Placing {
         }
     }
 
-    /// A place for a victim: away from walls and solids, and from every robot. One of a list is not taken by
-    /// `others`; if all others of the list are too near to something, the one with the most room will do.
+    /// Whether victims of a task have an area of their own.
+    #[must_use]
+    pub fn has_area(&self, task: usize) -> bool {
+        self.own[task].is_some()
+    }
+
+    /// A place for a victim of a task: away from walls and solids, and from every robot. One of a list is not
+    /// taken by `others`; if all others of the list are too near to something, the one with the most room will
+    /// do.
     pub fn victim(
         &self,
         stream: &mut Stream,
+        task: usize,
         robots: &[Vec2],
         others: &(impl Iterator<Item = Vec2> + Clone),
         solids: &[Placed],
     ) -> Place {
-        let listed = matches!(self.victims, Region::OneOf(_));
-        let place = draw(stream, &self.victims, |at| {
+        let region = self.own[task].as_ref().unwrap_or(&self.victims);
+        let listed = matches!(region, Region::OneOf(_));
+        let place = draw(stream, region, |at| {
             if listed && others.clone().any(|other| other == at) {
                 return TAKEN;
             }
@@ -218,7 +245,7 @@ mod tests {
                 robots.push((body, place.at));
             }
             let robots: Vec<Vec2> = robots.iter().map(|(_, at)| *at).collect();
-            let victim = placing.victim(&mut stream, &robots, &std::iter::empty(), &placed);
+            let victim = placing.victim(&mut stream, 0, &robots, &std::iter::empty(), &placed);
             assert!(victim.clear && victim.at.amax() <= 0.9);
             assert!(robots.iter().all(|robot| (robot - victim.at).norm() >= 0.2));
             assert!(placed.iter().all(|(solid, at)| solid.distance(victim.at - at) >= 0.1));
@@ -230,7 +257,7 @@ mod tests {
         let scenario = Scenario { spawn_clearance_m: 9.0, ..Scenario::default() };
         let placing = Placing::new(&scenario);
         let mut stream = Stream::new(0, 0, 0, Purpose::Start);
-        let place = placing.victim(&mut stream, &[Vec2::new(-0.9, -0.9)], &std::iter::empty(), &[]);
+        let place = placing.victim(&mut stream, 0, &[Vec2::new(-0.9, -0.9)], &std::iter::empty(), &[]);
         assert!(!place.clear && place.at.x > 0.7 && place.at.y > 0.7, "{place:?}");
     }
 
@@ -240,7 +267,7 @@ mod tests {
         let placing = Placing::new(&scenario);
         let mut stream = Stream::new(0, 0, 0, Purpose::Victims);
         let places: Vec<Vec2> =
-            (0..500).map(|_| placing.victim(&mut stream, &[], &std::iter::empty(), &[]).at).collect();
+            (0..500).map(|_| placing.victim(&mut stream, 0, &[], &std::iter::empty(), &[]).at).collect();
         assert!(places.iter().all(|at| (-0.5..=-0.1).contains(&at.x) && (0.0..=0.9).contains(&at.y)));
         assert!(places.iter().any(|at| at.x < -0.48) && places.iter().any(|at| at.x > -0.12));
         assert!(places.iter().any(|at| at.y < 0.05) && places.iter().any(|at| at.y > 0.85));
@@ -256,15 +283,15 @@ mod tests {
         let mut seen = [0; 3];
         for _ in 0..300 {
             let other = listed[1];
-            let place = placing.victim(&mut stream, &[], &[other].into_iter(), &[]);
+            let place = placing.victim(&mut stream, 0, &[], &[other].into_iter(), &[]);
             assert!(place.clear && place.at != other);
             let index = listed.iter().position(|at| *at == place.at);
             seen[index.unwrap_or_else(|| panic!("{place:?} is not listed"))] += 1;
         }
         assert!(seen[1] == 0 && seen[0] > 100 && seen[2] > 100, "{seen:?}");
-        let near = placing.victim(&mut stream, &listed, &std::iter::empty(), &[]);
+        let near = placing.victim(&mut stream, 0, &listed, &std::iter::empty(), &[]);
         assert!(near.clear && listed.contains(&near.at), "{near:?}");
-        let near = placing.victim(&mut stream, &listed[1..], &[listed[0]].into_iter(), &[]);
+        let near = placing.victim(&mut stream, 0, &listed[1..], &[listed[0]].into_iter(), &[]);
         assert!(near.clear && listed[1..].contains(&near.at), "{near:?}");
         let disc = Solid::Disc(0.2);
         let blocked = |centre| listed.map(|at| placing.is_blocked(at, &[(&disc, centre)]));

@@ -171,7 +171,7 @@ fn refuse_tasks_out_of_reach(scenario: &Scenario, team: &[Body], tasks: &[Needs]
         let far =
             |at: &[f64; 2]| !can_reach(needs, team, Vec2::new(at[0] as f32, at[1] as f32), radius, arena);
         let arrives_far = |one: &Arrival| one.task == task.name && far(&one.position_m);
-        let place = scenario.victim_places_m.iter().position(far);
+        let place = scenario.victim_places_m.iter().position(|at| task.holds(at) && far(at));
         let place = place.map(|index| ("victim_places_m", index, scenario.victim_places_m[index]));
         let arrival = scenario.arrivals.iter().position(arrives_far);
         let arrival = arrival.map(|index| ("arrivals", index, scenario.arrivals[index].position_m));
@@ -191,6 +191,19 @@ fn refuse_tasks_out_of_reach(scenario: &Scenario, team: &[Body], tasks: &[Needs]
 
 /// The error that names what does not fit into the arena.
 fn too_crowded(scenario: &Scenario, crowded: Crowded) -> Error {
+    if let Crowded::Victims(task) = crowded
+        && let Some(area) = scenario.tasks[task].area_m
+    {
+        return Error::Scenario {
+            key: format!("scenario.tasks[{task}].area_m"),
+            value: format!("{area:?}"),
+            rule: format!(
+                "no place in it is spawn_clearance_m = {} from all robots (and wall_clearance_m from obstacles); \
+                 task {:?} needs a larger one, or smaller clearances",
+                scenario.spawn_clearance_m, scenario.tasks[task].name
+            ),
+        };
+    }
     let (key, value, rule) = match crowded {
         Crowded::Obstacles => (
             "scenario.obstacles (their number)",
@@ -202,7 +215,7 @@ fn too_crowded(scenario: &Scenario, crowded: Crowded) -> Error {
             scenario.robots.len().to_string(),
             "no room for them without overlap; use fewer, smaller, or a wider arena, and start_m that are apart",
         ),
-        Crowded::Victims => (
+        Crowded::Victims(_) => (
             "scenario.spawn_clearance_m",
             scenario.spawn_clearance_m.to_string(),
             "no place is so far from all robots (and wall_clearance_m from obstacles); use a smaller one",

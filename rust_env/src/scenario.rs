@@ -2,6 +2,7 @@
 //! nothing plays by a scenario before [`crate::rules::Rules::new`] has found it valid.
 
 mod abilities;
+mod area;
 mod arrivals;
 mod battery;
 mod check;

@@ -24,8 +24,8 @@ pub enum Crowded {
     Obstacles,
     /// Robots.
     Robots,
-    /// Victims.
-    Victims,
+    /// Victims of a task.
+    Victims(usize),
 }
 
 /// Everything about appearing that a scenario fixes.
@@ -191,7 +191,7 @@ impl Spawn {
     }
 
     /// Lets victims appear at `step` in the empty slots that the situation wants to be filled, or in all where
-    /// they arrive, and counts them in `appeared`. Returns whether all found a clear place.
+    /// they arrive, and counts them in `appeared`. Returns the first task whose victim found no clear place.
     pub fn place_victims(
         &self,
         stream: &mut Stream,
@@ -200,8 +200,8 @@ impl Spawn {
         robots: &[Vec2],
         obstacles: &[Vec2],
         slots: &mut [Option<Victim>],
-    ) -> bool {
-        let mut clear = true;
+    ) -> Option<usize> {
+        let mut crowded = None;
         let solids = self.placed(obstacles);
         let wanted = match self.situation {
             Situation::Mixed => 1 + stream.below(slots.len()),
@@ -216,12 +216,12 @@ impl Spawn {
                 _ => *self.tasks_of_slot(index).start(),
             };
             let others = slots.iter().flatten().map(|victim| victim.position);
-            let place = self.placing.victim(stream, robots, &others, &solids);
-            clear &= place.clear;
+            let place = self.placing.victim(stream, task, robots, &others, &solids);
+            crowded = crowded.or((!place.clear).then_some(task));
             slots[index] = Some(Victim::new(*appeared, task as u32, step, place.at));
             *appeared += 1;
         }
-        clear
+        crowded
     }
 
     /// Lets the victims `due` appear at `step`, each in the first empty slot of its task, and counts
@@ -246,7 +246,7 @@ impl Spawn {
                 continue;
             };
             let others = slots.iter().flatten().map(|victim| victim.position);
-            let at = place.unwrap_or_else(|| self.placing.victim(stream, robots, &others, &solids).at);
+            let at = place.unwrap_or_else(|| self.placing.victim(stream, task, robots, &others, &solids).at);
             slots[slot] = Some(Victim::new(*appeared, task as u32, step, at));
             *appeared += 1;
         }
@@ -275,14 +275,22 @@ impl Spawn {
                 Some(Crowded::Obstacles)
             } else if !self.place_robots(&mut start, &obstacles, &mut robots) {
                 Some(Crowded::Robots)
-            } else if self.situation != Situation::Listed // whose places are given
-                && !self.place_victims(&mut victims, 0, &mut 0, &robots, &obstacles, &mut slots)
-            {
-                Some(Crowded::Victims)
+            } else if self.situation == Situation::Listed {
+                None // whose places are given
             } else {
-                None
+                self.place_victims(&mut victims, 0, &mut 0, &robots, &obstacles, &mut slots)
+                    .or_else(|| self.crowded_area(&mut victims, &robots, &obstacles))
+                    .map(Crowded::Victims)
             }
         })
+    }
+
+    /// The first task with an area of its own in which a victim alone finds no clear place. The situation may
+    /// want victims of it in few trials.
+    fn crowded_area(&self, stream: &mut Stream, robots: &[Vec2], obstacles: &[Vec2]) -> Option<usize> {
+        let (solids, nobody) = (self.placed(obstacles), std::iter::empty());
+        let mut own = (0..self.num_tasks).filter(|task| self.placing.has_area(*task));
+        own.find(|task| !self.placing.victim(stream, *task, robots, &nobody, &solids).clear)
     }
 
     /// The obstacles that block a layer (one bit).

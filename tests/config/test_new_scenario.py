@@ -45,6 +45,7 @@ def test_every_key_stands_in_it_with_its_meaning() -> None:
         "obstacles",
         "faults",
         "deadline_s",
+        "area_m",
     ],
 )
 def test_each_example_may_be_used(key: str, tmp_path: Path) -> None:
@@ -56,5 +57,6 @@ def test_each_example_may_be_used(key: str, tmp_path: Path) -> None:
     file.write_text("\n".join(lines))
     scenario = Scenario.from_toml(file)
     assert scenario != Scenario()
-    first = {"start_m": scenario.robots[0], "deadline_s": scenario.tasks[0]}
-    assert getattr(first.get(key, scenario), key)
+    parts = {"start_m": scenario.robots, "deadline_s": scenario.tasks, "area_m": scenario.tasks}
+    (first, *_) = parts.get(key, (scenario,))
+    assert getattr(first, key)

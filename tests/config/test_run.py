@@ -293,7 +293,7 @@ def test_a_digest_is_that_of_the_values_in_use() -> None:
         for name in ("acceleration_m_s2", "turn_acceleration_rad_s2", "wheel_base_m"):
             del robot[name]
     for task in values["scenario"]["tasks"]:
-        for name in ("service_s", "service", "deadline_s", "after", "arrival_rate_hz"):
+        for name in ("service_s", "service", "deadline_s", "after", "arrival_rate_hz", "area_m"):
             del task[name]
     text = json.dumps(values, sort_keys=True, separators=(",", ":"))
     assert config.digest() == hashlib.sha256(text.encode()).hexdigest()

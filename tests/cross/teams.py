@@ -121,6 +121,35 @@ def with_amounts(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     return scenario.replace(robots=robots, tasks=tuple(tasks))
 
 
+def with_areas(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The same, where most tasks have an area of their own, at times with listed places in it.
+
+    Areas are at least half as wide as the arena, so that there is room in them.
+    """
+    reach = scenario.arena_half_width_m - scenario.wall_clearance_m
+
+    def area() -> tuple[float, ...]:
+        sides = rng.uniform(1.0, 2.0, 2) * reach
+        low = rng.uniform(-reach, reach - sides)
+        return (*low.tolist(), *np.minimum(low + sides, reach).tolist())
+
+    tasks = tuple(
+        task.replace(area_m=area()) if index == 0 or rng.random() < 0.7 else task
+        for index, task in enumerate(scenario.tasks)
+    )
+    if rng.random() < 0.7:
+        whole = area() if rng.random() < 0.5 else None
+        return scenario.replace(tasks=tasks, victim_area_m=whole)
+    places = rng.uniform(-0.9, 0.9, (256, 2)) * reach
+    free = tuple(one for one in scenario.obstacles if one.position_m is None)
+    return scenario.replace(
+        tasks=tasks,
+        victim_places_m=tuple(map(tuple, places.tolist())),
+        obstacles=free,
+        max_victims=min(scenario.max_victims, 6),
+    )
+
+
 def with_arrivals(scenario: Scenario, rng: np.random.Generator) -> Scenario:
     """The same, where victims of each task arrive at random, of some tasks none."""
     rates = (0.0, 0.5, 2.0, 9.0)

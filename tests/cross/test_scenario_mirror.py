@@ -222,6 +222,7 @@ def test_every_value_survives_the_way_there_and_back() -> None:
                 "deadline_s": [1.5, 2.5],
                 "after": ["other"],
                 "arrival_rate_hz": 0.25,
+                "area_m": [-1.5, -0.125, 1.25, 0.875],
             },
             {**TASK, "name": "other"},
         ],

@@ -215,6 +215,48 @@ def test_victims_appear_in_their_area_alone(situation: str) -> None:
 
 
 @pytest.mark.parametrize("situation", SITUATIONS)
+def test_victims_of_a_task_fill_its_area_alone(situation: str) -> None:
+    areas = np.array([(-0.75, -0.5, -0.25, 0.875), (0.0, -0.875, 0.875, 0.0)])
+    first, second = Scenario().tasks
+    tasks = (first.replace(area_m=tuple(areas[0])), second)
+    scenario = Scenario(
+        situation=situation, tasks=tasks, victim_area_m=tuple(areas[1]), episode_steps=150
+    ).replace(spawn_clearance_m=0.0)
+    found, of_task = [], []
+    for _, _, before, after in driven(scenario, 200, 60):
+        new = after["present"] & (after["id"] != before["id"])
+        found.append(place_of(after)[new])
+        of_task.append(after["task"][new])
+    places, numbers = np.concatenate(found), np.concatenate(of_task)
+    for task, (low, high) in enumerate(areas.reshape(2, 2, 2)):
+        own = (places[numbers == task] - low) / (high - low) * 2.0 - 1.0
+        assert len(own) >= 300
+        assert_square_uniform(own, 1.0, cells=3)
+
+
+@pytest.mark.parametrize("situation", SITUATIONS)
+def test_listed_places_are_those_inside_the_area(situation: str) -> None:
+    listed = np.array([(0.5, 0.5), (-0.5, 0.5), (0.0, -0.75), (0.875, 0.0), (-0.25, 0.25)])
+    first, second = Scenario().tasks
+    scenario = Scenario(
+        situation=situation,
+        tasks=(first.replace(area_m=(-0.5, 0.0, 0.25, 0.5)), second),
+        victim_places_m=tuple(map(tuple, listed)),
+        episode_steps=150,
+        rescue_radius_m=0.4,
+    ).replace(spawn_clearance_m=0.0)
+    counts = np.zeros((2, len(listed)), int)
+    for _, _, before, after in driven(scenario, 200, 60):
+        same = (place_of(after)[:, :, None] == listed).all(-1)  # (E, V, places)
+        assert same.sum(1).max() <= 1
+        new = after["present"] & (after["id"] != before["id"])
+        for task in range(2):
+            counts[task] += (same & (new & (after["task"] == task))[..., None]).sum((0, 1))
+    assert (counts[0] > 0).tolist() == [False, True, False, False, True]
+    assert counts[counts > 0].min() >= 50
+
+
+@pytest.mark.parametrize("situation", SITUATIONS)
 def test_victims_appear_at_listed_places_alone_and_never_two_at_one(situation: str) -> None:
     listed = ((0.5, 0.5), (-0.5, 0.5), (0.0, -0.75), (0.875, 0.0))
     scenario = Scenario(situation=situation, victim_places_m=listed, episode_steps=150)

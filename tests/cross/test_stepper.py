@@ -12,6 +12,7 @@ from stepper import State, Stepper
 from teams import (
     random_scenario,
     with_amounts,
+    with_areas,
     with_arrivals,
     with_batteries,
     with_communication,
@@ -358,6 +359,19 @@ def test_worlds_in_which_victims_arrive_are_as_the_plain_stepper_says(chunk: int
 
     total = compare_some(rng, changed)
     for what in ("rescues", "appeared", "turned away", "lost"):
+        assert total[what] > 50, (what, total)
+
+
+@pytest.mark.parametrize("chunk", THIRDS)
+def test_worlds_whose_tasks_have_areas_are_as_the_plain_stepper_says(chunk: int) -> None:
+    rng = np.random.default_rng(1700 + chunk)
+
+    def changed(scenario: Scenario) -> Scenario:
+        scenario = with_arrivals(scenario, rng) if rng.random() < 0.3 else scenario
+        return with_areas(scenario, rng)
+
+    total = compare_some(rng, changed)
+    for what in ("rescues", "appeared"):
         assert total[what] > 50, (what, total)
 
 

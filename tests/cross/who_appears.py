@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from stepper import State, Stepper
 
+from innerattn.config import Scenario
 from innerattn.envs import BatchEnv
 
 EXACT = 1e-6
@@ -59,7 +60,23 @@ def check_victims(
     apart = np.linalg.norm(after.positions[envs] - at[:, None], axis=-1)
     apart = np.where(plain.there(before)[envs], apart, np.inf)
     assert (apart >= scenario.spawn_clearance_m - EXACT).all() or scenario.arrivals
+    check_areas(scenario, new["task"][fresh], at)
+    if scenario.victim_places_m:
+        for world in new:
+            shown = world[world["present"]]
+            assert len({(x, y) for x, y in zip(shown["x"], shown["y"], strict=True)}) == len(shown)
     return int(fresh.sum())
+
+
+def check_areas(scenario: Scenario, tasks: np.ndarray, at: np.ndarray) -> None:
+    """Checks that victims of these tasks (N,) may appear at their places (N, 2)."""
+    listed = set(map(tuple, np.array(scenario.victim_places_m, "f4").reshape(-1, 2).tolist()))
+    for task, place in zip(tasks, at, strict=True):
+        area = scenario.tasks[task].area_m or scenario.victim_area_m
+        if area is not None:
+            assert (np.array(area[:2]) - EXACT <= place).all()
+            assert (place <= np.array(area[2:]) + EXACT).all()
+        assert not listed or tuple(place.tolist()) in listed
 
 
 def check_arrivals(

@@ -31,6 +31,21 @@ def test_giving_back_what_is_there_changes_nothing() -> None:
     assert env.snapshot() == before
 
 
+@pytest.mark.parametrize("whole", [False, True])
+def test_victims_may_be_moved_out_of_their_area(whole: bool) -> None:
+    area = (-0.5, -0.5, 0.5, 0.5)
+    tasks = [task.replace(area_m=None if whole else area) for task in Scenario().tasks]
+    env = batch("double", victim_area_m=area if whole else None, tasks=tasks)
+    victims = env.victims()
+    assert (abs(victims["x"]) <= 0.5).all()
+    victims["x"] = 0.875
+    env.set_victims(victims)
+    np.testing.assert_array_equal(env.victims(), victims)
+    other = batch("double", victim_area_m=area if whole else None, tasks=tasks)
+    other.restore(env.snapshot())
+    np.testing.assert_array_equal(other.victims(), victims)
+
+
 def test_a_victim_that_is_added_is_seen_and_rescued() -> None:
     env = batch(max_victims=4)
     victims = env.victims()

@@ -21,6 +21,8 @@ METHODS = ("td-inner", "td-uniform", "ppo-inner", "ppo-uniform", "mappo")
 FAULTS = (Fault(robot="food_0", kind="heading_bias", value=0.4),)
 TEAM = Scenario().robots
 PLACED = (TEAM[0], TEAM[1].replace(start_m=(0.5, 0.0)), *TEAM[2:])
+TASKS = Scenario().tasks
+MIDDLE, LEFT = (-0.75, -0.75, 0.75, 0.75), (-0.9, -0.9, 0.0, 0.9)
 
 
 def run(method: str, scenario: Scenario, symmetry: str = "canonical") -> RunConfig:
@@ -159,6 +161,11 @@ def test_obstacles_that_break_the_symmetry_are_refused(obstacle: Obstacle) -> No
         ("victim_places_m", {"victim_places_m": ((0.5, 0.5), (-0.5, -0.5))}),
         ("victim_area_m", {"victim_area_m": (-0.5, -0.5, 0.5, 0.4)}),
         ("victim_area_m", {"victim_area_m": (0.0, 0.0, 0.5, 0.5)}),
+        (r"tasks\[1\]\.area_m", {"tasks": (TASKS[0], TASKS[1].replace(area_m=LEFT))}),
+        (
+            "victim_area_m",
+            {"victim_area_m": LEFT, "tasks": (TASKS[0].replace(area_m=MIDDLE), TASKS[1])},
+        ),
     ],
 )
 def test_places_that_break_the_symmetry_are_refused(key: str, changes: dict[str, object]) -> None:
@@ -170,8 +177,16 @@ def test_places_that_break_the_symmetry_are_refused(key: str, changes: dict[str,
         build_learner(run("td-inner", scenario), env)
 
 
-def test_a_square_around_the_centre_is_not() -> None:
-    scenario = Scenario(victim_area_m=(-0.5, -0.5, 0.5, 0.5))
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"victim_area_m": MIDDLE},
+        {"tasks": (TASKS[0].replace(area_m=MIDDLE), TASKS[1])},
+        {"tasks": [one.replace(area_m=MIDDLE) for one in TASKS], "victim_area_m": LEFT},
+    ],
+)
+def test_squares_around_the_centre_are_not(changes: dict[str, object]) -> None:
+    scenario = Scenario().replace(**changes)
     with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
         build_learner(run("td-inner", scenario), env)
 

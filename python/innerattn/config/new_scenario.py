@@ -29,7 +29,10 @@ _EXAMPLES: dict[str, Any] = {
     "communication": {"range_m": 0.8, "delay_steps": 2},
     "map": {"rows": ["....", ".##.", ".#..", "...."]},
 }
-_OF_TABLES = {"robots": ("start_m", [-0.5, 0.0]), "tasks": ("deadline_s", [10.0, 20.0])}
+_OF_TABLES: dict[str, dict[str, Any]] = {
+    "robots": {"start_m": [-0.5, 0.0]},
+    "tasks": {"deadline_s": [10.0, 20.0], "area_m": [-0.9, -0.9, 0.0, 0.9]},
+}
 _TABLES: dict[str, dict[str, Any]] = {
     "arrivals": {"at_s": 2.0, "task": "task_1", "position_m": [0.5, 0.5]},
     "obstacles": {
@@ -56,7 +59,7 @@ def new_scenario(name: str, file: str) -> str:
         value, comment = getattr(default, key), _comment(info.description or "", "# ")
         if isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
             first, *others = (one.model_dump(mode="json", exclude_none=True) for one in value)
-            example = "#" + _line(*_OF_TABLES[key])
+            example = "".join(f"#{_line(*one)}" for one in _OF_TABLES[key].items())
             team = [_table(key, first) + example, *(_table(key, one) for one in others)]
             tables.append(comment + _keys(type(value[0])) + "\n".join(team))
         elif key in _TABLES:

@@ -589,4 +589,12 @@ class Scenario(Model, Shown):
     @property
     def only_places_m(self) -> tuple[tuple[float, float], ...]:
         """The only places at which victims appear [m]; none: any."""
-        return self.victim_places_m or tuple(one.position_m for one in self.arrivals)
+        if self.arrivals:
+            return tuple(one.position_m for one in self.arrivals)
+        holds = [task.holds for task in self.tasks]
+        return tuple(at for at in self.victim_places_m if any(one(*at) for one in holds))
+
+    def area_of(self, task: Task) -> tuple[float, float, float, float]:
+        """Where victims of a task appear: least x, least y, most x, most y [m]."""
+        reach = self.arena_half_width_m - self.wall_clearance_m
+        return task.area_m or self.victim_area_m or (-reach, -reach, reach, reach)

@@ -56,6 +56,11 @@ class Task(Model):
         description="how many of its victims arrive on average, where the situation is poisson "
         "[1/s]",
     )
+    area_m: Annotated[tuple[float, float, float, float] | None, ADDED_LATER] = Field(
+        None,
+        description="rectangle in which its victims appear: least x, least y, most x, most y [m]; "
+        "None: as victim_area_m says",
+    )
 
     _check_needs = field_validator("needs", mode="before")(list_or_table)
 
@@ -65,6 +70,13 @@ class Task(Model):
         if isinstance(value, (list, tuple)) and len(value) != 2:
             raise PydanticCustomError("type", "Input should be a number or a pair [low, high]")
         return value
+
+    def holds(self, x: float, y: float) -> bool:
+        """Whether a place is in its own area, border included; any is if it has none."""
+        if self.area_m is None:
+            return True
+        left, bottom, right, top = self.area_m
+        return left <= x <= right and bottom <= y <= top
 
     @property
     def roles(self) -> tuple[str, ...]:

@@ -65,9 +65,11 @@ def _place(scenario: Scenario) -> tuple[str, str] | None:
             return f"robots[{index}].start_m", "a robot has a fixed start"
     if scenario.victim_places_m:
         return "victim_places_m", "victims have fixed places"
-    area = scenario.victim_area_m
-    if area is not None and len({-area[0], -area[1], area[2], area[3]}) > 1:
-        return "victim_area_m", "the area is no square around the centre"
+    for index, task in enumerate(scenario.tasks):
+        x_low, y_low, x_high, y_high = scenario.area_of(task)
+        if len({-x_low, -y_low, x_high, y_high}) > 1:
+            key = "victim_area_m" if task.area_m is None else f"tasks[{index}].area_m"
+            return key, "the area is no square around the centre"
     return None
 
 

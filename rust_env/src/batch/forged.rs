@@ -31,6 +31,7 @@ fn played(engine: Engine, steps: usize) -> Batch {
     tasks[0].service_s = 0.3;
     tasks[0].after = vec!["task_2".into()];
     tasks[1].deadline_s = Some(Deadline::Between([0.5, 2.0]));
+    tasks[1].area_m = Some([-0.4, -0.4, 0.4, 0.0]);
     let scenario = Scenario {
         engine,
         tasks,

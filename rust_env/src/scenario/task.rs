@@ -27,6 +27,10 @@ pub struct Task {
     /// How many of its victims arrive in a second in the poisson situation, on average.
     #[serde(default)]
     pub arrival_rate_hz: f64,
+    /// Least x and y, then largest x and y, of the places at which its victims appear, m; as
+    /// `victim_area_m` says if absent.
+    #[serde(default)]
+    pub area_m: Option<[f64; 4]>,
 }
 
 impl Task {
@@ -41,7 +45,16 @@ impl Task {
             deadline_s: None,
             after: vec![],
             arrival_rate_hz: 0.0,
+            area_m: None,
         }
+    }
+
+    /// Whether a place is in its own area, whose border belongs to it; any place is if it has none.
+    #[must_use]
+    pub fn holds(&self, place: &[f64; 2]) -> bool {
+        self.area_m.is_none_or(|[left, bottom, right, top]| {
+            (left..=right).contains(&place[0]) && (bottom..=top).contains(&place[1])
+        })
     }
 }
 

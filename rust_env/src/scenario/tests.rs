@@ -224,6 +224,56 @@ fn given_places_are_inside_and_fit_together() {
 }
 
 #[test]
+fn areas_of_tasks_are_inside_and_hold_what_is_given() {
+    let refused = refusal(|scenario| scenario.tasks[1].area_m = Some([-0.5, -0.5, 0.95, 0.5]));
+    assert!(refused.starts_with("scenario.tasks[1].area_m[2] = 0.95: must be in -0.9..=0.9 m"), "{refused}");
+    let refused = refusal(|scenario| scenario.tasks[0].area_m = Some([0.5, -0.5, 0.25, f64::NAN]));
+    assert!(refused.starts_with("scenario.tasks[0].area_m[3] = NaN: must be"), "{refused}");
+    let refused = refusal(|scenario| scenario.tasks[0].area_m = Some([0.5, -0.5, 0.25, 0.5]));
+    assert_eq!(
+        refused,
+        "scenario.tasks[0].area_m[0] = 0.5: must be at most tasks[0].area_m[2], which is 0.25"
+    );
+    let with = |situation, places: &[[f64; 2]]| Scenario {
+        situation,
+        victim_places_m: places.to_vec(),
+        tasks: [[-0.9, 0.0, -0.1, 0.5], [-0.5, 0.0, 0.9, 0.5]]
+            .into_iter()
+            .zip(Scenario::default().tasks)
+            .map(|(area, task)| Task { area_m: Some(area), ..task })
+            .collect(),
+        ..Scenario::default()
+    };
+    let (left, both, right) = ([-0.9, 0.5], [-0.5, 0.0], [0.5, 0.25]);
+    assert_eq!(with(Situation::Double, &[left, right]).validate(), Ok(()));
+    assert_eq!(with(Situation::Double, &[left, both, right]).validate(), Ok(()));
+    assert_eq!(with(Situation::Single, &[both]).validate(), Ok(()));
+    let outside = [0.0, 0.75];
+    let refused = with(Situation::Single, &[left, outside]).validate().expect_err("none").to_string();
+    assert_eq!(
+        refused,
+        "scenario.tasks[1].area_m = [-0.5, 0.0, 0.9, 0.5]: has 0 of victim_places_m in it; must have at least 1, \
+         or a victim of task \"task_2\" may find all of them taken"
+    );
+    // The other task's victim may be at the place that both have.
+    let refused = with(Situation::Double, &[both, right]).validate().expect_err("one").to_string();
+    assert!(refused.starts_with("scenario.tasks[0].area_m = [-0.9, 0.0, -0.1, 0.5]: has 1 of"), "{refused}");
+    assert!(refused.contains("must have at least 2, or a victim of task \"task_1\""), "{refused}");
+    let refused = with(Situation::Mixed, &[left, both, outside]).validate().expect_err("one").to_string();
+    assert!(refused.starts_with("scenario.tasks[1].area_m"), "all of a wave may be of a task: {refused}");
+    let arriving = |position_m| Scenario {
+        arrivals: vec![Arrival { at_s: 0.0, task: "task_2".into(), position_m }],
+        ..with(Situation::Listed, &[])
+    };
+    assert_eq!(arriving(right).validate(), Ok(()));
+    assert_eq!(
+        arriving(left).validate().expect_err("outside").to_string(),
+        "scenario.arrivals[0].position_m = [-0.9, 0.5]: must be in the area of its task \"task_2\": \
+         tasks[1].area_m = [-0.5, 0.0, 0.9, 0.5]"
+    );
+}
+
+#[test]
 fn services_and_deadlines_have_their_limits() {
     let task = |service_s: f64, deadline_s: Option<Deadline>| {
         let mut scenario = Scenario::default();

@@ -31,6 +31,7 @@ impl Scenario {
         self.validate_starts()?;
         self.validate_victim_places()?;
         self.validate_arrivals()?;
+        self.validate_task_areas()?;
         self.validate_batteries()?;
         self.validate_loads()
     }
@@ -170,17 +171,7 @@ impl Scenario {
 
     fn validate_victim_places(&self) -> Result<()> {
         let most = self.arena_half_width_m - self.wall_clearance_m;
-        if let Some(area) = self.victim_area_m {
-            for (index, value) in area.into_iter().enumerate() {
-                within(&format!("victim_area_m[{index}]"), value, -most, most, "m")?;
-            }
-            for (low, high) in [(0, 2), (1, 3)] {
-                if area[low] > area[high] {
-                    let rule = format!("must be at most victim_area_m[{high}], which is {}", area[high]);
-                    return broken(&format!("victim_area_m[{low}]"), &area[low], &rule);
-                }
-            }
-        }
+        self.validate_area("victim_area_m", self.victim_area_m)?;
         let places = self.victim_places_m.len();
         if places == 0 {
             return Ok(());

@@ -111,7 +111,7 @@ fn an_image_from_before_a_key_was_added_is_taken() {
         rules.scenario.to_json().replace(r#","victim_places_m":[]"#, "").replace(r#","start_m":null"#, "");
     let times = r#","service_s":0.0,"service":"keep","deadline_s":null"#;
     let older = older.replace(times, "").replace(r#","lost_cost":0.0"#, "");
-    let keys = r#","after":[],"arrival_rate_hz":0.0"#;
+    let keys = r#","after":[],"arrival_rate_hz":0.0,"area_m":null"#;
     let older = older.replace(keys, "").replace(r#","arrivals":[]"#, "");
     let older = older.replace(r#","battery":null"#, "").replace(r#","stations":[]"#, "");
     let older = older.replace(r#","load":null"#, "").replace(r#","depots":[]"#, "");
@@ -124,6 +124,7 @@ fn an_image_from_before_a_key_was_added_is_taken() {
         "end_when_done",
         "arriv",
         "after",
+        "\"area_m",
         "victim_places_m",
         "start_m",
         "service_s",

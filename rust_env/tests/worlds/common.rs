@@ -188,6 +188,19 @@ pub fn with_order(mut scenario: Scenario) -> Scenario {
     Scenario { rescue_radius_m: 0.4, ..scenario }
 }
 
+/// The same with two sites, one always for each task: the left half of the arena and the right one, in turn.
+pub fn with_areas(mut scenario: Scenario) -> Scenario {
+    let most = scenario.arena_half_width_m - scenario.wall_clearance_m;
+    for (index, task) in scenario.tasks.iter_mut().enumerate() {
+        task.area_m = Some([[-most, -most, 0.0, most], [0.0, -most, most, most]][index % 2]);
+    }
+    let situation = match scenario.situation {
+        Situation::Mixed => Situation::Double,
+        other => other,
+    };
+    Scenario { situation, rescue_radius_m: 0.4, ..scenario }
+}
+
 /// The same with victims that arrive at random, often more than there are slots.
 pub fn with_arrivals(mut scenario: Scenario) -> Scenario {
     for (index, task) in scenario.tasks.iter_mut().enumerate() {

@@ -6,8 +6,8 @@ use innerattn_env::scenario::{Actions, Scenario, Shaping, Situation};
 
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
-    with_amounts, with_an_end, with_arrivals, with_batteries, with_layers, with_leaving, with_list,
-    with_loads, with_map, with_order, with_radio, with_rays, with_sight, with_times, with_wheels,
+    with_amounts, with_an_end, with_areas, with_arrivals, with_batteries, with_layers, with_leaving,
+    with_list, with_loads, with_map, with_order, with_radio, with_rays, with_sight, with_times, with_wheels,
 };
 
 const STEPS: usize = 150;
@@ -36,6 +36,7 @@ fn scenarios() -> Vec<Scenario> {
         },
         with_amounts(tight.clone()),
         with_order(tight.clone()),
+        with_areas(tight.clone()),
         with_arrivals(tight.clone()),
         with_list(tight.clone()),
         with_an_end(tight.clone()),

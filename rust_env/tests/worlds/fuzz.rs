@@ -14,8 +14,8 @@ use serde_json::{Value, json};
 
 use crate::common::{
     ENGINES, Table, chance, coming_and_going, mixed_team, options, random_drive, some_obstacles,
-    with_amounts, with_an_end, with_arrivals, with_batteries, with_layers, with_leaving, with_list,
-    with_loads, with_map, with_order, with_radio, with_rays, with_sight, with_times, with_wheels,
+    with_amounts, with_an_end, with_areas, with_arrivals, with_batteries, with_layers, with_leaving,
+    with_list, with_loads, with_map, with_order, with_radio, with_rays, with_sight, with_times, with_wheels,
 };
 
 const ENVS: usize = 2;
@@ -54,6 +54,7 @@ fn scenarios() -> Vec<Scenario> {
             with_times(Scenario { engine, ..tight.clone() }),
             with_amounts(Scenario { engine, ..tight.clone() }),
             with_order(Scenario { engine, ..tight.clone() }),
+            with_areas(Scenario { engine, ..tight.clone() }),
             with_arrivals(Scenario { engine, ..tight.clone() }),
             with_list(Scenario { engine, ..tight.clone() }),
             with_an_end(Scenario { engine, ..tight.clone() }),

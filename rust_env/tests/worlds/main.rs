@@ -3,6 +3,7 @@
 
 mod common;
 
+mod areas;
 mod arrivals;
 mod batteries;
 mod contacts;

@@ -3,7 +3,7 @@
 use innerattn_env::scenario::{Scenario, Situation};
 use proptest::prelude::*;
 
-use crate::common::{Table, chance, coming_and_going, options, random_drive, with_times};
+use crate::common::{Table, chance, coming_and_going, options, random_drive, with_areas, with_times};
 
 const ENVS: usize = 3;
 
@@ -97,17 +97,19 @@ fn what_cannot_be_is_named_and_nothing_changes() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is put where at any time, the worlds stay worlds of their scenario: their image can be
-    /// restored, and goes on bit for bit. Giving back what is there changes nothing.
+    /// Whatever is put where at any time, outside of areas of tasks, too, the worlds stay worlds of their
+    /// scenario: their image can be restored, and goes on bit for bit. Giving back what is there changes nothing.
     #[test]
     fn worlds_with_moved_victims_are_worlds(
-        seed in 0..1000_u64, situation in 0..3_usize, faulty: bool, timed: bool, adds in 0..3_u32,
+        seed in 0..1000_u64, situation in 0..3_usize, faulty: bool, timed: bool, sites: bool, adds in 0..3_u32,
     ) {
         let situation = [Situation::Single, Situation::Double, Situation::Mixed][situation];
         let plain = Scenario { situation, ..Scenario::default() };
         let faults = if faulty { coming_and_going(&plain.robots) } else { vec![] };
         let scenario = Scenario { faults, ..plain };
         let scenario = if timed { with_times(scenario) } else { scenario };
+        let scenario = if sites { with_areas(scenario) } else { scenario };
+        let situation = scenario.situation;
         let mut table = Table::new(scenario.clone(), options(ENVS, seed));
         let (mut chance, slots) = (chance(seed), slots(&table));
         for _ in 0..40 {
