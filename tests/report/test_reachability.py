@@ -69,6 +69,29 @@ def test_a_share_of_the_area_is_named() -> None:
     assert list(closed_off(scenario(0.06, victim_places_m=[], victim_area_m=near))) == []
 
 
+def test_areas_of_tasks_count_each_for_itself() -> None:
+    below, above = [-0.9, -0.9, 0.9, -0.1], [-0.9, 0.3, 0.9, 0.9]
+    tasks = [
+        {"name": "beam", "needs": ["lift"], "area_m": above},
+        {"name": "leak", "needs": ["water"], "area_m": below},
+    ]
+    closed = scenario(0.06, victim_places_m=[], tasks=tasks)
+    assert list(closed_off(closed)) == [
+        "victims of beam: obstacles keep every robot with lift away from 100 % of their area"
+    ]
+    whole = [tasks[0], {"name": "leak", "needs": ["water"]}]
+    assert [line[:15] for line in closed_off(closed.replace(tasks=whole))] == [
+        "victims of beam",
+        "victims: obstac",
+    ]
+    whole = [tasks[1], {"name": "beam", "needs": ["lift"]}]
+    three = {"victim_places_m": [[0.5, -0.5], [0.0, 0.5], [0.4, -0.5]]}
+    places = scenario(0.06, tasks=whole, situation="double", **three)
+    assert list(closed_off(places)) == [
+        "place (0, 0.5): obstacles keep every robot with lift away from it"
+    ]
+
+
 @pytest.mark.parametrize("shape", [None, "disc"])
 def test_without_obstacles_that_have_a_place_nothing_is_closed(shape: str | None) -> None:
     obstacles = [{"shape": shape, "radius_m": 0.2}] if shape else []

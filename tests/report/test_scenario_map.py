@@ -45,6 +45,22 @@ def test_areas_and_places_of_victims() -> None:
     assert "·" not in scenario_map(listed)
 
 
+def test_areas_of_tasks_are_drawn_together() -> None:
+    left, right = Scenario().tasks
+    left = left.replace(area_m=(-0.9, 0.0, -0.5, 0.5))
+    sites = Scenario(tasks=(left, right.replace(area_m=(0.5, 0.0, 0.9, 0.5))))
+    drawn = [row for row in rows(sites) if "·" in row]
+    assert len(drawn) == 8
+    assert all(row.split() == ["·" * 12, "·" * 12] for row in drawn)
+    one = rows(Scenario(tasks=(left, right), victim_area_m=(0.0, -0.5, 0.5, 0.0)))
+    assert [sum("·" in row[half] for row in one) for half in (slice(30), slice(31, 61))] == [8, 8]
+    beside = Scenario(
+        tasks=(left, right.replace(area_m=(0.5, 0.0, 0.9, 0.5))),
+        victim_places_m=((-0.6, 0.2), (-0.7, 0.4), (0.7, 0.2), (0.8, 0.4), (0.0, -0.5)),
+    )
+    assert sum(row.count("x") for row in rows(beside)) == 4, "no task has the last place"
+
+
 def test_obstacles_that_some_pass_have_their_own_sign() -> None:
     preset = Scenario.preset("air-ground")
     assert {sign for row in rows(preset) for sign in row} == {" ", "·", "%"}

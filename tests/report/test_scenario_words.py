@@ -34,6 +34,31 @@ def test_services_and_deadlines_have_words() -> None:
     assert other.endswith("0.15 m, for 0.5 s; if they leave, it starts anew; lost after 4 to 8 s")
 
 
+def test_areas_of_tasks_have_words() -> None:
+    first, second = Scenario.preset("mixed").tasks
+    tasks = (first.replace(area_m=(-0.9, -0.25, 0.0, 0.9), deadline_s=8.0), second)
+    one, other = scenario_words(Scenario.preset("mixed").replace(tasks=tasks)).splitlines()
+    assert one.endswith("; lost after 8 s; its victims appear from (-0.9, -0.25) to (0, 0.9)")
+    assert other.endswith("0.15 m")
+
+
+def test_a_battery_must_last_to_the_farthest_area_of_a_task() -> None:
+    first, *others = Scenario().robots
+    near, far = (-0.5, -0.1, 0.0, 0.1), (0.0, 0.0, 0.25, 0.75)
+    tasks = tuple(one.replace(area_m=near) for one in Scenario().tasks)
+    made = Scenario.model_validate(
+        {
+            "robots": [first.replace(battery=Battery(capacity_j=1.0, per_m_j=2.0)), *others],
+            "stations": [Station(position_m=(0.0, 0.0), recharge_w=2.0)],
+            "tasks": tasks,
+            "spawn_clearance_m": 0.0,
+        }
+    )
+    assert "back to no station" not in scenario_words(made)
+    words = scenario_words(made.replace(tasks=(tasks[0], tasks[1].replace(area_m=far))))
+    assert "food_0: from a victim at [0.25, 0.75] its full battery brings it back to" in words
+
+
 def test_amounts_have_words() -> None:
     robots = [robot.model_dump() for robot in Scenario().robots]
     robots[0]["abilities"] = {"food": 1.5}

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.config import Obstacle, Robot, Scenario
+from innerattn.config import Obstacle, Robot, Scenario, Task
 
 _CELLS = 201
 _LEAST_SHARE = 0.01
@@ -30,17 +30,34 @@ def closed_off(scenario: Scenario) -> Iterator[str]:
     for need in needs:
         able = [robot for robot in scenario.robots if need in robot.abilities]
         near = np.any([_near(scenario, robot) for robot in able], axis=0)
-        for x, y in scenario.only_places_m:
+        asking = [task for task in scenario.tasks if need in task.needs]
+        for x, y in _places(scenario, asking):
             if not near[_cell(scenario, x, y)]:
                 yield f"place ({x:g}, {y:g}): obstacles keep every robot with {need} away from it"
-        if not scenario.only_places_m:
-            area = _area(scenario)
+        for task in () if scenario.only_places_m else _unlike(asking):
+            area = _area(scenario, task)
             share = float((area & ~near).sum() / max(1, area.sum()))
             if share > _LEAST_SHARE:
+                whose = "victims" if task.area_m is None else f"victims of {task.name}"
                 yield (
-                    f"victims: obstacles keep every robot with {need} away from "
+                    f"{whose}: obstacles keep every robot with {need} away from "
                     f"{100.0 * share:.0f} % of their area"
                 )
+
+
+def _places(scenario: Scenario, tasks: list[Task]) -> Iterable[tuple[float, float]]:
+    """The listed places at which victims of these tasks appear [m], each once."""
+    names = {task.name for task in tasks}
+    arriving = (one.position_m for one in scenario.arrivals if one.task in names)
+    listed = (at for at in scenario.victim_places_m if any(task.holds(*at) for task in tasks))
+    return dict.fromkeys(arriving if scenario.arrivals else listed)
+
+
+def _unlike(tasks: list[Task]) -> Iterator[Task]:
+    """Tasks with an area of their own, and one of those without."""
+    plain = [task for task in tasks if task.area_m is None]
+    yield from plain[:1]
+    yield from (task for task in tasks if task.area_m is not None)
 
 
 def _near(scenario: Scenario, robot: Robot) -> Mask:
@@ -64,11 +81,10 @@ def _near(scenario: Scenario, robot: Robot) -> Mask:
     return np.asarray(away <= scenario.rescue_radius_m + step)
 
 
-def _area(scenario: Scenario) -> Mask:
-    """Cells where victims may appear."""
+def _area(scenario: Scenario, task: Task) -> Mask:
+    """Cells where victims of a task may appear."""
     x, y = _grid(scenario)
-    half = scenario.arena_half_width_m - scenario.wall_clearance_m
-    x_min, y_min, x_max, y_max = scenario.victim_area_m or (-half, -half, half, half)
+    x_min, y_min, x_max, y_max = scenario.area_of(task)
     inside = (x_min <= x) & (x <= x_max) & (y_min <= y) & (y <= y_max)
     return inside & (_clearance((*scenario.obstacles, *scenario.map_boxes), x, y) > 0.0)
 

@@ -17,7 +17,7 @@ def scenario_map(scenario: Scenario) -> str:
     """The arena with all that has a place of its own, and a legend; without a newline at the end.
 
     Robots with a start are drawn by a letter, obstacles by ``#``, those that some layers pass by
-    ``%``, victims' places by ``x``, and the area in which victims may appear by ``·``.
+    ``%``, victims' places by ``x``, and the areas in which victims may appear by ``·``.
     """
     half = scenario.arena_half_width_m
     wall = _CORNER + _SIDE * _COLUMNS + _CORNER
@@ -26,7 +26,9 @@ def scenario_map(scenario: Scenario) -> str:
         (_column(at[0], half), _row(at[1], half)): letter
         for letter, at in zip(_letters(), _starts(scenario), strict=False)
     }
-    places = {(_column(x, half), _row(y, half)) for x, y in scenario.only_places_m}
+    listed = scenario.only_places_m
+    places = {(_column(x, half), _row(y, half)) for x, y in listed}
+    areas = set() if listed else {scenario.area_of(task) for task in scenario.tasks}
     for row in range(_ROWS):
         y = half * (1.0 - 2.0 * (row + 0.5) / _ROWS)
         cells = []
@@ -39,7 +41,7 @@ def scenario_map(scenario: Scenario) -> str:
             elif (column, row) in places:
                 cells.append(_PLACE)
             else:
-                cells.append(_AREA if _may_appear(scenario, x, y) else _FREE)
+                cells.append(_AREA if any(_holds(area, x, y) for area in areas) else _FREE)
         lines.append(_UPRIGHT + "".join(cells) + _UPRIGHT)
     return "\n".join([*lines, wall, *_legend(scenario)])
 
@@ -120,9 +122,6 @@ def _covers(obstacle: Obstacle, x: float, y: float) -> bool:
     return dx * dx + dy * dy <= (obstacle.radius_m or 0.0) ** 2
 
 
-def _may_appear(scenario: Scenario, x: float, y: float) -> bool:
-    if scenario.only_places_m:
-        return False
-    reach = scenario.arena_half_width_m - scenario.wall_clearance_m
-    left, bottom, right, top = scenario.victim_area_m or (-reach, -reach, reach, reach)
+def _holds(area: tuple[float, float, float, float], x: float, y: float) -> bool:
+    left, bottom, right, top = area
     return left <= x <= right and bottom <= y <= top

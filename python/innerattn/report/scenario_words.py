@@ -49,7 +49,7 @@ def _tasks(scenario: Scenario) -> Iterator[str]:
             if scenario.situation == "poisson":
                 number = f"{task.arrival_rate_hz:g} a second"
             arrivals = f"; {number} arrive, at most {scenario.max_victims} wait at once"
-        yield f"{task.name}: {' and '.join(helpers)}, {near}{_times(task)}{arrivals}"
+        yield f"{task.name}: {' and '.join(helpers)}, {near}{_times(task)}{_where(task)}{arrivals}"
 
 
 def _end(scenario: Scenario) -> Iterator[str]:
@@ -58,6 +58,13 @@ def _end(scenario: Scenario) -> Iterator[str]:
             f"{len(scenario.arrivals)} victims in all; an episode ends when each was rescued, "
             "lost or turned away"
         )
+
+
+def _where(task: Task) -> str:
+    if task.area_m is None:
+        return ""
+    left, bottom, right, top = task.area_m
+    return f"; its victims appear from ({left:g}, {bottom:g}) to ({right:g}, {top:g})"
 
 
 def _times(task: Task) -> str:
@@ -167,11 +174,9 @@ def _too_far(scenario: Scenario) -> Iterator[str]:
     """Robots whose full battery takes them to no station again from the farthest victims."""
     if not scenario.stations:
         return
-    reach = scenario.arena_half_width_m - scenario.wall_clearance_m
-    x_low, y_low, x_high, y_high = scenario.victim_area_m or (-reach, -reach, reach, reach)
-    corners = [(x, y) for x in (x_low, x_high) for y in (y_low, y_high)]
-    listed = [one.position_m for one in scenario.arrivals]
-    places = listed or list(scenario.victim_places_m) or corners
+    areas = dict.fromkeys(map(scenario.area_of, scenario.tasks))
+    corners = [(x, y) for area in areas for x in area[::2] for y in area[1::2]]
+    places = scenario.only_places_m or corners
 
     def apart(place: tuple[float, float]) -> float:
         ways = (math.dist(place, one.position_m) - one.radius_m for one in scenario.stations)
@@ -220,6 +225,7 @@ def _doubts(scenario: Scenario) -> Iterator[str]:
     largest = max(robot.radius_m for robot in scenario.robots)
     beyond = math.sqrt(2.0) * max(0.0, largest - scenario.wall_clearance_m)
     free = scenario.victim_area_m is None and not scenario.victim_places_m
+    free = free and any(task.area_m is None for task in scenario.tasks)
     if free and beyond > scenario.rescue_radius_m:
         yield (
             "victims in a corner: a robot as large as the largest cannot reach them; "
