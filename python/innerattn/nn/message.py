@@ -20,6 +20,7 @@ from innerattn.nn.actor import Actor
 from innerattn.nn.encoder import EntityColumns, observation_encoder
 from innerattn.nn.linear import PerRobotLinear
 from innerattn.nn.memory import RememberingActor, turned_memory
+from innerattn.nn.pooling import equal_weights, largest
 from innerattn.nn.symmetry import between
 
 _YES = 0.5
@@ -138,7 +139,7 @@ class Messages(nn.Module):
             arriving = _turned_for(arriving, frame.long(), element.long())
         hears = self._hears(obs, said)
         if self._pooling == "max":
-            return _largest(arriving, hears)
+            return largest(arriving, hears.unsqueeze(3), dim=1)
         if self._pooling == "attention":
             if self._hearing.delay:
                 encoded = functional.leaky_relu_(self.encoder(obs))
@@ -146,8 +147,7 @@ class Messages(nn.Module):
         else:
             if self._pooling == "nearest":
                 hears = _nearest(hears, self._distances(obs))
-            count = hears.sum(dim=1, keepdim=True).clamp_min(1)
-            weights = hears.to(rows.dtype) / count
+            weights = equal_weights(hears, 1, rows.dtype)
         pooled: Tensor = (weights.unsqueeze(3) * arriving).sum(dim=1)
         return pooled
 
@@ -193,13 +193,6 @@ def _turned_for(messages: Tensor, sender: Tensor, receiver: Tensor) -> Tensor:
     elements = between(sender.unsqueeze(0), receiver.unsqueeze(1))
     turned = turned_memory(messages.flatten(0, 1), elements.flatten(0, 1))
     return turned.view(messages.shape)
-
-
-def _largest(messages: Tensor, hears: Tensor) -> Tensor:
-    """(R, B, K) the largest of the messages (R, R, B, K) that are heard (R, R, B)."""
-    lowest = torch.finfo(messages.dtype).min
-    largest = messages.masked_fill(~hears.unsqueeze(3), lowest).amax(dim=1)
-    return largest.masked_fill(~hears.any(dim=1).unsqueeze(2), 0.0)
 
 
 def _nearest(hears: Tensor, distances: Tensor) -> Tensor:
