@@ -202,6 +202,15 @@ def test_tables_in_a_file_replace_lists(tmp_path: Path) -> None:
         ({"scenario.episode_steps": 0}, r"^scenario\.episode_steps = 0: must be"),
         ({"network.encoder": "rows"}, r"^network\.encoder = 'rows': must be 'flat' or 'entities'$"),
         (
+            {"network.pooling": "max"},
+            r"^network\.pooling = 'max': network\.encoder = 'flat' pools nothing; must be "
+            r"'attention', or the encoder 'entities'$",
+        ),
+        (
+            {"network.pooling": "sum", "network.encoder": "entities"},
+            r"^network\.pooling = 'sum': must be 'attention', 'mean', 'max' or 'nearest'$",
+        ),
+        (
             {"network.swapped_robots": ("food_0", "medical_0")},
             "must be two robots of a kind, of food",
         ),

@@ -260,7 +260,7 @@ ADDED_SINCE = {
     ),
     "network": (
         *("swapped_robots", "shared_gradients", "joint_critic", "symmetry", "memory_width"),
-        *("mask_actions", "message_width", "message_pooling"),
+        *("mask_actions", "message_width", "message_pooling", "pooling"),
     ),
     "train": (
         *("episode_steps", "engine", "stagger_starts", "schedule"),

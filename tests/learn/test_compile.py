@@ -26,7 +26,8 @@ def _nothing_compiled() -> None:
 
 
 def columns(robots: int) -> EntityColumns:
-    return EntityColumns(5, robots - 1, 2, 2, 2, 0)
+    sizes = 5, robots - 1, 2, 2, 2, 0
+    return EntityColumns(*sizes, teammate_place=(0, 1), victim_place=(0, 1))
 
 
 def make(algorithm: str, robots: int, network: dict, numbers: dict) -> ActorCritic:
@@ -129,9 +130,17 @@ def test_the_traced_update_agrees_without_attention() -> None:
     agree("ppo", 4, "aot_eager", {"attention": "none"}, {"advantage": "value"})
 
 
-@pytest.mark.long
-def test_the_traced_update_agrees_by_entities() -> None:
-    agree("ppo", 4, "aot_eager", ENTITIES, {})
+@pytest.mark.parametrize(
+    ("algorithm", "pooling"),
+    [
+        pytest.param("ppo", "attention", marks=pytest.mark.long),
+        pytest.param("ppo", "nearest", marks=pytest.mark.long),
+        pytest.param("td", "mean", marks=pytest.mark.slow),
+        pytest.param("td", "max", marks=pytest.mark.slow),
+    ],
+)
+def test_the_traced_update_agrees_by_entities(algorithm: str, pooling: str) -> None:
+    agree(algorithm, 4, "aot_eager", ENTITIES | {"pooling": pooling}, {})
 
 
 @pytest.mark.parametrize(
@@ -178,8 +187,8 @@ def test_advice_of_the_compiler_is_not_passed_on() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "network",
-    [ENTITIES, BY_KIND],
-    ids=["entities", "kind"],
+    [ENTITIES, BY_KIND, *(ENTITIES | {"pooling": one} for one in ("mean", "max", "nearest"))],
+    ids=["entities", "kind", "mean", "max", "nearest"],
 )
 def test_the_compiled_update_agrees_with_other_networks(network: dict) -> None:
     agree("td", 4, "inductor", network, {})

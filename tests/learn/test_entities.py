@@ -12,7 +12,8 @@ ENVS, STEPS, ACTIONS = 8, 4, 5
 
 
 def columns(robots: int) -> EntityColumns:
-    return EntityColumns(3, robots - 1, 4, 2, 3, 0)
+    sizes = 3, robots - 1, 4, 2, 3, 0
+    return EntityColumns(*sizes, teammate_place=(0, 1), victim_place=(1, 2))
 
 
 def make(algorithm: str, robots: int, encoder: str = "entities", **network: object) -> ActorCritic:
@@ -44,9 +45,14 @@ def transitions(robots: int, seed: int) -> Transitions:
 
 @pytest.mark.parametrize("precision", ["float32", "bfloat16"])
 @pytest.mark.parametrize("robots", [1, 4])
-@pytest.mark.parametrize("algorithm", ["td", "ppo"])
-def test_updates_change_every_parameter(algorithm: str, robots: int, precision: str) -> None:
-    learner = make(algorithm, robots, precision=precision)
+@pytest.mark.parametrize(
+    ("algorithm", "pooling"),
+    [("td", "attention"), ("td", "nearest"), ("ppo", "attention"), ("ppo", "mean"), ("ppo", "max")],
+)
+def test_updates_change_every_parameter(
+    algorithm: str, pooling: str, robots: int, precision: str
+) -> None:
+    learner = make(algorithm, robots, precision=precision, pooling=pooling)
     before = learner.state()
     for step in range(STEPS):
         learner.observe(transitions(robots, step), torch.zeros(ENVS, dtype=torch.bool))
@@ -59,8 +65,26 @@ def test_updates_change_every_parameter(algorithm: str, robots: int, precision: 
             assert not torch.equal(tensor, before[name]), name
 
 
-def test_the_policy_heeds_no_order_of_teammates_and_victims() -> None:
-    learner = make("td", 3)
+@pytest.mark.parametrize("pooling", ["mean", "max", "nearest"])
+def test_actors_and_critics_pool_alike_and_nothing_is_kept_of_queries(pooling: str) -> None:
+    attending, learner = make("td", 3), make("td", 3, pooling=pooling)
+    parts = ("weight", "bias", "weight.exp_avg", "bias.exp_avg")
+    encoders = {"actor": ["first"], "critic": ["state_encoder", "action_encoder"]}
+    queries = {
+        f"{network}{kind}.{encoder}.query.{part}"
+        for network, of in encoders.items()
+        for encoder in of
+        for part in parts
+        for kind in (("_adam",) if part.endswith("avg") else ("",))
+    }
+    assert queries <= attending.state().keys()
+    assert not [name for name in learner.state() if name in queries or "first.query" in name]
+    assert "critic.attention.query" in learner.state()
+
+
+@pytest.mark.parametrize("pooling", ["attention", "mean", "max", "nearest"])
+def test_the_policy_heeds_no_order_of_teammates_and_victims(pooling: str) -> None:
+    learner = make("td", 3, pooling=pooling)
     own, first, second, *victims = observations(3, 0).split([3, 4, 4, 3, 3], dim=2)
     obs = torch.cat([own, first, second, *victims], dim=2)
     other = torch.cat([own, second, first, *reversed(victims)], dim=2)
@@ -77,6 +101,13 @@ def test_flat_networks_ignore_whose_the_columns_are() -> None:
     plain = TD(team, network, TDConfig(), seed=1, device=torch.device("cpu")).state()
     assert given.keys() == plain.keys()
     assert all(torch.equal(tensor, plain[name]) for name, tensor in given.items())
+
+
+def test_the_nearest_needs_places() -> None:
+    network = NetworkConfig(encoder="entities", pooling="nearest")
+    team = Team(3, columns(3).width, ACTIONS, entities=EntityColumns(3, 2, 4, 2, 3, 0))
+    with pytest.raises(ValueError, match=r"network\.pooling = 'nearest' needs the places"):
+        TD(team, network, TDConfig(), seed=1, device=torch.device("cpu"))
 
 
 @pytest.mark.parametrize("entities", [None, columns(2)])

@@ -21,6 +21,21 @@ def test_columns_are_counted() -> None:
     assert entity_columns(OWN + VICTIMS) == EntityColumns(2, 0, 0, 2, 2, 1)
 
 
+def test_columns_say_where_entities_are() -> None:
+    for preset in ("mixed", "mixed-sight"):
+        with closing(BatchEnv(preset, 1, num_threads=1)) as env:
+            names = env.observation_names()
+        found = entity_columns(names)
+        teammate = [name for name in names if name.startswith("teammate_0.")]
+        victim = [name for name in names if name.startswith("victim_0.")]
+        for place, block in ((found.teammate_place, teammate), (found.victim_place, victim)):
+            assert place is not None
+            assert [block[one].partition(".")[2] for one in place] == [
+                "relative_position.x",
+                "relative_position.y",
+            ]
+
+
 @pytest.mark.parametrize("situation", ["single", "double", "mixed"])
 @pytest.mark.parametrize("robots", [1, 2, 4])
 def test_worlds_have_such_columns(situation: str, robots: int) -> None:

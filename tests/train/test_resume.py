@@ -128,6 +128,14 @@ CASES: dict[str, dict[str, Any]] = {
         "train.stagger_starts": True,
         "scenario.communication": {"delay_steps": 1},
     },
+    "ppo-inner entities": {
+        "train.method": "ppo-inner",
+        "network.encoder": "entities",
+        "network.pooling": "nearest",
+        "network.message_width": 8,
+        "network.memory_width": 4,
+        **MEMORY,
+    },
     "two threads": {"train.method": "td-inner", "train.threads": 2},
 }
 LONG = (

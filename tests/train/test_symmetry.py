@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from innerattn.config import Communication, Fault, Obstacle, RunConfig, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
-from innerattn.learn.types import RememberingLearner
+from innerattn.learn.types import Learner, RememberingLearner
 from innerattn.nn import NUM_ELEMENTS, SquareSymmetry
 from innerattn.train.build import build_learner
 from innerattn.train.columns import vector_columns
@@ -55,6 +56,11 @@ def test_a_turned_world_gets_the_turned_actions(method: str, situation: str) -> 
     with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
         learner = build_learner(run(method, scenario), env)
         symmetry = SquareSymmetry(vector_columns(env.observation_names()), torch.device("cpu"))
+    check_turned(learner, symmetry, obs)
+
+
+def check_turned(learner: Learner, symmetry: SquareSymmetry, obs: Tensor) -> None:
+    """In turned worlds a learner takes the turned actions, and attends to the same teammates."""
     actions = learner.act(obs, greedy=True)
     assert len(actions.unique()) > 1
     weights = learner.attention(obs, actions)
@@ -66,6 +72,22 @@ def test_a_turned_world_gets_the_turned_actions(method: str, situation: str) -> 
             turned = learner.attention(there, symmetry.turn_actions(actions, element))
             assert turned is not None
             assert torch.equal(turned, weights)
+
+
+@pytest.mark.parametrize("preset", ["mixed", "mixed-sight"])
+@pytest.mark.parametrize("pooling", ["attention", "mean", "max", "nearest"])
+def test_so_it_does_however_entities_are_pooled(pooling: str, preset: str) -> None:
+    scenario = Scenario.preset(preset)
+    obs = torch.from_numpy(some_observations(scenario))
+    # A robot that rests in a corner and sees no victim looks the same in two frames.
+    obs = obs[(obs[..., 0].abs() != obs[..., 1].abs()).all(dim=1)]
+    assert len(obs) > 100
+    config = run("ppo-inner", scenario)
+    network = config.network.replace(encoder="entities", pooling=pooling)
+    with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
+        learner = build_learner(config.replace(network=network), env)
+        symmetry = SquareSymmetry(vector_columns(env.observation_names()), torch.device("cpu"))
+    check_turned(learner, symmetry, obs)
 
 
 LATE = Communication(range_m=1.2, delay_steps=2, loss=0.1)

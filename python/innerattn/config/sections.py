@@ -17,6 +17,7 @@ from innerattn.config.schedule import ScheduleConfig
 Method = Annotated[str, OneOf(methods)]
 Attention = Annotated[str, OneOf(lambda: (*attentions(), "none"))]
 WarmStart = Literal["none", "hungarian", "greedy", "planner"]
+Pooling = Literal["attention", "mean", "max", "nearest"]
 Script = Literal["none", "random", "greedy", "hungarian", "planner", "oracle", "greedy-seen"]
 
 
@@ -40,6 +41,12 @@ class NetworkConfig(Model):
         "flat",
         description="first layer of actors and critic: flat takes the whole observation; entities "
         "encodes teammates and victims separately, in any order; mappo needs flat",
+    )
+    pooling: Annotated[Pooling, ADDED_LATER] = Field(
+        "attention",
+        description="what the encoder entities makes of the teammates and of the victims that are "
+        "there: their sum with learnt weights, their mean, the largest of each number, or the "
+        "nearest one",
     )
     parameter_sharing: Literal["none", "kind"] = Field(
         "none",
@@ -88,7 +95,7 @@ class NetworkConfig(Model):
         description="numbers of the message that each robot's policy learns to send in each step "
         "to those who hear it; 0: no messages; PPO methods only",
     )
-    message_pooling: Annotated[Literal["attention", "mean", "max", "nearest"], ADDED_LATER] = Field(
+    message_pooling: Annotated[Pooling, ADDED_LATER] = Field(
         "attention",
         description="what a robot makes of the messages it hears: their sum with learnt weights, "
         "their mean, the largest of each number, or that of the nearest robot",
@@ -103,6 +110,11 @@ class NetworkConfig(Model):
             raise ValueError(
                 f"network.hidden_width = {self.hidden_width}: must be a multiple of "
                 f"network.attention_heads = {self.attention_heads}"
+            )
+        if self.pooling != "attention" and self.encoder != "entities":
+            raise ValueError(
+                f"network.pooling = {self.pooling!r}: network.encoder = {self.encoder!r} pools "
+                "nothing; must be 'attention', or the encoder 'entities'"
             )
         return self
 

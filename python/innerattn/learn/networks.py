@@ -61,7 +61,8 @@ def draw_networks(
 
     Raises:
         ValueError: `network.encoder` is "entities" and `team.entities` are not the columns of an
-            observation, or `network.parameter_sharing` is "kind" and `team.kinds` are not those of
+            observation, or lack the places that `network.pooling` = "nearest" needs, or
+            `network.parameter_sharing` is "kind" and `team.kinds` are not those of
             the team, or `network.attention` is "oracle" and `team.partners` is missing, or
             `network.message_width` is not 0 and `team.hearing` is missing, or
             `network.mask_actions` is set and `team.able` is missing.
@@ -70,10 +71,11 @@ def draw_networks(
     kinds = _kinds(team) if network.parameter_sharing == "kind" else None
     robots, obs_width, num_actions, *_ = team
     width, remembered, heard = network.hidden_width, network.memory_width, network.message_width
+    pooling = network.pooling
     sizes = robots, obs_width, team.actions.outputs, width
     actor: AnyActor
     if network.attention == "none":
-        actor = _actor(team, network, *sizes, generator, entities, heard + remembered)
+        actor = _actor(team, network, *sizes, generator, entities, heard + remembered, pooling)
         outputs = critic_outputs or num_actions
         joint = CentralCritic if network.joint_critic == "central" else JointCritic
         critic: nn.Module = joint(robots, obs_width + remembered, outputs, width, generator)
@@ -82,11 +84,19 @@ def draw_networks(
         attention = kind(width, network.attention_heads, generator)
         if isinstance(attention, OracleAttention):
             attention.partners = _partners(team)
-        actor = _actor(team, network, *sizes, generator, entities, heard + remembered)
+        actor = _actor(team, network, *sizes, generator, entities, heard + remembered, pooling)
         form = VectorCritic if team.action_width else Critic
         inputs = team.action_width or num_actions
         critic = form(
-            robots, obs_width, inputs, attention, generator, critic_outputs, entities, remembered
+            robots,
+            obs_width,
+            inputs,
+            attention,
+            generator,
+            critic_outputs,
+            entities,
+            remembered,
+            pooling,
         )
         if kinds is not None:
             share_by_kind(critic, kinds)
@@ -111,6 +121,7 @@ def draw_networks(
             generator,
             turns=network.symmetry != "none",
             entities=entities,
+            entity_pooling=pooling,
         )
         if kinds is not None:
             share_by_kind(messages, kinds)

@@ -26,6 +26,7 @@ class Actor(nn.Module):
         generator: torch.Generator,
         entities: EntityColumns | None = None,
         extra_width: int = 0,
+        pooling: str = "attention",
     ) -> None:
         """Draw the parameters.
 
@@ -37,11 +38,12 @@ class Actor(nn.Module):
             generator: Source of the initial parameters, on the CPU.
             entities: Columns of the entities to encode separately; None: encode the whole row.
             extra_width: Further columns behind the observation, which belong to the robot itself.
+            pooling: How `EntityEncoder` sums up entities.
         """
         super().__init__()
         self.num_robots = num_robots
         self.first = observation_encoder(
-            num_robots, obs_width, hidden_width, generator, entities, extra_width
+            num_robots, obs_width, hidden_width, generator, entities, extra_width, pooling
         )
         self.second = PerRobotLinear(num_robots, hidden_width, hidden_width, generator)
         self.output = PerRobotLinear(num_robots, hidden_width, num_actions, generator)

@@ -44,6 +44,7 @@ class Critic(nn.Module):
         outputs: int | None = None,
         entities: EntityColumns | None = None,
         extra_width: int = 0,
+        pooling: str = "attention",
     ) -> None:
         """Draw the parameters.
 
@@ -56,15 +57,17 @@ class Critic(nn.Module):
             outputs: Values for each robot; None: one for each own action.
             entities: Columns of the entities to encode separately; None: encode the whole row.
             extra_width: Further columns behind the observation, which belong to the robot itself.
+            pooling: How `EntityEncoder` sums up entities.
         """
         super().__init__()
         width = attention.width
         self.num_actions = num_actions
         self.state_encoder = observation_encoder(
-            num_robots, obs_width, width, generator, entities, extra_width
+            num_robots, obs_width, width, generator, entities, extra_width, pooling
         )
+        inputs = extra_width + num_actions
         self.action_encoder = observation_encoder(
-            num_robots, obs_width, width, generator, entities, extra_width + num_actions
+            num_robots, obs_width, width, generator, entities, inputs, pooling
         )
         self.attention = attention
         self.hidden = PerRobotLinear(num_robots, 2 * width, width, generator)

@@ -12,8 +12,10 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from innerattn.nn.linear import PerRobotLinear
+from innerattn.nn.pooling import equal_weights, largest, nearest_one
 
 _HEAD_WIDTH = 8
+_YES = 0.5
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,11 @@ class EntityColumns:
         victims: Number of victims, at least 1.
         victim: Columns of each victim.
         present: Index among a victim's columns of the one that is above 0.5 if there is a victim.
+        seen: Index among a teammate's columns of the one that is above 0.5 if the robot sees it;
+            None: no column says so.
+        teammate_place: Indices among a teammate's columns of x and y, relative to the robot; None:
+            there are none.
+        victim_place: The same of a victim.
     """
 
     own: int
@@ -35,6 +42,9 @@ class EntityColumns:
     victims: int
     victim: int
     present: int
+    seen: int | None = None
+    teammate_place: tuple[int, int] | None = None
+    victim_place: tuple[int, int] | None = None
 
     @property
     def width(self) -> int:
@@ -48,11 +58,23 @@ class EntityEncoder(nn.Module):
     Every robot has its own parameters, and uses the same ones for all its teammates (victims):
 
         e = phi(W_own own),  v_k = phi(W_v victim_k),  t_k = phi(W_t teammate_k)
-        y = W [e, sum_k alpha_k v_k, sum_k beta_k t_k]
+        y = W [e, pool of v_k, pool of t_k]
 
-    where alpha is the softmax over the victims present of q . v_k / sqrt(d) with q = W_q e, per
-    head, and beta likewise over teammates. The sum over no entity is zero. Every layer has a bias.
-    Inside, the batch is the last dimension, so that sums over few entities run along memory.
+    A pool is over the victims (teammates) that are there, and zero where none is:
+
+        attention: sum_k alpha_k v_k, alpha = softmax over k of q . v_k / sqrt(d), per head
+        mean:      their mean
+        max:       the largest of them, number by number
+        nearest:   that of the one nearest to the robot, the first of equally near ones
+
+    The query is q = W_q e, with another W_q for teammates than for victims.
+
+    Victims are there where their column says so, and so are teammates, if they have such a column.
+    Without it attention takes all teammates, and the other pools those with a number that is not 0:
+    all columns of a teammate are 0 where nothing is known of it.
+
+    Every layer has a bias. Inside, the batch is the last dimension, so that sums over few entities
+    run along memory.
     """
 
     def __init__(
@@ -62,6 +84,7 @@ class EntityEncoder(nn.Module):
         extra_width: int,
         out_width: int,
         generator: torch.Generator,
+        pooling: str = "attention",
     ) -> None:
         """Draw the parameters.
 
@@ -72,9 +95,19 @@ class EntityEncoder(nn.Module):
             out_width: Outputs per robot; encodings of entities have a quarter of this width, in
                 heads of 8.
             generator: Source of the initial parameters, on the CPU.
+            pooling: "attention", "mean", "max" or "nearest".
+
+        Raises:
+            ValueError: The pooling is "nearest", and no columns say where entities are.
         """
         super().__init__()
-        self._columns = columns
+        if pooling == "nearest":
+            places = [columns.victim_place] + [columns.teammate_place] * bool(columns.teammates)
+            if None in places:
+                raise ValueError(
+                    f"columns = {columns}: network.pooling = 'nearest' needs the places of entities"
+                )
+        self._columns, self._pooling = columns, pooling
         self._heads = max(1, out_width // (4 * _HEAD_WIDTH))
         width = self._heads * _HEAD_WIDTH
         pools = 2 if columns.teammates else 1
@@ -83,7 +116,9 @@ class EntityEncoder(nn.Module):
         self.teammate = None
         if columns.teammates:
             self.teammate = PerRobotLinear(num_robots, columns.teammate, width, generator)
-        self.query = PerRobotLinear(num_robots, width, pools * width, generator)
+        self.query = None
+        if pooling == "attention":
+            self.query = PerRobotLinear(num_robots, width, pools * width, generator)
         self.output = PerRobotLinear(num_robots, (1 + pools) * width, out_width, generator)
 
     def forward(self, obs: Tensor) -> Tensor:
@@ -97,46 +132,90 @@ class EntityEncoder(nn.Module):
         ]
         own, teammates, victims, extra = torch.split(obs, widths, dim=2)
         own = functional.leaky_relu_(self.own.batch_last(torch.cat([own, extra], dim=2)))
-        width = own.shape[1]
-        queries = self.query.batch_last(own.transpose(1, 2)) * _HEAD_WIDTH**-0.5
+        width, queries = own.shape[1], None
+        if self.query is not None:
+            queries = self.query.batch_last(own.transpose(1, 2)) * _HEAD_WIDTH**-0.5
         blocks = _blocks(victims, columns.victims)
-        present = blocks[..., columns.present] > 0.5
-        parts = [own, self._pool(self.victim, blocks, queries[:, :width], present)]
+        there = blocks[..., columns.present] > _YES
+        asked = None if queries is None else queries[:, :width]
+        parts = [own, self._pool(self.victim, blocks, there, columns.victim_place, asked)]
         if self.teammate is not None:
             blocks = _blocks(teammates, columns.teammates)
-            parts.append(self._pool(self.teammate, blocks, queries[:, width:], None))
+            known, place = self._known(blocks), columns.teammate_place
+            asked = None if queries is None else queries[:, width:]
+            parts.append(self._pool(self.teammate, blocks, known, place, asked))
         hidden: Tensor = self.output(torch.cat(parts, dim=1).transpose(1, 2))
         return hidden
 
+    def _known(self, teammates: Tensor) -> Tensor | None:
+        """(R, K, B) bool: which teammates (R, K, B, columns) are there; None: all are."""
+        if self._columns.seen is not None:
+            return teammates[..., self._columns.seen] > _YES
+        if self._pooling == "attention":
+            return None
+        return (teammates != 0.0).any(dim=3)
+
     def _pool(
-        self, layer: PerRobotLinear, blocks: Tensor, queries: Tensor, present: Tensor | None
+        self,
+        layer: PerRobotLinear,
+        blocks: Tensor,
+        there: Tensor | None,
+        place: tuple[int, int] | None,
+        queries: Tensor | None,
     ) -> Tensor:
-        """Attend to entities.
+        """Encode entities and sum them up.
 
         Args:
             layer: Encodes an entity.
             blocks: (R, K, B, columns), K entities.
-            queries: (R, W, B), divided by sqrt(d).
-            present: (R, K, B) bool, the entities that are there; None: all are.
+            there: (R, K, B) bool, the entities that are there; None: all are.
+            place: Columns x and y of an entity's place.
+            queries: (R, W, B), divided by sqrt(d), if the pooling is "attention".
 
         Returns:
-            (R, W, B) the weighted encodings, with heads concatenated.
+            (R, W, B).
         """
         robots, entities, batch, _ = blocks.shape
         encoded = functional.leaky_relu_(layer.batch_last(blocks.flatten(1, 2)))
-        encoded = encoded.view(robots, self._heads, _HEAD_WIDTH, entities, batch)
-        asked = queries.view(robots, self._heads, _HEAD_WIDTH, 1, batch)
-        scores = (asked * encoded).sum(dim=2)  # (R, H, K, B)
-        if present is None:
-            weights = scores.softmax(dim=2)
+        if queries is not None:
+            encoded = encoded.view(robots, self._heads, _HEAD_WIDTH, entities, batch)
+            asked = queries.view(robots, self._heads, _HEAD_WIDTH, 1, batch)
+            return _attend(encoded, asked, there).view(robots, -1, batch)
+        assert there is not None  # as only "attention" takes all
+        encoded = encoded.view(robots, -1, entities, batch)
+        if self._pooling == "max":
+            return largest(encoded, there.unsqueeze(1), dim=2)
+        if self._pooling == "nearest":
+            assert place is not None  # as checked where it was made
+            x, y = (blocks[..., axis] for axis in place)
+            weights = nearest_one(there, x.square() + y.square()).to(encoded.dtype)
         else:
-            # The lowest finite number instead of -inf avoids NaN in a world without victims; the
-            # softmax then gives equal weights, which the product sets to 0.
-            seen = present.unsqueeze(1)
-            scores = scores.masked_fill(~seen, torch.finfo(scores.dtype).min)
-            weights = scores.softmax(dim=2) * seen
-        pooled: Tensor = (weights.unsqueeze(2) * encoded).sum(dim=3)
-        return pooled.view(robots, -1, batch)
+            weights = equal_weights(there, 1, encoded.dtype)
+        return (weights.unsqueeze(1) * encoded).sum(dim=2)
+
+
+def _attend(encoded: Tensor, asked: Tensor, there: Tensor | None) -> Tensor:
+    """Attend to entities by heads.
+
+    Args:
+        encoded: (R, H, d, K, B) encodings of K entities.
+        asked: (R, H, d, 1, B) queries, divided by sqrt(d).
+        there: (R, K, B) bool, the entities that are there; None: all are.
+
+    Returns:
+        (R, H, d, B).
+    """
+    scores = (asked * encoded).sum(dim=2)  # (R, H, K, B)
+    if there is None:
+        weights = scores.softmax(dim=2)
+    else:
+        # The lowest finite number instead of -inf avoids NaN in a world without victims; the
+        # softmax then gives equal weights, which the product sets to 0.
+        seen = there.unsqueeze(1)
+        scores = scores.masked_fill(~seen, torch.finfo(scores.dtype).min)
+        weights = scores.softmax(dim=2) * seen
+    pooled: Tensor = (weights.unsqueeze(2) * encoded).sum(dim=3)
+    return pooled
 
 
 def _blocks(columns: Tensor, count: int) -> Tensor:
@@ -152,6 +231,7 @@ def observation_encoder(
     generator: torch.Generator,
     entities: EntityColumns | None,
     extra_width: int = 0,
+    pooling: str = "attention",
 ) -> PerRobotLinear | EntityEncoder:
     """A layer that maps (R, B, D + extra) to (R, B, out).
 
@@ -162,7 +242,8 @@ def observation_encoder(
         generator: Source of the initial parameters, on the CPU.
         entities: Columns of the entities to encode separately; None: encode the whole row.
         extra_width: Columns behind an observation.
+        pooling: How `EntityEncoder` sums up entities.
     """
     if entities is None:
         return PerRobotLinear(num_robots, obs_width + extra_width, out_width, generator)
-    return EntityEncoder(num_robots, entities, extra_width, out_width, generator)
+    return EntityEncoder(num_robots, entities, extra_width, out_width, generator, pooling)

@@ -97,6 +97,7 @@ class Messages(nn.Module):
         *,
         turns: bool,
         entities: EntityColumns | None = None,
+        entity_pooling: str = "attention",
     ) -> None:
         """Draw the parameters.
 
@@ -110,11 +111,14 @@ class Messages(nn.Module):
             generator: Source of the initial parameters, on the CPU.
             turns: Whether observations come in frames that may differ between robots or steps.
             entities: Columns of the entities to encode separately; None: encode the whole row.
+            entity_pooling: How `EntityEncoder` sums up entities.
         """
         super().__init__()
         self.width, self._hearing, self._turns = width, hearing, turns
         self.obs_width = obs_width
-        self.encoder = observation_encoder(num_robots, obs_width, hidden_width, generator, entities)
+        self.encoder = observation_encoder(
+            num_robots, obs_width, hidden_width, generator, entities, pooling=entity_pooling
+        )
         self.output = PerRobotLinear(num_robots, hidden_width, width, generator)
         self.query, self._pooling = None, pooling
         if pooling == "attention":

@@ -28,3 +28,18 @@ def largest(values: Tensor, there: Tensor, dim: int) -> Tensor:
     lowest = torch.finfo(values.dtype).min
     found = values.masked_fill(~there, lowest).amax(dim=dim)
     return found.masked_fill(~there.any(dim=dim), 0.0)
+
+
+def nearest_one(there: Tensor, distances: Tensor) -> Tensor:
+    """The nearest of those that are there, the first of equally near ones.
+
+    Args:
+        there: (R, K, B) bool.
+        distances: (R, K, B), or any number that grows with distance.
+
+    Returns:
+        (R, K, B) bool, of which at most one of the K is set.
+    """
+    nearest = distances.masked_fill(~there, torch.inf).argmin(dim=1, keepdim=True)
+    slots = torch.arange(there.shape[1], device=there.device).view(-1, 1)
+    return there & (slots == nearest)

@@ -52,6 +52,8 @@ def entity_columns(names: Sequence[str]) -> EntityColumns:
         victims=victims,
         victim=len(victim),
         present=victim.index("present"),
+        teammate_place=_place(teammate),
+        victim_place=_place(victim),
     )
 
 
@@ -174,6 +176,14 @@ def hearing(names: Sequence[str], delay: int) -> Hearing:
 def _teammates(names: Sequence[str]) -> list[str]:
     owners = (name.partition(".")[0] for name in names)
     return list(dict.fromkeys(owner for owner in owners if owner.startswith("teammate_")))
+
+
+def _place(quantities: list[str]) -> tuple[int, int] | None:
+    """Indices of the place of an entity with these columns, relative to the robot."""
+    axes = ("relative_position.x", "relative_position.y")
+    if not set(axes) <= set(quantities):
+        return None
+    return quantities.index(axes[0]), quantities.index(axes[1])
 
 
 def _count(owners: dict[str, list[str]], prefix: str) -> int:

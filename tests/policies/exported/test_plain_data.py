@@ -156,6 +156,7 @@ def changed(document: dict[str, Any], place: str, value: object) -> dict[str, An
         ("network.hidden_width", 4097),
         ("network.leaky_relu_slope", 1.0),
         ("network.encoder", "deep"),
+        ("network.pooling", "sum"),
         ("damping", 1.5),
         ("observe_faults", 0),
         ("run.seed", 0.5),

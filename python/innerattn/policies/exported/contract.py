@@ -126,7 +126,11 @@ class NeededAbilities:
 
 @dataclass(frozen=True)
 class Entities:
-    """Whose columns are whose: those of the robot, of each teammate, of each victim."""
+    """Whose columns are whose: those of the robot, of each teammate, of each victim.
+
+    ``present`` of a victim's columns says that it is there, ``seen`` of a teammate's, if it has
+    such a column. Places are columns x and y, for the pooling "nearest".
+    """
 
     own: int
     teammates: int
@@ -134,6 +138,9 @@ class Entities:
     victims: int
     victim: int
     present: int
+    seen: int | None = None
+    teammate_place: tuple[int, int] | None = None
+    victim_place: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -162,7 +169,10 @@ class LogStd:
 
 @dataclass(frozen=True)
 class Network:
-    """How the numbers of `weights.safetensors` make a policy; `log_std` of continuous actions."""
+    """How the numbers of `weights.safetensors` make a policy; `log_std` of continuous actions.
+
+    ``pooling`` says what the encoder "entities" makes of several entities.
+    """
 
     encoder: Literal["flat", "entities"]
     hidden_width: int
@@ -170,6 +180,7 @@ class Network:
     entities: Entities | None
     frame: FrameColumns | None
     log_std: LogStd | None = None
+    pooling: Literal["attention", "mean", "max", "nearest"] = "attention"
 
 
 @dataclass(frozen=True)
@@ -314,6 +325,9 @@ _ENTITIES = record(
     victims=_INDEX,
     victim=_INDEX,
     present=_INDEX,
+    seen=optional(_INDEX),
+    teammate_place=optional(pair(_INDEX)),
+    victim_place=optional(pair(_INDEX)),
 )
 _FRAME = record(
     FrameColumns,
@@ -331,6 +345,7 @@ _NETWORK = record(
     entities=optional(_ENTITIES),
     frame=optional(_FRAME),
     log_std=optional(record(LogStd, lowest=_NUMBER, highest=_NUMBER, shift=_NUMBER)),
+    pooling=one_of("attention", "mean", "max", "nearest"),
 )
 _CHECKED = record(
     Checked,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple
 
 import numpy as np
@@ -53,7 +53,7 @@ class NumpyActor:
             for layer in shapes
         }
         self._slope = np.float32(network.leaky_relu_slope)
-        self._entities = network.entities
+        self._entities, self._pooling = network.entities, network.pooling
         self._frame = frame
         self._log_std = network.log_std
 
@@ -84,30 +84,68 @@ class NumpyActor:
         ends = np.cumsum([columns.own, columns.teammates * columns.teammate])
         own, teammates, victims = np.split(rows, ends, axis=1)
         own = self._relu(self._linear("first.own", own))
-        queries = self._linear("first.query", own) * np.float32(_HEAD_WIDTH**-0.5)
-        width = own.shape[1]
+        both: Sequence[Array | None] = (None, None)
+        if self._pooling == "attention":
+            queries = self._linear("first.query", own) * np.float32(_HEAD_WIDTH**-0.5)
+            width = own.shape[1]
+            both = queries[:, :width], queries[:, width:]
         blocks = victims.reshape(count, columns.victims, columns.victim)
-        present = blocks[:, :, columns.present] > 0.5
-        parts = [own, self._pool("first.victim", blocks, queries[:, :width], present)]
+        there = blocks[:, :, columns.present] > 0.5
+        place = columns.victim_place
+        parts = [own, self._pool("first.victim", blocks, there, place, both[0])]
         if columns.teammates:
             blocks = teammates.reshape(count, columns.teammates, columns.teammate)
-            parts.append(self._pool("first.teammate", blocks, queries[:, width:], None))
+            known, place = self._known(blocks, columns), columns.teammate_place
+            parts.append(self._pool("first.teammate", blocks, known, place, both[1]))
         return self._linear("first.output", np.concatenate(parts, axis=1))
 
+    def _known(self, teammates: Array, columns: Entities) -> NDArray[np.bool_]:
+        """Which teammates (B, K, n) are there: (B, K)."""
+        known: NDArray[np.bool_]
+        if columns.seen is not None:
+            known = teammates[:, :, columns.seen] > 0.5
+        elif self._pooling == "attention":
+            known = np.ones(teammates.shape[:2], np.bool_)
+        else:
+            known = (teammates != 0.0).any(axis=2)
+        return known
+
     def _pool(
-        self, layer: str, blocks: Array, queries: Array, present: NDArray[np.bool_] | None
+        self,
+        layer: str,
+        blocks: Array,
+        there: NDArray[np.bool_],
+        place: tuple[int, int] | None,
+        queries: Array | None,
     ) -> Array:
-        """Attend to entities (B, K, n) with queries (B, W): (B, W)."""
+        """Sum up the entities (B, K, n) that are there (B, K), by queries (B, W): (B, W)."""
         encoded = self._relu(self._linear(layer, blocks))
-        encoded = encoded.reshape(*blocks.shape[:2], -1, _HEAD_WIDTH)
-        asked = queries.reshape(len(blocks), 1, -1, _HEAD_WIDTH)
+        if queries is not None:
+            return self._attend(encoded, there, queries)
+        seen = there[:, :, None]
+        pooled: Array
+        if self._pooling == "max":
+            largest = np.where(seen, encoded, np.finfo(np.float32).min).max(axis=1)
+            pooled = np.where(seen.any(axis=1), largest, np.float32(0.0))
+        elif self._pooling == "nearest":
+            assert place is not None  # as `layer_shapes` checks
+            x, y = (blocks[:, :, axis] for axis in place)
+            nearest = np.where(there, x * x + y * y, np.inf).argmin(axis=1)
+            rows = np.arange(len(blocks))
+            pooled = encoded[rows, nearest] * seen[rows, nearest]
+        else:
+            number = np.maximum(seen.sum(axis=1, keepdims=True), 1).astype(np.float32)
+            pooled = (seen / number * encoded).sum(axis=1)
+        return pooled
+
+    def _attend(self, encoded: Array, there: NDArray[np.bool_], queries: Array) -> Array:
+        """Attend to encodings (B, K, W)."""
+        encoded = encoded.reshape(*encoded.shape[:2], -1, _HEAD_WIDTH)
+        asked = queries.reshape(len(encoded), 1, -1, _HEAD_WIDTH)
         scores = (asked * encoded).sum(axis=3)  # (B, K, H)
-        if present is not None:
-            scores = np.where(present[:, :, None], scores, np.finfo(np.float32).min)
-        weights = _softmax(scores, axis=1)
-        if present is not None:
-            weights = weights * present[:, :, None]
-        pooled: Array = (weights[..., None] * encoded).sum(axis=1).reshape(len(blocks), -1)
+        scores = np.where(there[:, :, None], scores, np.finfo(np.float32).min)
+        weights = _softmax(scores, axis=1) * there[:, :, None]
+        pooled: Array = (weights[..., None] * encoded).sum(axis=1).reshape(len(encoded), -1)
         return pooled
 
     def _linear(self, layer: str, rows: Array) -> Array:
@@ -131,22 +169,39 @@ def layer_shapes(network: Network, width: int, outputs: int) -> dict[str, tuple[
     columns = network.entities
     if (network.encoder == "entities") != (columns is not None):
         raise ValueError("network.entities: must be there for the encoder 'entities' alone")
+    if network.pooling != "attention" and columns is None:
+        raise ValueError("network.pooling: must be 'attention' for the encoder 'flat'")
     if columns is None:
         return {"first": (hidden, width)} | rest
     of_teammates = columns.teammates * columns.teammate
     if columns.own + of_teammates + columns.victims * columns.victim != width:
         raise ValueError(f"network.entities: must have {width} columns")
+    _check_indices(columns, network.pooling)
     inside = max(1, hidden // (4 * _HEAD_WIDTH)) * _HEAD_WIDTH
     pools = 2 if columns.teammates else 1
     first = {
         "first.own": (inside, columns.own),
         "first.victim": (inside, columns.victim),
-        "first.query": (pools * inside, inside),
         "first.output": (hidden, (1 + pools) * inside),
     }
+    if network.pooling == "attention":
+        first["first.query"] = (pools * inside, inside)
     if columns.teammates:
         first["first.teammate"] = (inside, columns.teammate)
     return first | rest
+
+
+def _check_indices(columns: Entities, pooling: str) -> None:
+    """Refuse columns of an entity that it does not have."""
+    pooled = [("victim", columns.victim, [columns.present], columns.victim_place)]
+    if columns.teammates:
+        seen = [] if columns.seen is None else [columns.seen]
+        pooled.append(("teammate", columns.teammate, seen, columns.teammate_place))
+    for entity, width, flags, place in pooled:
+        if pooling == "nearest" and place is None:
+            raise ValueError(f"network.entities.{entity}_place: is missing")
+        if (last := max([*flags, *(place or ())], default=-1)) >= width:
+            raise ValueError(f"network.entities: a {entity} has {width} columns, not column {last}")
 
 
 def probabilities_of(logits: Array) -> Array:

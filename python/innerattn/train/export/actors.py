@@ -73,7 +73,9 @@ def team_actors(config: RunConfig, actor: Actor, entities: EntityColumns | None)
         of_robot = tuple(_shared_name(robot, robots) for robot in robots)
     actors = {}
     for name in dict.fromkeys(of_robot):
-        actors[name] = _of_robot(actor, of_robot.index(name), entities)
+        actors[name] = _of_robot(
+            actor, of_robot.index(name), entities, pooling=config.network.pooling
+        )
     return TeamActors(of_robot, actors)
 
 
@@ -83,11 +85,12 @@ def _shared_name(robot: Robot, team: Sequence[Robot]) -> str:
     return robot.kind if alike else f"{robot.kind}-{robot.drive}"
 
 
-def _of_robot(actor: Actor, robot: int, entities: EntityColumns | None) -> Actor:
+def _of_robot(actor: Actor, robot: int, entities: EntityColumns | None, pooling: str) -> Actor:
     num_actions, hidden_width = actor.output.weight.shape[1:]
     first = actor.first
     obs_width = first.weight.shape[2] if isinstance(first, PerRobotLinear) else 1
-    one = Actor(1, obs_width, num_actions, hidden_width, torch.Generator(), entities)
+    sizes = 1, obs_width, num_actions, hidden_width
+    one = Actor(*sizes, torch.Generator(), entities, pooling=pooling)
     theirs = _layers(actor)
     with torch.no_grad():
         for name, layer in _layers(one).items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from hashlib import sha256
 from importlib.metadata import version
 from typing import Any
@@ -68,8 +68,14 @@ def contract_document(
     scenario = config.scenario
     continuous = scenario.actions == "continuous"
     parts = asdict(network)
+    # What is not in use is left out, so that earlier versions read the contract.
     if network.log_std is None:
-        del parts["log_std"]  # so that earlier versions read the contract
+        del parts["log_std"]
+    if network.pooling == "attention":
+        del parts["pooling"]
+    if network.entities is not None:
+        known = parts["entities"]
+        parts["entities"] = {key: one for key, one in known.items() if one is not None}
     if network.frame is not None and not network.frame.rays:
         del parts["frame"]["rays"], parts["frame"]["ray_turns"]
     kind = {"action_kind": scenario.actions} if continuous else {}
@@ -188,13 +194,17 @@ def network_of(config: RunConfig, names: Sequence[str], entities: EntityColumns 
         frame = FrameColumns(
             found.vectors, found.handed, found.anchors, found.rays, found.ray_turns
         )
+    columns = None if entities is None else Entities(**asdict(entities))
+    if columns is not None and config.network.pooling != "nearest":
+        columns = replace(columns, teammate_place=None, victim_place=None)
     return Network(
         encoder=config.network.encoder,
         hidden_width=config.network.hidden_width,
         leaky_relu_slope=LEAKY_RELU_SLOPE,
-        entities=None if entities is None else Entities(**asdict(entities)),
+        entities=columns,
         frame=frame,
         log_std=_log_std() if config.scenario.actions == "continuous" else None,
+        pooling=config.network.pooling,
     )
 
 
