@@ -21,13 +21,16 @@ def test_columns_are_counted() -> None:
     assert entity_columns(OWN + VICTIMS) == EntityColumns(2, 0, 0, 2, 2, 1)
 
 
-def test_columns_say_where_entities_are() -> None:
-    for preset in ("mixed", "mixed-sight"):
+def test_columns_say_who_is_seen_and_where_limited_sight_needs_it() -> None:
+    for preset, limited in (("mixed", False), ("mixed-sight", True), ("mixed-radio", True)):
         with closing(BatchEnv(preset, 1, num_threads=1)) as env:
             names = env.observation_names()
         found = entity_columns(names)
         teammate = [name for name in names if name.startswith("teammate_0.")]
         victim = [name for name in names if name.startswith("victim_0.")]
+        assert (found.seen is not None) == limited
+        if found.seen is not None:
+            assert teammate[found.seen] == "teammate_0.seen"
         for place, block in ((found.teammate_place, teammate), (found.victim_place, victim)):
             assert place is not None
             assert [block[one].partition(".")[2] for one in place] == [

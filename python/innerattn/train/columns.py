@@ -23,7 +23,7 @@ def entity_columns(names: Sequence[str]) -> EntityColumns:
     Args:
         names: Of all columns: ``own.*``, then ``teammate_0.*``, ``teammate_1.*`` and so on, then
             ``victim_0.*`` and so on. All teammates have the same columns, and so have all victims,
-            ``victim_k.present`` among them.
+            ``victim_k.present`` among them. ``teammate_k.seen`` says whether a teammate is there.
 
     Raises:
         ConfigError: The names are not of that form; the message names the first column that is not.
@@ -52,6 +52,7 @@ def entity_columns(names: Sequence[str]) -> EntityColumns:
         victims=victims,
         victim=len(victim),
         present=victim.index("present"),
+        seen=teammate.index("seen") if "seen" in teammate else None,
         teammate_place=_place(teammate),
         victim_place=_place(victim),
     )

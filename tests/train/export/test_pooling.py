@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_export import FRAMED, made_export
 
+from innerattn.config import Scenario
 from innerattn.nn import Actor, EntityColumns
 from innerattn.policies import Exported
 from innerattn.policies.exported.contract import Entities, Network
@@ -104,14 +105,17 @@ def test_onnx_gives_the_numbers_of_the_actor(pooling: str, seen: bool) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("pooling", POOLINGS)
 def test_the_contract_says_how_a_team_pools(pooling: str, tmp_path: Path) -> None:
-    values = {**FRAMED, "network.pooling": pooling}
+    robots = [one.replace(sight_m=0.8).model_dump() for one in Scenario().robots]
+    values = {**FRAMED, "network.pooling": pooling, "scenario.robots": robots}
     _, folder = made_export(tmp_path, "ppo-inner", **values)
     contract = Exported(folder, backend="numpy").contract
     assert contract.network.pooling == pooling
     assert contract.checked is not None
     assert contract.checked.same_greedy_action == contract.checked.observations
-    entities = contract.network.entities
+    names, entities = [one.name for one in contract.observation], contract.network.entities
     assert entities is not None
+    assert entities.seen is not None
+    assert names[entities.own + entities.seen] == "teammate_0.seen"
     assert (entities.victim_place is not None) == (pooling == "nearest")
 
 
