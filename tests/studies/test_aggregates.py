@@ -1,5 +1,6 @@
 """Scores over all scenarios, and the forms that other tools read."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,24 @@ def test_places_of_grids_that_set_other_keys_stand_in_one_table() -> None:
     assert "| scenario | keys | seeds |" in table
     assert "| mixed |  | 0 |" in table
     assert "| office | hidden_width = 128, warm_start = hungarian | 0 |" in table
+
+
+def test_keys_that_follow_from_the_scenario_are_left_out() -> None:
+    values: dict[tuple[str, Length], Values] = {("score", "standard"): Values({0: 0.5}, None)}
+    found = [
+        Mean(
+            {"scenario": scenario, "train.env_steps": steps, "ppo.epochs": epochs},
+            (0,),
+            values,
+            {"standard": 25},
+        )
+        for scenario, steps in (("mixed", 100), ("mixed-8", 200))
+        for epochs in (1, 2)
+    ]
+    assert "| scenario | ppo.epochs | seeds |" in markdown(means_table(found))
+    assert "| train.env_steps | ppo.epochs | seeds |" in markdown(
+        means_table([replace(one, place=one.place | {"scenario": "mixed"}) for one in found])
+    )
 
 
 def test_algorithms_over_their_tasks() -> None:

@@ -350,9 +350,25 @@ def _set_there(place: Mapping[str, Value], keys: Sequence[str]) -> str:
 
 
 def varied_in(places: Sequence[Mapping[str, Value]]) -> list[str]:
-    """Coordinates that are not the same everywhere."""
+    """Coordinates that are not the same everywhere.
+
+    Keys of a run that all places set are left out where they follow from scenario, method, budget
+    and variant, such as a length of training for each scenario.
+    """
     keys = dict.fromkeys(key for place in places for key in place)
-    return [key for key in keys if len({place.get(key) for place in places}) > 1]
+    varied = [key for key in keys if len({place.get(key) for place in places}) > 1]
+    named = [key for key in varied if "." not in key]
+    return [key for key in varied if key in named or not _follows(key, named, places)]
+
+
+def _follows(key: str, named: Sequence[str], places: Sequence[Mapping[str, Value]]) -> bool:
+    """Whether all places set a key, and to one value where they agree in the coordinates named."""
+    if any(key not in place for place in places):
+        return False
+    agreeing: dict[tuple[Value | None, ...], set[Value]] = {}
+    for place in places:
+        agreeing.setdefault(tuple(map(place.get, named)), set()).add(place[key])
+    return all(len(values) == 1 for values in agreeing.values())
 
 
 def _dated(one: Rules) -> str:
