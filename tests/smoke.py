@@ -3,6 +3,7 @@
 It takes the extras that are there as an argument, e.g. "gym", and needs no test library.
 """
 
+import os
 import pickle
 import subprocess
 import sys
@@ -12,6 +13,24 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 EXTRAS = sys.argv[1].split(",") if len(sys.argv) > 1 else []
+SMALL = (
+    *("--train.env-steps", "1000", "--train.num-envs", "16", "--network.hidden-width", "16"),
+    *("--evaluate.episodes", "4", "--evaluate.score-episodes", "8"),
+    *("--evaluate.long-episodes", "4"),
+)
+"""Options of a training of seconds."""
+STUDY = """
+question = "Does Ray start workers?"
+[grid]
+methods = ["ppo-inner"]
+seeds = "0..1"
+train.env_steps = [1_000]
+train.num_envs = [16]
+network.hidden_width = [16]
+evaluate.episodes = [4]
+evaluate.score_episodes = [8]
+evaluate.long_episodes = [4]
+"""
 
 
 def command(*arguments: str) -> "subprocess.CompletedProcess[str]":
@@ -81,12 +100,9 @@ def views() -> None:
 
 def a_team() -> None:
     """Train, export, measure and show a team, each by the command."""
-    small = ("--train.env-steps", "1000", "--train.num-envs", "16", "--network.hidden-width", "16")
-    few = ("--evaluate.episodes", "4", "--evaluate.score-episodes", "8")
-    few += ("--evaluate.long-episodes", "4")
     with TemporaryDirectory() as folder:
         run = Path(folder) / "run"
-        calls = [("train", "--run-dir", run, "--method", "ppo-inner", *small, *few)]
+        calls = [("train", "--run-dir", run, "--method", "ppo-inner", *SMALL)]
         if "deploy" in EXTRAS:
             calls.append(("export", run))
         if "report" in EXTRAS:
@@ -126,6 +142,38 @@ def a_map_and_a_proposal() -> None:
         assert done.returncode == 0, done.stderr
 
 
+def loggers() -> None:
+    """Let each library follow a training, without a network."""
+    from innerattn.loggers import LOGGERS
+
+    with TemporaryDirectory() as folder:
+        place = Path(folder)
+        (place / "mlflow").mkdir()
+        os.environ |= {
+            "WANDB_MODE": "offline",
+            "WANDB_DIR": folder,
+            "MLFLOW_TRACKING_URI": (place / "mlflow").as_uri(),
+            "MLFLOW_ALLOW_FILE_STORE": "true",
+            "TRACKIO_DIR": str(place / "trackio"),
+        }
+        to_each = [word for name in LOGGERS for word in ("--log", name)]
+        done = command("train", "--run-dir", str(place / "run"), *to_each, *SMALL)
+        assert done.returncode == 0, done.stderr
+        for file in ("run/tensorboard/*", "wandb/offline-run-*", "mlflow/*", "trackio/*.db"):
+            assert list(place.glob(file)), (file, done.stderr)
+
+
+def workers_of_ray() -> None:
+    """Run a study by workers that Ray starts on this machine."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "study.toml"
+        file.write_text(STUDY)
+        where = ("--out", str(Path(folder) / "out"))
+        done = command("study", "run", str(file), *where, "--workers", "2", "--ray", "local")
+        assert done.returncode == 0, done.stderr
+        assert len(list(Path(folder).glob("out/runs/*/run.json"))) == 2
+
+
 def missing_views() -> None:
     said = "nothing"
     try:
@@ -148,4 +196,8 @@ if __name__ == "__main__":
         a_team()
     if {"maps", "search"} <= set(EXTRAS):
         a_map_and_a_proposal()
+    if "log" in EXTRAS:
+        loggers()
+    if "ray" in EXTRAS:
+        workers_of_ray()
     print(f"command{', views' if 'gym' in EXTRAS else ''}; import innerattn.envs: {seconds:.3f} s")
