@@ -156,8 +156,8 @@ def loggers() -> None:
             "MLFLOW_ALLOW_FILE_STORE": "true",
             "TRACKIO_DIR": str(place / "trackio"),
         }
-        to_each = [word for name in LOGGERS for word in ("--log", name)]
-        done = command("train", "--run-dir", str(place / "run"), *to_each, *SMALL)
+        own = ("--method", "ppo-inner", "--ppo.rollout-steps", "20", "--ppo.minibatch-size", "80")
+        done = command("train", "--run-dir", str(place / "run"), *own, *SMALL, "--log", *LOGGERS)
         assert done.returncode == 0, done.stderr
         for file in ("run/tensorboard/*", "wandb/offline-run-*", "mlflow/*", "trackio/*.db"):
             assert list(place.glob(file)), (file, done.stderr)
