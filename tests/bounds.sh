@@ -7,7 +7,7 @@ unset PIP_CONSTRAINT PYTHONPATH VIRTUAL_ENV
 here=$(cd "$(dirname "$0")" && pwd)
 python=$1
 wheel=$(realpath "$2")
-extras=gym,train,report,deploy,maps,search,log,ray
+extras=gym,train,report,deploy,maps,search,log,ray,torchrl
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 "$python" - "$here/../pyproject.toml" "$extras" >"$folder/bounds.txt" <<'EOF'

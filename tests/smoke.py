@@ -174,6 +174,16 @@ def workers_of_ray() -> None:
         assert len(list(Path(folder).glob("out/runs/*/run.json"))) == 2
 
 
+def the_view_of_torchrl() -> None:
+    from torchrl.envs.utils import check_env_specs
+
+    from innerattn.envs import RescueTorchRLEnv
+
+    env = RescueTorchRLEnv("mixed", 3)
+    check_env_specs(env, seed=0)
+    assert env.rollout(4).shape == (3, 4)
+
+
 def missing_views() -> None:
     said = "nothing"
     try:
@@ -198,6 +208,8 @@ if __name__ == "__main__":
         a_map_and_a_proposal()
     if "log" in EXTRAS:
         loggers()
+    if "torchrl" in EXTRAS:
+        the_view_of_torchrl()
     if "ray" in EXTRAS:
         workers_of_ray()
     print(f"command{', views' if 'gym' in EXTRAS else ''}; import innerattn.envs: {seconds:.3f} s")
