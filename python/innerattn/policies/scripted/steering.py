@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
+from innerattn.policies.exported.motion import final_speed_and_lag
 from innerattn.policies.scripted.routes import Routes
 from innerattn.policies.scripted.wheel_steering import WheelSteering
 
@@ -24,7 +25,6 @@ NEVER_S = 1e4
 """Arrival time of a robot that cannot move [s]; longer than any episode takes."""
 
 _DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], dtype=np.float64)
-_ENOUGH_PERIODS = 200  # by then a robot drives at its final speed, or the lag no longer matters
 
 
 class Steering:
@@ -54,13 +54,7 @@ class Steering:
 
     def _speed_and_lag(self, push: Array, limit: Array) -> tuple[Array, Array]:
         """Final speeds [m/s] and lags [s] of robots that gain ``push`` a period up to ``limit``."""
-        speeds = np.zeros((_ENOUGH_PERIODS, *np.shape(push)))
-        for period in range(1, _ENOUGH_PERIODS + 1):
-            before = speeds[period - 2] if period > 1 else 0.0
-            speeds[period - 1] = np.minimum(self._keep * before + push, limit)
-        final = speeds[-1]
-        shortfall = 1.0 - speeds / np.maximum(final, 1e-12)
-        return final, np.where(final > 0.0, shortfall.sum(0) * self._dt, 0.0)
+        return final_speed_and_lag(self._keep, push, limit, self._dt)
 
     def _of_cases(self, cases: Array) -> tuple[Array, Array]:
         """Final speeds and lags (C, R) of drives that are left so much, (C, R * 2).
