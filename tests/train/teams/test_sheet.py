@@ -126,3 +126,19 @@ def test_victims_are_known_when_the_first_robot_has_left() -> None:
         assert not tables.abilities[0, :2].any()
         abilities = sorted({one for robot in scenario.robots for one in robot.abilities})
         _same_victims(tables.is_victim, tables.places, tables.needs, env, abilities, 1)
+
+
+def test_who_is_not_heard_is_not_there() -> None:
+    scenario = Scenario.preset("mixed")
+    with closing(BatchEnv(scenario, 3, seed=1)) as env:
+        obs, names = as_tensor(env.reset()), env.observation_names()
+    heard = TeamSheet(scenario, names, each_sees=True).tables(obs)
+    assert heard.is_there.all()
+    silent = obs.clone()
+    silent[:, 0, [name.startswith("teammate_1.") for name in names]] = 0.0
+    tables = TeamSheet(scenario, names, each_sees=True).tables(silent)
+    expected = np.ones((12, 4), np.bool_)
+    expected[::4, 2] = False  # the first robot does not hear the third
+    np.testing.assert_array_equal(tables.is_there, expected)
+    assert not tables.abilities[::4, 2].any()
+    torch.testing.assert_close(tables.positions[1:4], heard.positions[1:4])

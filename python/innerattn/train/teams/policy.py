@@ -8,7 +8,7 @@ from torch import Tensor
 from innerattn.config import RunConfig
 from innerattn.envs import BatchEnv
 from innerattn.learn.types import Transitions
-from innerattn.nn.teams import relate
+from innerattn.nn.teams import TeamActor, relate
 from innerattn.train.teams.learner import build_team_learner
 from innerattn.train.teams.sheet import TeamSheet
 
@@ -34,6 +34,7 @@ class TeamPolicy:
         """
         self._learner = build_team_learner(config)
         self._sheet = TeamSheet(env.scenario, env.observation_names())
+        self._own_sheet = TeamSheet(env.scenario, env.observation_names(), each_sees=True)
 
     def act(self, obs: Tensor, greedy: bool = False) -> Tensor:
         """See `Learner.act`."""
@@ -44,6 +45,30 @@ class TeamPolicy:
             actions, _ = self._learner.act(relate(self._sheet.tables(part)), greedy=greedy)
             found.append(self._sheet.own_rows(actions))
         return torch.cat(found).view(worlds, robots)
+
+    @property
+    def num_robots(self) -> int:
+        """R."""
+        return self._sheet.num_robots
+
+    @property
+    def actor(self) -> TeamActor:
+        """Its network."""
+        return self._learner.actor
+
+    @torch.no_grad()
+    def own_log_probs(self, obs: Tensor) -> Tensor:
+        """Log-probabilities (E, R, 5) where each robot looks at its own row of ``obs`` (E, R, D).
+
+        `act` lets one table of a world serve all its robots while no sense can fail. Numbers then
+        differ by rounding, and the order of victims may differ that a robot reaches at once.
+        """
+        worlds, robots, _ = obs.shape
+        found = []
+        for part in torch.split(obs, max(1, _TABLES_AT_ONCE // robots)):
+            seen = relate(self._own_sheet.tables(part))
+            found.append(self._own_sheet.own_rows(self.actor(seen)))
+        return torch.cat(found).view(worlds, robots, -1)
 
     def seed_draws(self, seed: int) -> None:
         """See `Learner.seed_draws`."""

@@ -30,12 +30,20 @@ class TeamSheet:
 
     Attributes:
         num_robots: R.
-        each_sees: whether each robot acts on what it sees itself, because senses may fail. Else all
-            see the same, and one table of a world serves all.
+        each_sees: whether each robot acts on what it sees itself, because senses may fail, or as a
+            robot with a computer of its own does. Else all see the same, and one table of a world
+            serves all.
     """
 
-    def __init__(self, scenario: Scenario, names: Sequence[str]) -> None:
+    def __init__(
+        self, scenario: Scenario, names: Sequence[str], *, each_sees: bool = False
+    ) -> None:
         """Take the team from ``scenario``; ``names`` are the columns of its observations.
+
+        Args:
+            scenario: the worlds.
+            names: of the columns.
+            each_sees: let each robot act on its own row, though no sense fails.
 
         Raises:
             ConfigError: actions are continuous or set velocities, or robots have a battery or a
@@ -45,7 +53,7 @@ class TeamSheet:
             raise ConfigError("scenario.actions = 'continuous': must be 'discrete' for any team")
         refuse_stores_drives_and_senses(scenario, "policies for any team")
         self.num_robots = len(scenario.robots)
-        self.each_sees = any(fault.kind in SENSES for fault in scenario.faults)
+        self.each_sees = each_sees or any(fault.kind in SENSES for fault in scenario.faults)
         self._leave = scenario.robots_leave
         steering = Steering(scenario)
         push = [robot.drive_force_n / robot.mass_kg * scenario.dt_s for robot in scenario.robots]
@@ -108,6 +116,7 @@ class TeamSheet:
             available,
             obs[world, robot],
             positions[world, robot],
+            heard=torch.ones_like(available),
         )
 
     def _of_each(self, obs: Tensor) -> TeamTables:
@@ -121,16 +130,21 @@ class TeamSheet:
         own, velocity = rows[:, self._own_position], rows[:, self._own_velocity]
         own_can, ready = rows[:, self._own_abilities], rows[:, [self._own_available]]
         if self._mate_positions:
-            places = rows[:, self._mate_positions] + own[:, None]
-            moving = rows[:, self._mate_velocities] + velocity[:, None]
+            ways, moving = rows[:, self._mate_positions], rows[:, self._mate_velocities]
             can, others = rows[:, self._mate_abilities], rows[:, self._mate_available, None]
         else:
-            places, moving, can, others = (
-                x[:, None][:, :0] for x in (own, velocity, own_can, ready)
-            )
-        available = of_team(ready, others).squeeze(2) > 0.5
-        team = (of_team(own, places), of_team(velocity, moving), of_team(own_can, can))
-        return self._made(*team, available, rows, own)
+            ways, moving, can, others = (x[:, None][:, :0] for x in (own, velocity, own_can, ready))
+        # Of a teammate that is not heard all columns are zeros: it is as if it were not there.
+        known = torch.cat([ways, moving, can, others], 2).any(2, keepdim=True)
+        return self._made(
+            of_team(own, ways + own[:, None]),
+            of_team(velocity, moving + velocity[:, None]),
+            of_team(own_can, can),
+            of_team(ready, others).squeeze(2) > 0.5,
+            rows,
+            own,
+            heard=of_team(torch.ones_like(ready, dtype=torch.bool), known).squeeze(2),
+        )
 
     def _made(
         self,
@@ -140,13 +154,14 @@ class TeamSheet:
         available: Tensor,
         seen: Tensor,
         own: Tensor,
+        heard: Tensor,
     ) -> TeamTables:
         count, robots = positions.shape[:2]
         present = seen[:, self._present] > 0.5
         places = (seen[:, self._places] + own[:, None]) * present[..., None]
         return TeamTables(
-            is_robot=(everyone := torch.ones(count, robots, dtype=torch.bool)),
-            is_there=available if self._leave else everyone,
+            is_robot=torch.ones(count, robots, dtype=torch.bool),
+            is_there=available if self._leave else heard,
             positions=positions,
             velocities=velocities,
             bodies=self._bodies.expand(count, -1, -1),
