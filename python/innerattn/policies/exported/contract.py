@@ -31,6 +31,9 @@ WEIGHTS = "weights.safetensors"
 CONTINUOUS_OUTPUTS = 4
 """Of a policy over forces: mean x and y, then log standard deviation x and y, before tanh."""
 
+MOST_NEEDS = 8
+"""Abilities that a task may need; a policy for any team looks at all sets of them."""
+
 
 @dataclass(frozen=True)
 class Column:
@@ -168,29 +171,46 @@ class LogStd:
 
 
 @dataclass(frozen=True)
+class PairRules:
+    """What a policy for any team must know besides robots, tasks and the arena.
+
+    Attributes:
+        rescue_radius_m: how near a robot must be to help.
+        robots_leave: whether robots that are not available are not in the arena.
+        key_width: width of queries and keys, where the pooling is attention.
+    """
+
+    rescue_radius_m: float
+    robots_leave: bool
+    key_width: int
+
+
+@dataclass(frozen=True)
 class Network:
     """How the numbers of `weights.safetensors` make a policy; `log_std` of continuous actions.
 
-    ``pooling`` says what the encoder "entities" makes of several entities.
+    ``pooling`` says what the encoder "entities" makes of several entities, and "pairs" of several
+    robots at a victim. The encoder "pairs" is that of policies for any team.
     """
 
-    encoder: Literal["flat", "entities"]
+    encoder: Literal["flat", "entities", "pairs"]
     hidden_width: int
     leaky_relu_slope: float
     entities: Entities | None
     frame: FrameColumns | None
     log_std: LogStd | None = None
     pooling: Literal["attention", "mean", "max", "nearest"] = "attention"
+    pairs: PairRules | None = None
 
 
 @dataclass(frozen=True)
 class Checked:
-    """What the check at the export found."""
+    """What the check at the export found; there is no difference of what has no ONNX file."""
 
     observations: int
     same_greedy_action: int
     near_ties: int
-    largest_difference_onnx: float
+    largest_difference_onnx: float | None
     largest_difference_numpy: float
 
 
@@ -231,7 +251,7 @@ class Contract:
         stations: places [m] that charge batteries.
         depots: places [m] that refill loads.
         network: what numpy needs.
-        actors: the ONNX file of each actor.
+        actors: the ONNX file of each actor; of a policy for any team `WEIGHTS`, as it has none.
         weights_sha256: that of the tensors of `weights.safetensors`: names, types, shapes, bytes.
         files: all other files of the folder.
         checked: what the check found.
@@ -339,20 +359,25 @@ _FRAME = record(
 )
 _NETWORK = record(
     Network,
-    encoder=one_of("flat", "entities"),
+    encoder=one_of("flat", "entities", "pairs"),
     hidden_width=whole(1, 4097),
     leaky_relu_slope=number(least=0, below=1),
     entities=optional(_ENTITIES),
     frame=optional(_FRAME),
     log_std=optional(record(LogStd, lowest=_NUMBER, highest=_NUMBER, shift=_NUMBER)),
     pooling=one_of("attention", "mean", "max", "nearest"),
+    pairs=optional(
+        record(
+            PairRules, rescue_radius_m=number(least=0), robots_leave=flag, key_width=whole(1, 4097)
+        )
+    ),
 )
 _CHECKED = record(
     Checked,
     observations=_INDEX,
     same_greedy_action=whole(0),
     near_ties=whole(0),
-    largest_difference_onnx=_NUMBER,
+    largest_difference_onnx=optional(_NUMBER),
     largest_difference_numpy=_NUMBER,
 )
 _CONTRACT = record(
@@ -439,7 +464,40 @@ def _checked(document: dict[str, Any]) -> Contract:
         raise ValueError(f"files: {min(missing)} is missing")
     if unknown := {robot.actor for robot in contract.robots} - contract.actors.keys():
         raise ValueError(f"actors: {min(unknown)} is missing")
+    _check_pairs(contract)
     return contract
+
+
+def _check_pairs(contract: Contract) -> None:
+    """Refuse a policy for any team with what it does not know, and other policies with its parts.
+
+    What it refuses is what `innerattn.config.refusals` refuses of a scenario.
+    """
+    network = contract.network
+    if (network.encoder == "pairs") != (network.pairs is not None):
+        raise ValueError("network.pairs: must be there for the encoder 'pairs' alone")
+    if network.pairs is None:
+        return
+    if network.entities is not None or network.frame is not None or not contract.actions:
+        raise ValueError("network: the encoder 'pairs' needs actions, no entities and no frame")
+    if not contract.tasks:
+        raise ValueError("tasks: has 0 entries: must have at least 1 for the encoder 'pairs'")
+    for task in contract.tasks:
+        if (needed := len(set(task.needs))) > MOST_NEEDS:
+            raise ValueError(
+                f"tasks: {task.name} needs {needed} abilities: must be at most {MOST_NEEDS} for "
+                "policies for any team"
+            )
+    for key in ("observed_teammates", "observed_victims"):
+        if contract.scenario.get(key) is not None:
+            raise ValueError(f"scenario.{key}: must be None; policies for any team see everything")
+    for robot in contract.robots:
+        senses = (robot.sight_m, robot.field_of_view_deg, robot.range_sensor)
+        if robot.drive != "force" or robot.stores or any(one is not None for one in senses):
+            raise ValueError(
+                f"robots: {robot.name} must set forces, see everything and have no stores; "
+                "policies for any team know nothing else"
+            )
 
 
 def _check_member(robot: Member, actions: int) -> None:

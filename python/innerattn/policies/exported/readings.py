@@ -364,9 +364,10 @@ class RowBuilder:
             far = (squares[:, 0] + squares[:, 1]).tolist()
             order.sort(key=lambda i: (self._cannot_help[tasks[i]], far[i]))
             targets = list(range(len(tasks)))
+        ways = relative.tolist()
         for target, index in zip(targets, order):
             blocks[target, : layout.place] = self._needs[tasks[index]]
-            place_and_shares = [*relative[index], *shares[index]]
+            place_and_shares = [*ways[index], *shares[index]]
             blocks[target, layout.place : layout.place + len(place_and_shares)] = place_and_shares
         if layout.sight:
             self._write_unseen(unseen, slots, [slots[index] for index in order], blocks)

@@ -27,6 +27,7 @@ from innerattn.policies.exported.decision import (
 from innerattn.policies.exported.folder import ExportFolder, read_export
 from innerattn.policies.exported.frame import frame_of
 from innerattn.policies.exported.network import NumpyActor, probabilities_of
+from innerattn.policies.exported.pair_network import PairActor, PairLayers
 from innerattn.policies.exported.readings import RowBuilder
 from innerattn.policies.exported.tensors import tensors_in
 
@@ -46,7 +47,7 @@ class Exported:
 
     Attributes:
         contract: what ``contract.json`` says.
-        backend: what computes it, "onnxruntime" or "numpy".
+        backend: what computes it, "onnxruntime" or "numpy"; the second for any team.
         greedy: whether it takes the likeliest action instead of drawing one.
         name: method of the training.
     """
@@ -66,19 +67,29 @@ class Exported:
 
         Args:
             folder: what `innerattn export` wrote.
-            backend: "onnxruntime" or "numpy"; None: onnxruntime where it is installed.
+            backend: "onnxruntime" or "numpy"; None: onnxruntime where it is installed. Policies for
+                any team run with numpy alone.
             greedy: take the likeliest actions; None: as the contract says.
             max_age_s: how old readings may be [s]; None: as the contract says.
             seed: of the actions that are drawn.
 
         Raises:
-            ExportError: no such folder, or a file is missing, altered, or of another team.
+            ExportError: no such folder, a file is missing, altered, or of another team, or a policy
+                for any team is asked of onnxruntime.
             MissingLibraryError: onnxruntime is asked for and not installed.
             ValueError: an unknown backend, or an age that is not above 0.
         """
-        self.backend = chosen_backend(backend)
+        chosen = chosen_backend(backend)
         found = read_export(folder)
         self.contract: Contract = found.contract
+        if self.contract.network.pairs is not None:
+            if backend == "onnxruntime":
+                raise ExportError(
+                    f"{found.path}: backend = 'onnxruntime': must be 'numpy' or None; a policy for "
+                    "any team has no ONNX file"
+                )
+            chosen = "numpy"
+        self.backend = chosen
         age = self.contract.max_age_s if max_age_s is None else max_age_s
         if not 0 < age < np.inf:
             raise ValueError(f"max_age_s = {age}: must be above 0 and finite")
@@ -317,17 +328,35 @@ def _actors(found: ExportFolder, backend: Backend) -> list[Actor]:
             mark = onnx_mark(contract.weights_sha256, contract.scenario_sha256, name)
             place = str(found.path / file)
             made[name] = OnnxActor(found.files[file], place, contract, mark)
+    elif contract.network.pairs is not None:
+        return _pair_actors(found)
     else:
         tensors = tensors_in(found.files[WEIGHTS])
         for name in contract.actors:
-            frame = frame_of(contract, name)
-            own = {
-                key.removeprefix(f"{name}."): value
-                for key, value in tensors.items()
-                if key.startswith(f"{name}.")
-            }
+            frame, own = frame_of(contract, name), _tensors_of(name, tensors)
             made[name] = NumpyActor(contract.network, own, width, contract.outputs, frame)
     return [made[robot.actor] for robot in contract.robots]
+
+
+def _pair_actors(found: ExportFolder) -> list[Actor]:
+    """Those of a policy for any team: each has the same layers, and a table of its own."""
+    contract = found.contract
+    tensors = tensors_in(found.files[WEIGHTS])
+    layers = {
+        name: PairLayers(contract.network, _tensors_of(name, tensors)) for name in contract.actors
+    }
+    return [
+        PairActor(contract, number, layers[robot.actor])
+        for number, robot in enumerate(contract.robots)
+    ]
+
+
+def _tensors_of(
+    actor: str, tensors: Mapping[str, NDArray[np.float32]]
+) -> dict[str, NDArray[np.float32]]:
+    """The arrays of one actor, by the names of its layers."""
+    start = f"{actor}."
+    return {key[len(start) :]: value for key, value in tensors.items() if key.startswith(start)}
 
 
 def _refuse_not_finite(contract: Contract, actors: list[Actor]) -> None:

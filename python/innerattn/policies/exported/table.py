@@ -1,0 +1,120 @@
+"""A robot's row as a table of its team and one of its victims, for policies for any team."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from innerattn.policies.exported.contract import Contract
+from innerattn.policies.exported.layout import layout_of
+from innerattn.policies.exported.motion import final_speed_and_lag
+
+Array = NDArray[np.float32]
+
+
+class Table(NamedTuple):
+    """What one robot sees of R robots, itself first, and of the M victims that wait.
+
+    Attributes:
+        places: (2, R) float32, x and y of robots [m].
+        velocities: (2, R) float32 [m/s].
+        abilities: (R, K) float32, what robots that are available offer, else 0.
+        there: R flags, which robots are in the arena and heard.
+        victims: (2, M) float32, x and y of victims [m].
+        needs: (M, K) float32, how many robots or how much of each ability a victim needs.
+    """
+
+    places: Array
+    velocities: Array
+    abilities: Array
+    there: list[bool]
+    victims: Array
+    needs: Array
+
+
+class Bodies(NamedTuple):
+    """What is known of R robots beforehand, (R,) float32 each.
+
+    Attributes:
+        speed: final speed at full drive [m/s].
+        lag: time that a start from rest costs against it [s].
+        push: what one control period of full drive adds to the speed [m/s].
+    """
+
+    speed: Array
+    lag: Array
+    push: Array
+
+
+class TableReader:
+    """Reads the rows of one robot.
+
+    Attributes:
+        order: numbers of the robots in the contract, as rows have them: its own, then the others.
+    """
+
+    def __init__(self, contract: Contract, robot: int) -> None:
+        """Find the columns of the robot with this number.
+
+        Raises:
+            ValueError: the columns of the contract are not those of its team.
+        """
+        layout = layout_of(contract)
+        robots = len(contract.robots)
+        self.order = [robot, *(one for one in range(robots) if one != robot)]
+        # Columns of each robot's place, velocity, abilities and availability, and of each victim's
+        # presence, needs and place, as (R, 5 + K) and (V, 3 + K).
+        begin = layout.own + (robots - 1) * layout.mate
+        blocks = [0, *range(layout.own, begin, layout.mate)]
+        self._team = np.add.outer(blocks, np.arange(layout.available + 1))
+        slots = begin + np.arange(contract.victim_slots) * layout.victim
+        self._victims = np.add.outer(slots, np.arange(layout.place + 2))
+        assert contract.network.pairs is not None  # as such a policy has them
+        self._leave = contract.network.pairs.robots_leave
+
+    def table(self, row: Array) -> Table:
+        """The table of a row (D,)."""
+        team = row.take(self._team)
+        available = team[:, -1] > 0.5
+        there: list[bool] = available.tolist()
+        if not self._leave and False in there:  # nothing is known of who is not heard
+            heard: list[bool] = np.asarray(team[1:].any(axis=1)).tolist()
+            there = [True, *heard]
+        team[1:, :4] += team[0, :4]
+        victims = row.take(self._victims)
+        victims = victims.compress(victims[:, 0] > 0.5, axis=0)
+        return Table(
+            places=team[:, :2].T,
+            velocities=team[:, 2:4].T,
+            abilities=team[:, 4:-1] * available[:, None],
+            there=there,
+            victims=(victims[:, -2:] + team[0, :2]).T,
+            needs=victims[:, 1:-2],
+        )
+
+
+def bodies_of(contract: Contract, order: list[int]) -> Bodies:
+    """The bodies of robots, in an order of their numbers."""
+    robots = [contract.robots[number] for number in order]
+    dt = contract.control_period_s
+    push = np.array([robot.drive_force_n / robot.mass_kg * dt for robot in robots])
+    limit = np.array([robot.max_speed_mps for robot in robots])
+    kept = np.full(len(robots), 1.0 - contract.damping)
+    speed, lag = final_speed_and_lag(kept, push, limit, dt)
+    return Bodies(*(one.astype(np.float32) for one in (speed, lag, push)))
+
+
+def demand_of(contract: Contract) -> Array:
+    """How much of each ability a victim needs on average over the tasks, (K,) float32."""
+
+    def amount(needs: tuple[str, ...] | dict[str, float], ability: str) -> float:
+        if isinstance(needs, Mapping):
+            return needs.get(ability, 0.0)
+        return float(needs.count(ability))
+
+    tasks = contract.tasks
+    sums = [sum(amount(task.needs, one) for task in tasks) for one in contract.abilities]
+    return np.array([total / len(tasks) for total in sums], np.float32)
