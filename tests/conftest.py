@@ -115,6 +115,14 @@ def framed_team(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
+def any_team(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of ``zoo:any``, exported for five robots: ``export``; not to be changed."""
+    from team_of_any import exported  # PyTorch takes long to load what exports
+
+    return made_once(tmp_path_factory, "any_team", exported)
+
+
+@pytest.fixture(scope="session")
 def small() -> dict[str, object]:
     """Values by key for runs of a second."""
     return {

@@ -61,3 +61,32 @@ def test_a_missing_library_is_named_with_its_extra(
     assert capsys.readouterr().err == (
         f"innerattn: error: innerattn export needs {library}: pip install 'innerattn[deploy]'\n"
     )
+
+
+def test_a_policy_for_any_team_is_exported_for_the_team_of_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robots = """robots = [
+  { name = "a", kind = "a", abilities = ["see"], max_speed_mps = 1.0, mass_kg = 1.0%s },
+  { name = "b", kind = "b", abilities = ["lift"], max_speed_mps = 0.7, mass_kg = 1.2 },
+]
+tasks = [{ name = "both", needs = ["see", "lift"] }]
+situation = "single"
+"""
+    file, folder = tmp_path / "two.toml", tmp_path / "out"
+    file.write_text(robots % "")
+    words = ["export", "zoo:any", "--scenario", str(file), "-o", str(folder)]
+    assert main(words) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    lines = out.splitlines()
+    assert lines[0] == f"{folder}: 2 robots, for numpy alone, 0.1 MB"
+    assert lines[-1].startswith("largest difference: ")
+    assert lines[-1].endswith(" in numpy")
+    assert Exported(folder).robot_names == ("a", "b")
+    file.write_text(robots % ", sight_m = 0.5")
+    assert main([*words[:-1], str(tmp_path / "none")]) == 1
+    assert capsys.readouterr().err == (
+        "innerattn: error: scenario.robots[0].sight_m = 0.5: must be left out; policies for any "
+        "team see everything\n"
+    )

@@ -123,7 +123,7 @@ def numpy_alone(folder: Path) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("name", ["zoo_team", "framed_team"])
+@pytest.mark.parametrize("name", ["zoo_team", "framed_team", "any_team"])
 def test_a_team_acts_as_with_the_whole_package(
     request: pytest.FixtureRequest, installed: Path, tmp_path: Path, name: str
 ) -> None:
@@ -144,11 +144,12 @@ OLD = os.environ.get("INNERATTN_OLD_PYTHON")
 
 
 @pytest.mark.skipif(OLD is None, reason="INNERATTN_OLD_PYTHON names no Python 3.9 with numpy")
+@pytest.mark.parametrize("name", ["zoo_team", "any_team"])
 def test_a_team_acts_the_same_in_an_old_python(
-    zoo_team: Path, installed: Path, tmp_path: Path
+    request: pytest.FixtureRequest, installed: Path, tmp_path: Path, name: str
 ) -> None:
     assert OLD is not None
-    export = zoo_team / "export"
+    export = request.getfixturevalue(name) / "export"
     code = "import numpy, os, sys; print(os.path.dirname(os.path.dirname(numpy.__file__)))"
     asked = subprocess.run([OLD, "-I", "-c", code], capture_output=True, text=True, check=True)
     obs = random_observations(export)

@@ -164,8 +164,9 @@ BRIEF: Mapping[str, Brief] = {
         (
             ("RUN", "a run with weights: folder, latest, zoo:NAME, or how a name begins"),
             ("-o, --output FOLDER", "folder to make (export in the run's folder)"),
+            ("--scenario FILE", "the team that a policy for any team serves (that of the run)"),
         ),
-        ("latest", "zoo:mixed -o team"),
+        ("latest", "zoo:mixed -o team", "zoo:any --scenario my_team.toml -o team"),
     ),
     "seal": Brief(
         "RUN ...",

@@ -1,4 +1,4 @@
-"""`innerattn export`: a trained team as ONNX files and a contract, for robots."""
+"""`innerattn export`: a trained team as files and a contract, for robots."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import tyro
 
 from innerattn.cli.options import Command, UsageError
 from innerattn.cli.runs import existing_run
+from innerattn.config import Scenario
 from innerattn.policies import SCRIPTS
 from innerattn.zoo import in_zoo
 
@@ -22,6 +23,8 @@ class Export(Command):
     """A run's folder or name."""
     output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """Folder to make; None: export in the run's folder."""
+    scenario: Path | None = None
+    """TOML file with the team that a policy for any team is to serve; None: that of the run."""
 
     def run(self) -> int:
         """Export, check, print.
@@ -43,13 +46,16 @@ class Export(Command):
             raise UsageError(f"{self.run_folder}: -o FOLDER must say where to write")
         from innerattn.train.export import export_run
 
-        folder, contract = export_run(run, self.output)
+        worlds = None if self.scenario is None else Scenario.from_toml(self.scenario)
+        folder, contract = export_run(run, self.output, worlds)
         checked = contract.checked
         assert checked is not None  # as export_run always checks
         robots, actors = len(contract.robots), len(contract.actors)
         size = sum(entry.bytes for entry in contract.files.values()) / 1e6
         frame = "as the world is" if contract.network.frame is None else "canonical, in the files"
-        print(f"{folder}: {robots} robots, {actors} ONNX files, {size:.1f} MB")
+        has_onnx = contract.network.pairs is None
+        files = f"{actors} ONNX files" if has_onnx else "for numpy alone"
+        print(f"{folder}: {robots} robots, {files}, {size:.1f} MB")
         print(f"observation: {len(contract.observation)} columns; frame: {frame}")
         print(f"control period: {contract.control_period_s:g} s")
         ties = f", {checked.near_ties:,} near ties" if checked.near_ties else ""
@@ -57,8 +63,8 @@ class Export(Command):
             f"checked on {checked.observations:,} played observations: same greedy action in "
             f"{checked.same_greedy_action:,}{ties}"
         )
-        print(
-            f"largest difference: {checked.largest_difference_onnx:.1e} in onnxruntime, "
-            f"{checked.largest_difference_numpy:.1e} in numpy"
-        )
+        differences = [("onnxruntime", checked.largest_difference_onnx)]
+        differences.append(("numpy", checked.largest_difference_numpy))
+        said = [f"{one:.1e} in {name}" for name, one in differences if one is not None]
+        print(f"largest difference: {', '.join(said)}")
         return 0

@@ -91,9 +91,33 @@ _ABOUT_FIRST = {
 }
 
 
-def about(scenario: Scenario) -> dict[str, str]:
-    """The rules by subject: those of every team, and those of what this one has."""
+_ABOUT_ANY = {
+    "frames": "World frame: origin in the centre of the arena, x and y along its walls, metres. "
+    "relative_* columns are differences in axes of the world frame; nothing is rotated with the "
+    "robot's heading. Rows and actions are in this frame.",
+    "any_team": "One policy acts for every robot, and there is no ONNX file: numpy computes it. A "
+    "robot reads its row as a table of robots and victims. A teammate tells its position, velocity "
+    "and availability; its abilities come with its columns, and max_speed_mps, mass_kg and "
+    "drive_force_n of all robots from `robots`. The policy does not see faults, services, "
+    "deadlines, the order of tasks and obstacles.",
+    "not_heard": "All columns of a teammate that is not heard are zeros, its abilities and "
+    "availability too. A message older than max_age_s counts as not heard. The robot then acts as "
+    "in a team without that teammate. One that has left for good is never heard.",
+    "probabilities": "The policy gives their logarithms. With greedy_actions the likeliest action "
+    "is taken, else one is drawn.",
+}
+
+
+def about(scenario: Scenario, *, for_any_team: bool = False) -> dict[str, str]:
+    """The rules by subject: those of every team, and those of what this one has.
+
+    Args:
+        scenario: the worlds.
+        for_any_team: whether the policy is one for any team.
+    """
     found = _ABOUT_FORCES if scenario.actions == "continuous" else _ABOUT
+    if for_any_team:
+        found = found | _ABOUT_ANY
     if scenario.has_wheels:
         found = found | _ABOUT_WHEELS
     if any(robot.range_sensor is not None for robot in scenario.robots):

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from hashlib import sha256
 from importlib.metadata import version
-from typing import Any
+from typing import Any, Literal
 
 from innerattn.config import Robot, RunConfig, Scenario
+from innerattn.config.team import TeamConfig
 from innerattn.nn import EntityColumns
 from innerattn.nn.actions import LOG_STD_RANGE, LOG_STD_SHIFT
 from innerattn.policies.exported.contract import (
@@ -19,6 +20,7 @@ from innerattn.policies.exported.contract import (
     FrameColumns,
     LogStd,
     Network,
+    PairRules,
     digest_of,
 )
 from innerattn.policies.exported.frame import Frame
@@ -60,7 +62,7 @@ def contract_document(
         names: of the columns of an observation.
         network: what numpy needs to know of the actors.
         of_robot: name of the actor of each robot.
-        actors: the ONNX file of each actor.
+        actors: the file of each actor, as of `Contract`.
         weights_sha256: digest of the tensors for numpy.
         run: where the team comes from.
         files: the bytes of each file beside the contract.
@@ -73,6 +75,8 @@ def contract_document(
         del parts["log_std"]
     if network.pooling == "attention":
         del parts["pooling"]
+    if network.pairs is None:
+        del parts["pairs"]
     if network.entities is not None:
         known = parts["entities"]
         parts["entities"] = {key: one for key, one in known.items() if one is not None}
@@ -80,15 +84,14 @@ def contract_document(
         del parts["frame"]["rays"], parts["frame"]["ray_turns"]
     kind = {"action_kind": scenario.actions} if continuous else {}
     forces = () if continuous else _FORCES
+    libraries = ["innerattn", "torch", *(("onnx", "onnxscript") if network.pairs is None else ())]
     worlds = scenario.model_dump(mode="json")
     return _plain(
         {
             "format": FORMAT,
             "version": VERSION,
-            "about": about(scenario),
-            "made_with": {
-                name: version(name) for name in ("innerattn", "torch", "onnx", "onnxscript")
-            },
+            "about": about(scenario, for_any_team=network.pairs is not None),
+            "made_with": {name: version(name) for name in libraries},
             "run": dict(run),
             "scenario": worlds,
             "scenario_sha256": digest_of(worlds),
@@ -188,6 +191,8 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def network_of(config: RunConfig, names: Sequence[str], entities: EntityColumns | None) -> Network:
     """What numpy needs to know of the actors."""
+    if isinstance(config.algorithm, TeamConfig):
+        return _pairs_network(config.algorithm, config.scenario)
     frame = None
     if config.network.symmetry == "canonical":
         found = turning_columns(config.scenario, names)
@@ -205,6 +210,28 @@ def network_of(config: RunConfig, names: Sequence[str], entities: EntityColumns 
         frame=frame,
         log_std=_log_std() if config.scenario.actions == "continuous" else None,
         pooling=config.network.pooling,
+    )
+
+
+_POOLINGS: Mapping[str, Literal["attention", "mean", "max", "nearest"]] = {
+    "inner": "attention",
+    "uniform": "mean",
+    "max": "max",
+    "nearest": "nearest",
+}
+"""What the poolings of policies for any team are called in a contract."""
+
+
+def _pairs_network(team: TeamConfig, scenario: Scenario) -> Network:
+    """That of a policy for any team, in these worlds."""
+    return Network(
+        encoder="pairs",
+        hidden_width=team.hidden_width,
+        leaky_relu_slope=0.0,
+        entities=None,
+        frame=None,
+        pooling=_POOLINGS[team.pooling],
+        pairs=PairRules(scenario.rescue_radius_m, scenario.robots_leave, team.key_width),
     )
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
-from innerattn.config import RunConfig
+from innerattn.config import RunConfig, Scenario
 from innerattn.config.files import sync_folder, write_whole
 from innerattn.envs import BatchEnv
 from innerattn.errors import ExportError, MissingLibraryError, missing_library
@@ -19,6 +21,7 @@ from innerattn.policies.exported.backend import onnx_mark
 from innerattn.policies.exported.contract import (
     NAME,
     WEIGHTS,
+    Checked,
     Contract,
     contract_in,
     contract_text,
@@ -26,15 +29,19 @@ from innerattn.policies.exported.contract import (
 )
 from innerattn.policies.exported.team import Exported
 from innerattn.records.run_files import RunFiles, amend
+from innerattn.records.run_folder import config_of
 from innerattn.train.columns import entity_columns
 from innerattn.train.export.actors import OnnxForm, OnnxVectorForm, inner_actor, team_actors
-from innerattn.train.export.check import check_export
+from innerattn.train.export.check import check_export, check_pairs
 from innerattn.train.export.document import contract_document, frame_in, network_of
 from innerattn.train.export.onnx_file import onnx_files
-from innerattn.train.policy import load_newest
+from innerattn.train.policy import NewestPolicy, load_newest
+from innerattn.train.teams.policy import TeamPolicy
 from innerattn.train.weights import write_weights
 
 FORMAT = "innerattn.actors"
+ANY = "any"
+"""Name of the actor that serves any team."""
 _LIBRARIES = ("onnx", "onnxscript", "onnxruntime")
 
 
@@ -52,12 +59,16 @@ def needed_libraries() -> None:
             raise missing
 
 
-def export_run(run: str | Path, out: str | Path | None = None) -> tuple[Path, Contract]:
+def export_run(
+    run: str | Path, out: str | Path | None = None, scenario: Scenario | None = None
+) -> tuple[Path, Contract]:
     """Export the newest policy of a run, and check it on observations that it plays.
 
     Args:
         run: the run folder.
         out: the folder to make; None: ``export`` in the run folder.
+        scenario: the worlds of the team that a policy for any team is to serve; None: those of the
+            run.
 
     Returns:
         The folder, and its contract.
@@ -65,22 +76,37 @@ def export_run(run: str | Path, out: str | Path | None = None) -> tuple[Path, Co
     Raises:
         MissingLibraryError: a library of the extra ``deploy`` is not installed.
         ExportError: the folder is already there or cannot be made, the run's policy is not one of
-            this package, or the exported one differs from it.
-        RunError, ConfigError: there is no readable run, or it holds no weights.
+            this package, it is for one team and ``scenario`` is given, or the exported one differs
+            from it.
+        RunError, ConfigError: there is no readable run, it holds no weights, or a policy for any
+            team does not know what ``scenario`` has.
         OSError: the run's manifest cannot be written.
     """
-    needed_libraries()
     source = Path(run)
     target = source / "export" if out is None else Path(out)
     if os.path.lexists(target):
         raise ExportError(f"{target}: is already there; -o names another folder")
-    newest = load_newest(source)
+    config = config_of(RunFiles(source))
+    if not config.algorithm.for_any_team:
+        needed_libraries()
+        if scenario is not None:
+            raise ExportError(
+                f"{run}: method {config.train.method!r} is of one team: it cannot be exported for "
+                "another scenario, as policies for any team can"
+            )
+    newest = load_newest(source, scenario=scenario)
     if not target.parent.is_dir():
         raise ExportError(f"{target.parent}: no such folder")
     partial = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(8)}")
     try:
         partial.mkdir()
-        contract = _write(source, newest.config, newest.learner, newest.env_steps, partial)
+        made_by = _origin_of(source, newest)
+        if isinstance(newest.learner, TeamPolicy):
+            worlds = newest.config.scenario if scenario is None else scenario
+            team = newest.config.model_copy(update={"scenario": worlds})
+            contract = _write_pairs(team, newest.learner, made_by, partial)
+        else:
+            contract = _write(source, newest.config, newest.learner, made_by, partial)
         os.rename(partial, target)
     except BaseException as error:
         shutil.rmtree(partial, ignore_errors=True)
@@ -93,7 +119,54 @@ def export_run(run: str | Path, out: str | Path | None = None) -> tuple[Path, Co
     return target, contract
 
 
-def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: Path) -> Contract:
+def _origin_of(run: Path, newest: NewestPolicy) -> dict[str, str | int | None]:
+    """Where an exported policy comes from."""
+    return {
+        "method": newest.config.train.method,
+        "seed": newest.config.train.seed,
+        "env_steps": newest.env_steps,
+        "config_sha256": newest.config.digest(),
+        "weights_sha256": RunFiles(run).info.weights_sha256,
+    }
+
+
+def _write_pairs(
+    config: RunConfig, policy: TeamPolicy, made_by: Mapping[str, str | int | None], out: Path
+) -> Contract:
+    """Fill a folder with a policy for any team, for the team of ``config``, and check it."""
+    with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
+        names = env.observation_names()
+    tensors = {f"{ANY}.{name}": one.detach() for name, one in policy.actor.state_dict().items()}
+    weights_sha256 = write_weights(out / WEIGHTS, tensors, FORMAT)
+    document = contract_document(
+        config,
+        names,
+        network_of(config, names, None),
+        of_robot=[ANY] * len(config.scenario.robots),
+        actors={ANY: WEIGHTS},
+        weights_sha256=weights_sha256,
+        run=made_by,
+        files={WEIGHTS: (out / WEIGHTS).read_bytes()},
+    )
+    write_whole(out / NAME, contract_text(document))
+    checked = check_pairs(config.scenario, policy, Exported(out, backend="numpy"))
+    return _sealed(document, checked, out)
+
+
+def _sealed(document: dict[str, Any], checked: Checked, out: Path) -> Contract:
+    """Write the contract once more, with what the check found."""
+    data = contract_text({**document, "checked": asdict(checked)})
+    write_whole(out / NAME, data)
+    return contract_in(data)
+
+
+def _write(
+    run: Path,
+    config: RunConfig,
+    learner: Learner,
+    made_by: Mapping[str, str | int | None],
+    out: Path,
+) -> Contract:
     """Fill a folder, and check what is in it."""
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         names = env.observation_names()
@@ -133,18 +206,9 @@ def _write(run: Path, config: RunConfig, learner: Learner, env_steps: int, out: 
         of_robot=team.of_robot,
         actors=files,
         weights_sha256=weights_sha256,
-        run={
-            "method": config.train.method,
-            "seed": config.train.seed,
-            "env_steps": env_steps,
-            "config_sha256": config.digest(),
-            "weights_sha256": RunFiles(run).info.weights_sha256,
-        },
+        run=made_by,
         files={name: (out / name).read_bytes() for name in (WEIGHTS, *files.values())},
     )
     write_whole(out / NAME, contract_text(document))
     onnx, plain = Exported(out, backend="onnxruntime"), Exported(out, backend="numpy")
-    checked = check_export(config, learner, actor, onnx, plain)
-    data = contract_text({**document, "checked": asdict(checked)})
-    write_whole(out / NAME, data)
-    return contract_in(data)
+    return _sealed(document, check_export(config, learner, actor, onnx, plain), out)
