@@ -26,7 +26,7 @@ from page import machine, publish, table
 from innerattn.policies.exported import Exported
 
 PAGE = Path(__file__).parents[1] / "docs" / "deployment.md"
-TEAMS = ("zoo:mixed", "zoo:mixed-16")
+TEAMS = ("zoo:mixed", "zoo:mixed-16", "zoo:any")
 RUNS, ROUNDS, CALLS = 3, 400, 20
 HEAD = ["team", "robots", "backend", "given", "clock [µs]", "core [µs]"]
 
@@ -67,7 +67,9 @@ def rows_of(team: str) -> list[list[str]]:
 def costs(export: Path) -> list[tuple[str, str, float, float]]:
     """Backend, what is given, and the two times of a call [µs], for all pairs of the first two."""
     found = []
-    for backend in ("onnxruntime", "numpy"):
+    contract = Exported(export, backend=None).contract
+    has_onnx = any(name.endswith(".onnx") for name in contract.files)
+    for backend in ("onnxruntime", "numpy") if has_onnx else ("numpy",):
         team = Exported(export, backend=backend)
         robot, *others = team.robot_names
         body = {"position": (0.1, 0.2), "velocity": (0.0, 0.3), "time": 1.0}
