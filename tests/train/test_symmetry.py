@@ -9,7 +9,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from innerattn.config import Communication, Fault, Obstacle, RunConfig, Scenario
+from innerattn.config import Arrival, Communication, Fault, Obstacle, RunConfig, Scenario
+from innerattn.config.turning import turning_hindrance
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
 from innerattn.learn.types import Learner, RememberingLearner
@@ -209,6 +210,49 @@ def test_places_that_break_the_symmetry_are_refused(key: str, changes: dict[str,
 )
 def test_squares_around_the_centre_are_not(changes: dict[str, object]) -> None:
     scenario = Scenario().replace(**changes)
+    with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
+        build_learner(run("td-inner", scenario), env)
+
+
+SQUARE = [(x, y) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
+OCTAGON = [(x, y) for a in (-0.5, 0.5) for b in (-0.2, 0.2) for x, y in ((a, b), (b, a))]
+
+
+def listed(places: list[tuple[float, float]], at_s: float = 1.0) -> Scenario:
+    arrivals = [Arrival(at_s=at_s, task="task_1", position_m=place) for place in places]
+    return Scenario(situation="listed", max_victims=8, arrivals=arrivals)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "lonely"),
+    [
+        (listed([(0.5, 0.0)]), 0),
+        (listed([(0.5, 0.5), (-0.5, -0.5)]), 0),
+        (listed([(0.0, 0.0), *OCTAGON[1:]]), 1),
+        (listed([*SQUARE, SQUARE[0]]), 0),
+    ],
+)
+def test_lists_of_arrivals_that_break_the_symmetry_are_refused(
+    scenario: Scenario, lonely: int
+) -> None:
+    with (
+        closing(BatchEnv(scenario, 1, num_threads=1)) as env,
+        pytest.raises(ConfigError, match=rf"arrivals\[{lonely}\]\.position_m: network\.symmetry"),
+    ):
+        build_learner(run("td-inner", scenario), env)
+
+
+def test_places_of_other_times_and_tasks_are_no_images() -> None:
+    ones = listed(SQUARE).arrivals
+    late, other = ones[3].replace(at_s=2.0), ones[3].replace(task="task_2")
+    for last in (late, other):
+        scenario = listed(SQUARE).replace(arrivals=(*ones[:3], last))
+        assert turning_hindrance(scenario) is not None
+
+
+@pytest.mark.parametrize("places", [[(0.0, 0.0)], SQUARE, OCTAGON, SQUARE * 2])
+def test_lists_whose_places_map_onto_each_other_are_not(places: list[tuple[float, float]]) -> None:
+    scenario = listed(places)
     with closing(BatchEnv(scenario, 1, num_threads=1)) as env:
         build_learner(run("td-inner", scenario), env)
 

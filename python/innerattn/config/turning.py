@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+
 from innerattn.config.range_sensor import RangeSensor
 from innerattn.config.run import RunConfig
 from innerattn.config.scenario import Robot, Scenario
+from innerattn.config.task import Arrival
 from innerattn.errors import ConfigError
 
 
@@ -65,11 +69,31 @@ def _place(scenario: Scenario) -> tuple[str, str] | None:
             return f"robots[{index}].start_m", "a robot has a fixed start"
     if scenario.victim_places_m:
         return "victim_places_m", "victims have fixed places"
+    lonely = _first_without_images(scenario.arrivals)
+    if lonely is not None:
+        what = "a victim arrives at a place alone, not at all that turns and mirrors make of it"
+        return f"arrivals[{lonely}].position_m", what
     for index, task in enumerate(scenario.tasks):
         x_low, y_low, x_high, y_high = scenario.area_of(task)
         if len({-x_low, -y_low, x_high, y_high}) > 1:
             key = "victim_area_m" if task.area_m is None else f"tasks[{index}].area_m"
             return key, "the area is no square around the centre"
+    return None
+
+
+def _first_without_images(arrivals: Sequence[Arrival]) -> int | None:
+    """Index of the first arrival that a turned or mirrored world would not have; None: no such."""
+    each = Counter((one.at_s, one.task, *one.position_m) for one in arrivals)
+    for index, one in enumerate(arrivals):
+        x, y = one.position_m
+        images = {
+            (one.at_s, one.task, *image)
+            for across in (x, -x)
+            for up in (y, -y)
+            for image in ((across, up), (up, across))
+        }
+        if len({each[image] for image in images}) > 1:
+            return index
     return None
 
 
