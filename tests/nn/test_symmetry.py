@@ -126,3 +126,16 @@ def test_columns_that_are_none_are_refused() -> None:
         SquareSymmetry(VectorColumns(2, ((0, 1),), (), ()), CPU)
     with pytest.raises(ValueError, match=r"columns in 0\.\.1"):
         SquareSymmetry(VectorColumns(2, ((0, 2),), (), ((0, 2),)), CPU)
+
+
+def test_the_first_anchor_decides_however_many_follow() -> None:
+    """As in a team of 64 whose teammates all lie on one side of a robot in a corner."""
+    pairs = tuple((2 * k, 2 * k + 1) for k in range(97))
+    symmetry = SquareSymmetry(VectorColumns(194, pairs, (), pairs), CPU)
+    row = torch.full((1, 194), 0.25)
+    row[0, :2] = -0.75
+    row[0, 2], row[0, 3::2] = 0.5, 0.75
+    for element in range(NUM_ELEMENTS):
+        there = symmetry.turn(row, torch.tensor([element]))
+        form = symmetry.turn(there, symmetry.frame(there))[0]
+        assert form[:4].tolist() == [0.75, 0.75, -0.5, -0.75]

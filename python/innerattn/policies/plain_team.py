@@ -167,12 +167,15 @@ def frame_columns(names: Sequence[str]) -> FrameColumns:
     place = {name: column for column, name in enumerate(names)}
     stems = [name.removesuffix(".x") for name in names if name.endswith(".x")]
     pairs = {stem: (place[f"{stem}.x"], place[f"{stem}.y"]) for stem in stems}
-    own = [stem for stem in ("own.position", "own.velocity") if stem in pairs]
-    anchors = [stem for stem in stems if stem.startswith("victim_")] + own
+    anchors = [stem for stem in stems if stem.startswith("victim_")]
+    anchors += ["own.position", "own.velocity"]
+    if "teammate_0.seen" in place:
+        teammates = [stem for stem in stems if stem.startswith("teammate_")]
+        anchors += ["own.heading", *(stem for stem in teammates if stem.endswith("_position"))]
     return FrameColumns(
         vectors=tuple(pairs.values()),
         handed=tuple(place[name] for name in names if name.endswith(_HANDED)),
-        anchors=tuple(pairs[stem] for stem in anchors),
+        anchors=tuple(pairs[stem] for stem in anchors if stem in pairs),
     )
 
 

@@ -64,6 +64,8 @@ def vector_columns(
     """Columns that turn with the world: pairs ``*.x`` and ``*.y``, angles, and ways to the left.
 
     Victims choose the frame, in the order of their slots; then the robot's own place and velocity.
+    Where sight is limited, a robot may see no victim: then its heading and its teammates' places
+    follow.
 
     Args:
         names: Of all columns.
@@ -81,13 +83,16 @@ def vector_columns(
             f"a column .y for every column .x; {(missing or ['own.position'])[0]} lacks it"
         )
     pairs = {stem: (place[f"{stem}.x"], place[f"{stem}.y"]) for stem in stems}
-    anchors = [pairs[stem] for stem in stems if stem.startswith("victim_")]
-    anchors += [pairs[stem] for stem in ("own.position", "own.velocity") if stem in pairs]
+    anchors = [stem for stem in stems if stem.startswith("victim_")]
+    anchors += ["own.position", "own.velocity"]
+    if "teammate_0.seen" in place:
+        teammates = [stem for stem in stems if stem.startswith("teammate_")]
+        anchors += ["own.heading", *(stem for stem in teammates if stem.endswith("_position"))]
     return VectorColumns(
         width=len(names),
         vectors=tuple(pairs.values()),
         handed=tuple(place[name] for name in names if name.endswith(_HANDED)),
-        anchors=tuple(anchors),
+        anchors=tuple(pairs[stem] for stem in anchors if stem in pairs),
         rays=tuple(place[name] for name in names if name.startswith("own.ray.")),
         ray_turns=ray_turns,
     )
