@@ -7,12 +7,13 @@ import pytest
 from gymnasium.error import ResetNeeded
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Wedge
+from matplotlib.patches import Arc, Wedge
 from numpy.typing import NDArray
 
 from innerattn.config import Obstacle, Scenario
 from innerattn.envs import parallel_env
 from innerattn.envs.render import draw_world, paint_figure
+from innerattn.envs.victims import victim_dtype
 
 VICTIM = np.dtype([("present", "i1"), ("task", "i1"), ("x", "f4"), ("y", "f4")])
 PLACES = np.array([[-0.7, -0.7], [0.7, -0.7], [-0.7, 0.7], [0.7, 0.7]], np.float32)
@@ -132,6 +133,51 @@ def test_sight_is_drawn_as_far_and_as_wide_as_it_is() -> None:
     assert len({one.get_facecolor()[:3] for one in (fan, circle)}) == 2
     paint_figure(figure := Figure(), plain, PLACES, *rest)
     assert not [one for one in figure.axes[0].patches if isinstance(one, Wedge)]
+
+
+def test_services_and_deadlines_are_drawn() -> None:
+    scenario = Scenario(
+        tasks=[one.replace(service_s=2.0, deadline_s=9.0) for one in Scenario().tasks]
+    )
+    victims = np.zeros(3, victim_dtype(scenario))
+    victims["present"] = True, True, False
+    victims["x"], victims["y"] = (0.25, 0.5, 0.0), (-0.5, 0.5, 0.0)
+    victims["served"], victims["deadline_step"] = (0.25, 0.0, 0.5), (37, -1, 37)
+    world = PLACES, np.zeros_like(PLACES), victims, np.zeros((0, 2), np.float32)
+    for step, said in ((12, ["2.5 s"]), (12.25, ["2.5 s"]), (40, ["0.0 s"]), (None, [])):
+        figure = Figure()
+        paint_figure(figure, scenario, *world, step=step)
+        (axes,) = figure.axes
+        (arc,) = (one for one in axes.patches if isinstance(one, Arc))
+        assert (arc.center, arc.theta1, arc.theta2) == ((0.25, -0.5), 0.0, 90.0)
+        texts = {one.get_text(): one.xy for one in axes.texts if one.get_text().endswith(" s")}
+        assert texts == dict.fromkeys(said, (0.25, -0.5))
+        names = [text.get_text() for text in figure.legends[0].get_texts()]
+        assert "share of\nservice done" in names
+        assert ("time until\nit is lost" in names) == (step is not None)
+
+
+def test_worlds_without_them_name_neither() -> None:
+    figure, victims = Figure(), np.array([(1, 0, 0.0, 0.0)], VICTIM)
+    still, none = np.zeros_like(PLACES), np.zeros((0, 2), np.float32)
+    paint_figure(figure, Scenario(), PLACES, still, victims, none, step=3)
+    names = " ".join(text.get_text() for text in figure.legends[0].get_texts())
+    assert "service" not in names
+    assert "lost" not in names
+
+
+def test_the_environment_says_how_long_victims_wait() -> None:
+    tasks = [one.replace(deadline_s=5.0) for one in Scenario().tasks]
+    pictures = []
+    for scenario in (Scenario(), Scenario(tasks=tasks)):
+        env = parallel_env(scenario, render_mode="rgb_array")
+        env.reset(seed=0)
+        for _ in range(2):
+            env.step(dict.fromkeys(env.agents, 0))
+            pictures.append(env.render()[60:540, 80:580].astype(int))
+    inside = [int((one != pictures[0]).any(-1).sum()) for one in pictures]
+    assert inside[1] == 0
+    assert 20 < inside[2] != inside[3] > 20
 
 
 def test_layers_are_told_apart_with_a_legend() -> None:

@@ -23,6 +23,8 @@ _VICTIM_COLOUR = "#D55E00"
 _TASK_MARKERS = "*XDP^v"
 _EDGES = ("-", "--", ":", "-.")  # of robots, by their layer
 _LETTER_PT = (4.9, 10.0)  # width and height of a letter of a robot's name, with its halo
+_SERVED, _TIME_LEFT = "share of\nservice done", "time until\nit is lost"
+_SERVICE_REACH = 0.06  # radius of the arc of a service, of the arena's half width
 _ARROW_S = 0.2  # an arrow's tip is where the robot would be after so many seconds
 
 
@@ -34,6 +36,7 @@ def draw_world(
     obstacles: NDArray[np.float32],
     headings: NDArray[np.float32] | None = None,
     *,
+    step: float | None = None,
     title: str = "",
     pixels: int = 600,
 ) -> NDArray[np.uint8]:
@@ -43,9 +46,11 @@ def draw_world(
         scenario: the world's description.
         positions: (R, 2) robots' centres [m]; NaN of robots that are not there.
         velocities: (R, 2) robots' velocities [m/s].
-        victims: (V,) structured; fields ``present``, ``task``, ``x``, ``y`` [m] are used.
+        victims: (V,) structured; fields ``present``, ``task``, ``x``, ``y`` [m] are used, and
+            ``served`` and ``deadline_step`` where there are such.
         obstacles: (O, 2) obstacles' centres [m].
         headings: (R,) angles of robots on wheels [rad]; None: no nose is drawn.
+        step: control steps done in the episode; None: it is not said how long victims still wait.
         title: text above the picture.
         pixels: height of the picture.
 
@@ -57,7 +62,8 @@ def draw_world(
 
     figure = Figure(figsize=(8, 6), dpi=pixels / 6)
     canvas = FigureCanvasAgg(figure)
-    paint_figure(figure, scenario, positions, velocities, victims, obstacles, headings, title=title)
+    world = (positions, velocities, victims, obstacles, headings)
+    paint_figure(figure, scenario, *world, step=step, title=title)
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels_rgba = canvas.buffer_rgba()  # type: ignore[no-untyped-call]
     return np.asarray(pixels_rgba, np.uint8)[..., :3].copy()
@@ -77,13 +83,16 @@ def paint_figure(
     obstacles: NDArray[np.float32],
     headings: NDArray[np.float32] | None = None,
     *,
+    step: float | None = None,
     title: str = "",
 ) -> None:
     """Paint one world with its legend on an empty figure; arguments as in `draw_world`."""
     axes = figure.add_axes((0.1, 0.1, 0.63, 0.84))
     axes.set_title(title)
-    legend = paint_world(axes, scenario, positions, velocities, victims, obstacles, headings)
-    low = 0.6 - 0.08 * (len(scenario.layers) - 1 + scenario.has_wheels + ("sight" in legend))
+    world = (positions, velocities, victims, obstacles, headings)
+    legend = paint_world(axes, scenario, *world, step=step)
+    more = [scenario.has_wheels, "sight" in legend, _SERVED in legend, _TIME_LEFT in legend]
+    low = 0.6 - 0.08 * (len(scenario.layers) - 1 + sum(more))
     figure.legend(legend.values(), legend.keys(), loc=(0.74, low), frameon=False, labelspacing=0.9)
 
 
@@ -95,6 +104,8 @@ def paint_world(
     victims: NDArray[np.void],
     obstacles: NDArray[np.float32],
     headings: NDArray[np.float32] | None = None,
+    *,
+    step: float | None = None,
 ) -> dict[str, Artist]:
     """Paint one world on ``axes``; arguments as in `draw_world`.
 
@@ -108,6 +119,8 @@ def paint_world(
     _paint_arena(axes, scenario, obstacles)
     legend = _paint_sight(axes, scenario, positions, headings)
     legend |= _paint_victims(axes, scenario, victims)
+    legend |= _paint_services(axes, scenario, victims)
+    legend |= _paint_times_left(axes, scenario, victims, step)
     legend |= _paint_robots(axes, scenario, positions, velocities)
     return legend | _paint_noses(axes, scenario, positions, headings)
 
@@ -197,6 +210,47 @@ def _paint_victims(axes: Axes, scenario: Scenario, victims: NDArray[np.void]) ->
         ring.set_edgecolor(_VICTIM_COLOUR)
         axes.add_patch(ring)
     return legend
+
+
+def _paint_services(axes: Axes, scenario: Scenario, victims: NDArray[np.void]) -> dict[str, Artist]:
+    """An arc around a victim, from the top to the right: the share of its service that it had."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Arc
+
+    if "served" not in (victims.dtype.names or ()):
+        return {}
+    style: dict[str, Any] = {"color": _VICTIM_COLOUR, "linewidth": 3.5, "zorder": 3.5}
+    width = 2 * _SERVICE_REACH * scenario.arena_half_width_m
+    for victim in victims[victims["present"].astype(bool) & (victims["served"] > 0.0)]:
+        place, had = (float(victim["x"]), float(victim["y"])), float(victim["served"])
+        axes.add_patch(Arc(place, width, width, theta1=90 - 360 * had, theta2=90, **style))
+    return {_SERVED: Line2D([], [], color=_VICTIM_COLOUR, linewidth=3.5)}
+
+
+def _paint_times_left(
+    axes: Axes, scenario: Scenario, victims: NDArray[np.void], step: float | None
+) -> dict[str, Artist]:
+    """The seconds below a victim until it is lost."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patheffects import withStroke
+
+    if step is None or "deadline_step" not in (victims.dtype.names or ()):
+        return {}
+    for victim in victims[victims["present"].astype(bool) & (victims["deadline_step"] >= 0)]:
+        left = max(int(victim["deadline_step"]) - step, 0.0) * scenario.dt_s
+        axes.annotate(
+            f"{left:.1f} s",
+            (float(victim["x"]), float(victim["y"])),
+            xytext=(0, -9),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            fontsize="small",
+            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            zorder=5,
+        )
+    seconds: dict[str, Any] = {"color": "k", "linestyle": "", "markersize": 15}
+    return {_TIME_LEFT: Line2D([], [], marker=r"$2.5\,\mathrm{s}$", **seconds)}
 
 
 def _paint_robots(

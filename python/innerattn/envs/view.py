@@ -95,12 +95,15 @@ class Screen:
             env.obstacles()[world],
             env.headings()[world],
         )
-        title = f"step {int(env.step_counts()[world])} of {env.scenario.episode_steps}"
+        step = int(env.step_counts()[world])
+        title = f"step {step} of {env.scenario.episode_steps}"
         if self.mode == "rgb_array":
-            return draw_world(env.scenario, *drawn, title=title)
+            return draw_world(env.scenario, *drawn, step=step, title=title)
         if self._window is None:
             self._window = Window(f"innerattn, {env.scenario.situation}", STEPS_PER_SECOND)
-        self._window.update(lambda figure: paint_figure(figure, env.scenario, *drawn, title=title))
+        self._window.update(
+            lambda figure: paint_figure(figure, env.scenario, *drawn, step=step, title=title)
+        )
         return None
 
     def follow(self, env: BatchEnv) -> None:

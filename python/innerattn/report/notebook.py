@@ -87,6 +87,7 @@ def _picture(env: BatchEnv, title: str) -> str:
             env.victims()[0],
             env.obstacles()[0],
             env.headings()[0],
+            step=int(env.step_counts()[0]),
             title=title,
             pixels=_PIXELS,
         )

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.patches import Arc
 from PIL import Image
 from watched import watched
 
@@ -56,6 +57,24 @@ def test_rays_of_the_chosen_robot_end_where_they_meet_something() -> None:
     axes = Figure().add_subplot()
     _paint(axes, record, "a", 0, 1.0, places, ("food_1",))
     assert not [one for one in axes.lines if len(one.get_xydata()) == 2]
+
+
+def test_services_and_deadlines_of_victims_are_drawn() -> None:
+    """An arc of the share that was recorded, and the time that is left at each half step."""
+    tasks = [one.replace(service_s=2.0, deadline_s=8.0) for one in SHORT.tasks]
+    record = watched(SHORT.replace(tasks=tasks, episode_steps=40))
+    victims = record.steps["victims"]
+    served = np.where(victims["present"], victims["served"], 0.0)
+    episode, step, slot = (int(one[0]) for one in np.nonzero((served > 0.2) & (served < 0.8)))
+    victim = victims[episode, step, slot]
+    axes = Figure().add_subplot()
+    places = np.zeros((0, 2), np.float32)
+    _paint(axes, record, "a", episode, step + 0.5, places, ("food_0",))
+    arcs = [one for one in axes.patches if isinstance(one, Arc) and one.center[0] == victim["x"]]
+    assert [one.theta2 - one.theta1 for one in arcs] == [pytest.approx(360 * victim["served"])]
+    left = (victim["deadline_step"] - step - 0.5) * SHORT.dt_s
+    texts = [one for one in axes.texts if one.get_text().endswith(" s")]
+    assert f"{left:.1f} s" in [one.get_text() for one in texts if one.xy[0] == victim["x"]]
 
 
 @pytest.mark.long

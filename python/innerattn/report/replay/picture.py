@@ -165,9 +165,8 @@ def _paint(
     if record.scenario.robots_leave and "faults" in kept:
         positions = positions_of(positions, kept["faults"]["unavailable"] < 1.0)
     headings = kept["headings"][:, 0] if "headings" in kept else None
-    legend = paint_world(
-        axes, record.scenario, positions, kept["velocities"], kept["victims"], obstacles, headings
-    )
+    world = (positions, kept["velocities"], kept["victims"], obstacles, headings)
+    legend = paint_world(axes, record.scenario, *world, step=moment)
     discs = axes.patches[-record.scenario.num_robots :]
     axes.set(xlabel="", ylabel="", xticks=[], yticks=[])
     axes.set_axis_off()
