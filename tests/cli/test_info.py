@@ -5,10 +5,11 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from innerattn.cli.main import COMMANDS, main
-from innerattn.config import BUDGETS, SCENARIOS, Scenario
+from innerattn.config import BUDGETS, SCENARIOS, Map, Scenario
 
 
 def run(*arguments: str) -> "subprocess.CompletedProcess[str]":
@@ -45,6 +46,42 @@ def test_info_prints_a_scenario_with_its_defaults(
     printed = tomllib.loads(capsys.readouterr().out)
     assert Scenario.model_validate(printed) == Scenario(situation="double", episode_steps=50)
     assert printed["rescue_radius_m"] == 0.15
+
+
+@pytest.mark.parametrize("is_screen", [True, False])
+@pytest.mark.parametrize("side", [40, 41, 200])
+def test_cells_of_a_large_map_are_joined_on_a_screen_alone(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    side: int,
+    is_screen: bool,
+) -> None:
+    solid = np.random.default_rng(side).random((side, side)) < 0.02
+    solid[:, : side // 4] = False
+    rows = ["".join("#" if one else "." for one in row) for row in solid]
+    file = tmp_path / "large.toml"
+    file.write_text(f"[map]\nrows = {rows}\n")
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: is_screen, raising=False)
+    assert main(["info", "--scenario", str(file)]) == 0
+    out = capsys.readouterr().out
+    printed = tomllib.loads(out)
+    if side == 40 or not is_screen:
+        assert Scenario.model_validate(printed).map == Map(rows=rows)
+        assert "joined" not in out
+        return
+    lines = out.splitlines()
+    columns = min(side, 76)
+    start = lines.index(f"# {side} rows of {side} cells, joined to 40 of {columns} for the screen:")
+    assert "rows" not in printed["map"]
+    assert lines[start + 41].startswith("# a file gets all rows")
+    assert max(len(line) for line in lines[start : start + 42]) <= 78
+    drawn = np.array([list(line[2:]) for line in lines[start + 1 : start + 41]]) == "#"
+    # The sign of a cell is that in which its middle lies.
+    wanted = np.zeros((40, columns), bool)
+    for row, column in np.argwhere(solid):
+        wanted[int((row + 0.5) * 40 / side), int((column + 0.5) * columns / side)] = True
+    np.testing.assert_array_equal(drawn, wanted)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import platform
+import sys
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -76,13 +77,30 @@ class Info(Command):
 
 
 def _show_scenario(scenario: Scenario) -> None:
-    """The file with all keys, a map and a few sentences, as a file that can be used again."""
-    from innerattn.report.scenario_map import scenario_map
+    """The file with all keys, a map and a few sentences, as a file that can be used again.
+
+    On a screen alone the cells of a large map are joined: that is said, and is a comment.
+    """
+    from innerattn.report.scenario_map import map_for_screen, scenario_map
     from innerattn.report.scenario_words import scenario_words
 
-    print(tomli_w.dumps(scenario.model_dump(exclude_none=True)))
+    values = scenario.model_dump(exclude_none=True)
+    joined = None
+    if scenario.map is not None and sys.stdout.isatty():
+        joined = map_for_screen(scenario.map)
+    if joined is None:
+        print(tomli_w.dumps(values))
+    else:
+        values["map"]["rows"] = []
+        hint = "a file gets all rows: innerattn info --scenario FILE > OTHER"
+        shown = f"{_commented(joined)}\n# {hint}"
+        print(tomli_w.dumps(values).replace("\nrows = []\n", f"\n{shown}\n", 1))
     for text in (scenario_map(scenario), scenario_words(scenario)):
-        print("\n".join(f"# {line}".rstrip() for line in text.splitlines()))
+        print(_commented(text))
+
+
+def _commented(text: str) -> str:
+    return "\n".join(f"# {line}".rstrip() for line in text.splitlines())
 
 
 def _show_instance(written: str) -> None:

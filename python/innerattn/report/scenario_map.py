@@ -9,6 +9,7 @@ from innerattn.config import Map, Obstacle, Scenario
 from innerattn.config.amounts import in_words
 
 _COLUMNS, _ROWS = 61, 31
+_MOST_ROWS, _MOST_COLUMNS = 40, 76
 _CORNER, _SIDE, _UPRIGHT = "+", "-", "|"
 _FREE, _AREA, _PLACE, _SOLID, _PASSED = " ", "·", "x", "#", "%"
 
@@ -44,6 +45,26 @@ def scenario_map(scenario: Scenario) -> str:
                 cells.append(_AREA if any(_holds(area, x, y) for area in areas) else _FREE)
         lines.append(_UPRIGHT + "".join(cells) + _UPRIGHT)
     return "\n".join([*lines, wall, *_legend(scenario)])
+
+
+def map_for_screen(found: Map) -> str | None:
+    """A map whose rows fill more than a screen, with several cells in one; None: it fits as it is.
+
+    At most 40 rows of 76 signs: ``#`` where one of the cells is solid, else ``.``; a sentence above
+    says how many there are. Without a newline at the end.
+    """
+    side = len(found.rows)
+    if side <= _MOST_ROWS:
+        return None
+    columns = [
+        _cells(one, min(side, _MOST_COLUMNS), side) for one in range(min(side, _MOST_COLUMNS))
+    ]
+    lines = []
+    for row in range(_MOST_ROWS):
+        solid = found.solid[_cells(row, _MOST_ROWS, side)]
+        lines.append("".join("#" if solid[:, cells].any() else "." for cells in columns))
+    said = f"{side} rows of {side} cells, joined to {_MOST_ROWS} of {len(columns)} for the screen:"
+    return "\n".join([said, *lines])
 
 
 def _legend(scenario: Scenario) -> Iterator[str]:
