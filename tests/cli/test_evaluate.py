@@ -79,6 +79,53 @@ def test_a_script_in_a_world_of_ones_own(
     assert document(capsys, "greedy", *FEW)["situation"] == "mixed"
 
 
+LISTED = """situation = "listed"
+episode_steps = 20
+end_when_done = true
+arrivals = [{ at_s = 0.0, task = "task_1", position_m = [0.5, 0.5] }]
+"""
+POISSON = """situation = "poisson"
+tasks = [{ name = "one", needs = ["food"], arrival_rate_hz = 0.5 }]
+"""
+
+
+@pytest.mark.parametrize(("situation", "text"), [("listed", LISTED), ("poisson", POISSON)])
+def test_victims_that_arrive_are_taken_where_the_scenario_has_some(
+    situation: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    found = document(capsys, "greedy", *FEW, "--scenario", str(path), "--situation", situation)
+    assert found["situation"] == situation
+    assert found["rescues_per_episode"]["mean"] > 0.0
+    assert found == document(capsys, "greedy", *FEW, "--scenario", str(path))
+
+
+@pytest.mark.parametrize(
+    ("situation", "text", "message"),
+    [
+        ("poisson", "", "--situation poisson: no task of the scenario has an arrival_rate_hz"),
+        ("listed", "", "--situation listed: the scenario has no arrivals, so nobody would arrive"),
+        ("listed", "situation = 'listed'", "--situation listed: the scenario has no arrivals"),
+        ("mixed", POISSON, "tasks[0].arrival_rate_hz = 0.5: must be 0 but where situation ="),
+        ("listed", POISSON, "tasks[0].arrival_rate_hz = 0.5: must be 0 but where situation ="),
+        ("poisson", LISTED, "scenario.arrivals (their number) = 1: must be 0 but where"),
+        ("single", LISTED, "scenario.arrivals (their number) = 1: must be 0 but where"),
+    ],
+)
+def test_situations_in_which_a_scenario_cannot_be_played(
+    situation: str, text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    where = ["--scenario", str(path)] if text else []
+    assert main(["evaluate", "greedy", *FEW, *where, "--situation", situation]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert message in err
+    assert err.count("\n") == 1
+
+
 def test_tables_and_file(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "out.json"
     assert main(["evaluate", str(run_dir), "--json", str(file)]) == 0

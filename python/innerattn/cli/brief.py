@@ -80,7 +80,7 @@ BRIEF: Mapping[str, Brief] = {
                 "script: random, greedy, greedy-seen, hungarian, planner, oracle",
             ),
             ("--scenario FILE", "TOML file with the scenario to measure in"),
-            ("--situation NAME", "single, double or mixed (that of the run)"),
+            ("--situation NAME", "single, double, mixed, poisson or listed"),
             ("--score-episodes N", "episodes that rescues are averaged over (1000)"),
             ("--episodes N", "episodes that cooperation is counted in (80)"),
             ("--episode-steps N", "length of an episode (that of the run)"),

@@ -60,8 +60,9 @@ class Evaluate(LongCommand):
     random."""
     scenario: Path | None = None
     """TOML file with the scenario to measure in; None: that of the run, or mixed."""
-    situation: Literal["single", "double", "mixed"] | None = None
-    """Situation to measure in; None: that of the run, or mixed."""
+    situation: Literal["single", "double", "mixed", "poisson", "listed"] | None = None
+    """Situation to measure in; None: that of the run, or mixed. poisson and listed: where the
+    scenario says which victims arrive."""
     episode_steps: int | None = None
     """Length of an episode [control steps]; None: that of the run, or 25."""
     episodes: int | None = None
@@ -187,6 +188,26 @@ class Evaluate(LongCommand):
             return evaluate_run(policy, scenario=scenario, settings=settings, progress=progress)
 
     def _worlds(self, scenario: Scenario) -> Scenario:
+        """The worlds to measure in.
+
+        Raises:
+            UsageError: the options do not fit the scenario, such as a situation in which nobody
+                would arrive.
+        """
+        worlds = self._with_options(scenario)
+        if self.situation == "poisson" and not any(one.arrival_rate_hz for one in worlds.tasks):
+            raise UsageError(
+                "--situation poisson: no task of the scenario has an arrival_rate_hz above 0, so "
+                "nobody would arrive; --scenario FILE takes one that has"
+            )
+        if self.situation == "listed" and not worlds.arrivals:
+            raise UsageError(
+                "--situation listed: the scenario has no arrivals, so nobody would arrive; "
+                "--scenario FILE takes one that has"
+            )
+        return worlds
+
+    def _with_options(self, scenario: Scenario) -> Scenario:
         given = self._given("situation", "episode_steps")
         if self.scenario is None:
             with option_values():
