@@ -170,6 +170,29 @@ def test_who_measures_nothing_refuses_rays() -> None:
         refuse_stores_drives_and_senses(scenario, "they")
 
 
+@pytest.mark.parametrize("rays", [2, 7, 360])
+def test_no_two_rays_are_the_same(rays: int) -> None:
+    preset = Scenario.preset("mixed-wheels")
+
+    def rays_of(degrees: float, rays: int = rays) -> np.ndarray:
+        sensor = RangeSensor(rays=rays, range_m=1.0, field_of_view_deg=degrees)
+        first, *others = preset.robots
+        preset.replace(robots=(first.replace(range_sensor=sensor), *others))
+        angles = np.array(sensor.angles_rad(), np.float32)
+        return np.stack([np.cos(angles), np.sin(angles)], -1)
+
+    for degrees in (360.0, 359.99, 359.0, 1.0):
+        assert len(np.unique(rays_of(degrees), axis=0)) == rays
+    for degrees in (359.995, 359.9999999):
+        with pytest.raises(
+            ConfigError,
+            match=r"robots\[0\]\.range_sensor\.field_of_view_deg = 359\.99\d+: must be 360, or at "
+            r"most 359\.99: the first ray would be the last one, too",
+        ):
+            rays_of(degrees)
+    assert rays_of(359.9999999, 1).tolist() == [[1.0, 0.0]]
+
+
 @pytest.mark.parametrize(
     ("sensor", "message"),
     [

@@ -12,6 +12,9 @@ pub const MAX_RAYS: usize = 360;
 /// Shortest and farthest range, m: those of sight.
 const RANGES_M: (f64, f64) = (0.005, 1000.0);
 
+/// Widest field of view below a full turn, degrees: of a wider one the first and the last ray are the same.
+const WIDEST_FAN_DEG: f64 = 359.99;
+
 /// A sensor that measures how far things are along rays from a robot's centre.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -87,7 +90,14 @@ impl Scenario {
             let rule = format!("must be above radius_m = {} m: it counts from its centre", robot.radius_m);
             return broken(&key("range_m"), &sensor.range_m, &rule);
         }
-        robot.validate_field_of_view(&key("field_of_view_deg"), sensor.field_of_view_deg)?;
+        let field = sensor.field_of_view_deg;
+        robot.validate_field_of_view(&key("field_of_view_deg"), field)?;
+        if sensor.rays > 1 && field > WIDEST_FAN_DEG && !sensor.is_all_around() {
+            let rule = format!(
+                "must be {FULL_TURN_DEG}, or at most {WIDEST_FAN_DEG}: the first ray would be the last one, too"
+            );
+            return broken(&key("field_of_view_deg"), &field, &rule);
+        }
         match &sensor.layers {
             Some(layers) => self.validate_blocked(&key("layers"), layers),
             None => Ok(()),
