@@ -184,7 +184,9 @@ ROWS: tuple[Row, ...] = (
     ),
     Row(
         "committed digests",
-        "Ten scenarios do what `tests/cross/digests.json` says, optimised and with assertions.",
+        "Fourteen scenarios do what `tests/cross/digests.json` says, optimised and with "
+        "assertions: in all five situations, with faults, obstacles, services, deadlines, an order "
+        "and areas of tasks, and with the nearest teammates alone.",
         ("tests/cross/test_digests.py",),
         ("digests::",),
         long=(ELSEWHERE,),

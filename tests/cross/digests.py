@@ -1,4 +1,4 @@
-"""What ten scenarios do, as digests that are kept beside the source.
+"""What fourteen scenarios do, as digests that are kept beside the source.
 
 `python tests/cross/digests.py` writes `digests.json` anew: it changes where the worlds change.
 `rust_env/tests/worlds/digests.rs` does the same and compares the same numbers.
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.config import Fault, Obstacle, Scenario
+from innerattn.config import Arrival, Fault, Obstacle, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.envs.batch import FAULT_KINDS, Autoreset
 
@@ -50,6 +50,19 @@ def scenarios() -> dict[str, Scenario]:
     faulty = mixed.replace(faults=faults, observe_faults=True, **tight)
     continuous = mixed.replace(situation="double", actions="continuous", obstacles=obstacles)
     short = mixed.replace(shaping="potential", end_when_rescued=2, **tight)
+    near = {**tight, "rescue_radius_m": 0.3, "episode_steps": 40}
+    food, medicine = mixed.tasks
+    served = food.replace(service_s=0.3, deadline_s=1.5)
+    restarted = medicine.replace(service_s=0.2, service="restart", deadline_s=(0.5, 2.0))
+    arriving = [
+        Arrival(at_s=0.3 * index, task=("task_1", "task_2")[index % 2], position_m=(x, y))
+        for index, (x, y) in enumerate((x, y) for x in (-0.3, 0.0, 0.3) for y in (-0.4, -0.1, 0.2))
+    ]
+    sites = (
+        served.replace(area_m=(-0.4, -0.4, 0.0, 0.4)),
+        restarted.replace(area_m=(0.1, -0.3, 0.4, 0.3), after=("task_1",)),
+    )
+    many = Scenario.preset("mixed-16").replace(observed_teammates=5, observed_victims=2)
     return {
         **plain,
         "tight": mixed.replace(**tight),
@@ -58,6 +71,25 @@ def scenarios() -> dict[str, Scenario]:
         "faults, discs": faulty.replace(engine="discs"),
         "continuous among obstacles": continuous,
         "short episodes, discs": short.replace(engine="discs"),
+        "poisson, deadlines": mixed.replace(
+            situation="poisson",
+            lost_cost=0.5,
+            tasks=(
+                food.replace(deadline_s=1.0, arrival_rate_hz=0.6),
+                medicine.replace(deadline_s=(0.5, 2.0), arrival_rate_hz=1.5),
+            ),
+            **near,
+        ),
+        "listed, services": mixed.replace(
+            situation="listed",
+            end_when_done=True,
+            arrivals=arriving,
+            lost_cost=0.2,
+            tasks=(served, restarted),
+            **near,
+        ),
+        "services, areas of tasks, discs": mixed.replace(engine="discs", tasks=sites, **near),
+        "nearest teammates": many.replace(faults=faults, observe_faults=True),
     }
 
 

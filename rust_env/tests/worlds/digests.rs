@@ -47,7 +47,7 @@ fn worlds_do_what_they_did() {
     let kept: Value = serde_json::from_str(KEPT).expect("JSON");
     let number = |key: &str| kept[key].as_u64().expect("a number");
     let rows = kept["rows"].as_array().expect("rows");
-    assert_eq!(rows.len(), 10);
+    assert_eq!(rows.len(), 14);
     let others = rows.iter().filter(|row| {
         let scenario = Scenario::from_json(&row["scenario"].to_string()).expect("a scenario");
         let found = crc32(scenario, number("num_envs") as usize, number("steps"), number("seed"));
