@@ -14,6 +14,7 @@ from innerattn.policies.scripted.assignment import (
     FORBIDDEN,
     Needs,
     assign,
+    assign_whole_teams,
     can_be_rescued,
     pair_costs,
 )
@@ -60,6 +61,85 @@ def test_both_ways_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     by_enumeration = assign(costs)
     monkeypatch.setattr(assignment, "_MOST_PLANS", 0)
     np.testing.assert_array_equal(assign(costs), by_enumeration)
+
+
+def teams_by_trying(cost: np.ndarray, wanted: np.ndarray) -> dict[int, list[int]]:
+    """Robots of each victim that gets a whole team, one victim after the other, by trying all."""
+    robots, victims, _ = cost.shape
+    free, left, found = set(range(robots)), set(range(victims)), {}
+    while True:
+        teams = {}
+        for victim in sorted(left):
+            size = int(wanted[victim])
+            able = [
+                team
+                for team in permutations(sorted(free), size)
+                if size
+                and all(cost[robot, victim, need] < FORBIDDEN for need, robot in enumerate(team))
+            ]
+            if able:
+                prices = [[cost[r, victim, need] for need, r in enumerate(team)] for team in able]
+                best = min(range(len(able)), key=lambda one: sum(prices[one]))
+                teams[victim] = (max(prices[best]), list(able[best]))
+        if not teams:
+            return found
+        first = min(teams, key=lambda victim: teams[victim][0])
+        found[first] = teams[first][1]
+        free -= set(found[first])
+        left.remove(first)
+
+
+@settings(max_examples=80)
+@given(
+    shape=st.sampled_from([(3, 3, 3), (4, 3, 2), (5, 2, 4), (4, 2, 3), (5, 3, 3)]),
+    seed=st.integers(0, 2**32 - 1),
+    forbidden=st.sampled_from([0.0, 0.2, 0.5]),
+)
+def test_whole_teams_come_first_where_else_nobody_is_rescued(
+    shape: tuple[int, int, int], seed: int, forbidden: float
+) -> None:
+    robots, victims, needs = shape
+    rng = np.random.default_rng(seed)
+    wanted = rng.integers(0, needs + 1, (6, victims))
+    needed = np.arange(needs) < wanted[..., None]
+    costs = rng.uniform(0.0, 3.0, (6, *shape))
+    costs[~np.broadcast_to(needed[:, None], costs.shape)] = FORBIDDEN
+    costs[rng.random(costs.shape) < forbidden] = FORBIDDEN
+    flat = costs.reshape(6, robots, -1)
+    plain, chosen = assign(flat), assign_whole_teams(flat, needed)
+    for world in range(6):
+
+        def team(slots: np.ndarray, victim: int, world: int = world) -> list[int]:
+            """Robots by the need they fill."""
+            return [
+                int(robot)
+                for need in range(wanted[world, victim])
+                for robot in np.flatnonzero(slots[world] == victim * needs + need)
+            ]
+
+        if any(0 < wanted[world, v] == len(team(plain, v)) for v in range(victims)):
+            np.testing.assert_array_equal(chosen[world], plain[world])
+            continue
+        first = teams_by_trying(costs[world], wanted[world])
+        for victim, robots_of_it in first.items():
+            assert team(chosen, victim) == robots_of_it
+        rest = sorted(set(range(robots)) - {robot for one in first.values() for robot in one})
+        others = costs[world][rest].copy()
+        others[:, list(first)] = FORBIDDEN
+        again = assign(others.reshape(1, len(rest), -1))[0] if rest else []
+        assert chosen[world][rest].tolist() == list(again)
+
+
+def test_a_service_that_goes_on_has_its_team_first() -> None:
+    times = np.array([[0.0, 4.0, 4.5, 0.5], [5.0, 0.2, 0.1, 5.5]]).T[None]  # (1, R, V)
+    permitted = np.ones((1, 4, 2, 4), bool)
+    needed = np.ones((1, 2, 4), bool)
+    held = np.zeros((1, 4, 2), bool)
+    for robot, victim in ((0, 0), (1, 1)):
+        held[:] = False
+        held[0, robot, victim] = True
+        chosen = assign_whole_teams(pair_costs(times, permitted, held), needed)
+        assert (chosen // 4 == victim).all()
 
 
 def test_permitted_by_hand() -> None:

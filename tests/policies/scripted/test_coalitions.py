@@ -95,11 +95,12 @@ def test_coalitions_are_those_of_a_plain_loop(
         wanted[slot] = [
             r for r in coalition(worlds, slot, times[0, :, slot], everyone) if r in free
         ]
-    shared, needed = coalitions.shared(state, times, permitted, permitted.any(1))
+    shared, needed, short = coalitions.shared(state, times, permitted, permitted.any(1))
     for slot in range(victims):
         members = np.flatnonzero(shared[0, :, slot].any(-1)).tolist()
         assert members == sorted(wanted.get(slot, []))
         assert needed[0, slot].sum() == len(members)
+        assert short[0, slot] == (slot in open_)
 
 
 def boats(count: int, needed: float, **more: object) -> Scenario:

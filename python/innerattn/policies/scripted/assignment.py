@@ -18,6 +18,9 @@ from innerattn.config import Scenario
 FORBIDDEN = 1e7
 """Cost of a pair that cannot be [s]; so much that a permitted pair is always preferred."""
 
+_LARGE_TEAM = 6
+"""Needs of a victim from which on whole teams come first. Smaller teams may wait for each other,
+too; they are assigned at the least total cost alone, so that what was measured stays comparable."""
 _MOST_PLANS = 1000  # beyond, solving each world on its own is the faster way
 _OWN_SHARE = 0.3
 _HOLD_S = 2e4
@@ -44,6 +47,11 @@ class Needs:
         most = max(len(task.needs) for task in scenario.tasks)
         rows = [[abilities.index(need) for need in task.needs] for task in scenario.tasks]
         self.of_task = np.array([row + [-1] * (most - len(row)) for row in rows], np.int64)
+
+    @property
+    def has_large_teams(self) -> bool:
+        """Whether some victim needs so many robots that teams must be formed one by one."""
+        return bool(self.of_task.shape[1] >= _LARGE_TEAM)
 
     def permitted(self, present: NDArray[np.bool_], task: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which robot can fill which need.
@@ -130,6 +138,67 @@ def assign(costs: NDArray[np.float64]) -> NDArray[np.int64]:
         chosen = _one_by_one(costs)
     cost = np.take_along_axis(costs, np.maximum(chosen, 0)[..., None], -1)[..., 0]
     return np.where((chosen >= 0) & (cost < FORBIDDEN), chosen, -1)
+
+
+def assign_whole_teams(costs: NDArray[np.float64], needed: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """As `assign`, but where no victim would get all its helpers, whole teams come first.
+
+    At the least total cost robots may wait at several victims for helpers who wait at others. If
+    so, and robots can fill all needs of some victim, the victim whose team is there soonest gets
+    it, then the next one of the robots that are left, and so on; the rest are assigned as ever.
+
+    Args:
+        costs: (E, R, V * N) cost of robot r filling a need of a victim; `FORBIDDEN` where it
+            cannot.
+        needed: (E, V, N) the needs that there are.
+
+    Returns:
+        (E, R) int64 as that of `assign`.
+    """
+    chosen = assign(costs)
+    wanted = needed.sum(-1)
+    victims = np.where(chosen >= 0, chosen // needed.shape[-1], -1)
+    coming = (victims[..., None] == np.arange(needed.shape[1])).sum(1)
+    alone = ~((coming == wanted) & (wanted > 0)).any(1) & (coming > 0).any(1)
+    if alone.any():
+        chosen[alone] = _teams_first(costs[alone], wanted[alone])
+    return chosen
+
+
+def _teams_first(costs: NDArray[np.float64], wanted: NDArray[np.int64]) -> NDArray[np.int64]:
+    """What `assign_whole_teams` does where no victim would get all its helpers.
+
+    Args:
+        costs: (E, R, V * N).
+        wanted: (E, V) number of helpers that each victim needs.
+    """
+    worlds, robots, _ = costs.shape
+    victims = wanted.shape[1]
+    left = costs.reshape(worlds, robots, victims, -1).copy()
+    needs = left.shape[-1]
+    chosen = np.full((worlds, robots), -1, np.int64)
+    every = np.arange(worlds)
+    for _ in range(victims):
+        team = assign(left.transpose(0, 2, 1, 3).reshape(-1, robots, needs))
+        team = team.reshape(worlds, victims, robots)
+        comes = team >= 0
+        cost = np.take_along_axis(left.transpose(0, 2, 1, 3), np.maximum(team, 0)[..., None], -1)[
+            ..., 0
+        ]
+        latest = np.where(comes, cost, -np.inf).max(-1)
+        # A service that goes on does so first.
+        latest = np.where((comes & (cost < 0.0)).any(-1), latest - _HOLD_S, latest)
+        latest = np.where((comes.sum(-1) == wanted) & (wanted > 0), latest, np.inf)
+        first = latest.argmin(1)
+        taken = comes[every, first] & np.isfinite(latest[every, first])[:, None]
+        if not taken.any():
+            break
+        chosen = np.where(taken, first[:, None] * needs + team[every, first], chosen)
+        left = np.where(taken[:, :, None, None], FORBIDDEN, left)
+        some = taken.any(1)
+        left[every[some], :, first[some]] = FORBIDDEN
+    rest = assign(left.reshape(worlds, robots, -1))
+    return np.where(chosen >= 0, chosen, rest)
 
 
 def _by_enumeration(costs: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -53,7 +53,7 @@ class Coalitions:
 
     def shared(
         self, state: WorldState, times: NDArray[np.float64], permitted: _Bools, needed: _Bools
-    ) -> tuple[_Bools, _Bools]:
+    ) -> tuple[_Bools, _Bools, _Bools]:
         """The same where no robot is in two coalitions.
 
         The victim whose coalition is there soonest has it; then the next one has the soonest of the
@@ -67,7 +67,8 @@ class Coalitions:
             needed: (E, V, N) the needs that there are.
 
         Returns:
-            What is permitted, (E, R, V, N') bool, and needed, (E, V, N') bool.
+            What is permitted, (E, R, V, N') bool, and needed, (E, V, N') bool; and which victims
+            need sums that no coalition of their own reaches, (E, V) bool.
         """
         worlds = np.arange(len(times))
         helpful = np.asarray(permitted.any(-1))
@@ -92,7 +93,7 @@ class Coalitions:
         slots = self._in_place_of_needs(state, members, times, permitted)
         listed = np.zeros((*needed.shape[:2], slots.shape[-1]), np.bool_)
         listed[..., : needed.shape[-1]] = needed
-        return slots, np.where(of_sum[..., None], slots.any(1), listed)
+        return slots, np.where(of_sum[..., None], slots.any(1), listed), open_
 
     def of_sum(self, state: WorldState) -> _Bools:
         """Which victims need sums, (E, V)."""

@@ -18,7 +18,13 @@ from innerattn.config import Scenario
 from innerattn.envs.batch import NUM_DISCRETE_ACTIONS
 from innerattn.errors import ConfigError
 from innerattn.policies.policy import Policy, PolicyInput, WorldState
-from innerattn.policies.scripted.assignment import Needs, assign, can_be_rescued, pair_costs
+from innerattn.policies.scripted.assignment import (
+    Needs,
+    assign,
+    assign_whole_teams,
+    can_be_rescued,
+    pair_costs,
+)
 from innerattn.policies.scripted.charging import Charging
 from innerattn.policies.scripted.coalitions import Coalitions
 from innerattn.policies.scripted.loading import Loading
@@ -184,7 +190,8 @@ class GreedySeenPolicy(_Dispatcher):
 class HungarianPolicy(_Dispatcher):
     """Robots are assigned to needs at the least total cost in arrival times, anew every step.
 
-    Where needs are sums, the robots of a coalition are assigned in place of needs.
+    Where needs are sums, the robots of a coalition are assigned in place of needs. Where a victim
+    needs many robots, teams are formed one by one, if else nobody would be rescued.
     """
 
     name = "hungarian"
@@ -206,17 +213,21 @@ class HungarianPolicy(_Dispatcher):
                 permitted &= self._hopeful(state, permitted, needed)
         times = self._times(state, places, faults)
         blocked = state.victims["blocked"] if self._timing.has_order else None
+        whole = needed if blocked is None else needed & ~blocked[..., None]
         if self._coalitions.is_needed:
             if blocked is not None:  # their coalitions would take robots from others
                 permitted &= ~blocked[:, None, :, None]
-            permitted, needed = self._coalitions.shared(state, times, permitted, needed)
+            permitted, needed, short = self._coalitions.shared(state, times, permitted, needed)
+            whole = needed & ~short[..., None]  # blocked victims are not needed any more
         if faults is not None:
             permitted &= can_be_rescued(permitted, needed)[:, None, :, None]
         held = None
         if self._timing.is_needed:
             permitted &= self._timing.in_time(state, times, permitted)[:, None, :, None]
             held = self._timing.held(state, times)
-        need = assign(pair_costs(times, permitted, held, blocked))
+        costs = pair_costs(times, permitted, held, blocked)
+        large = self.needs.has_large_teams
+        need = assign_whole_teams(costs, whole) if large else assign(costs)
         return np.where(need >= 0, need // permitted.shape[-1], -1)
 
     def _hopeful(
