@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+PALE = 0.3
+"""Opacity of what is painted faintly."""
+
 _VICTIM_COLOUR = "#D55E00"
 _TASK_MARKERS = "*XDP^v"
 _EDGES = ("-", "--", ":", "-.")  # of robots, by their layer
@@ -106,8 +109,20 @@ def paint_world(
     headings: NDArray[np.float32] | None = None,
     *,
     step: float | None = None,
+    pale: tuple[NDArray[np.bool_], NDArray[np.bool_]] | None = None,
 ) -> dict[str, Artist]:
     """Paint one world on ``axes``; arguments as in `draw_world`.
+
+    Args:
+        axes: where.
+        scenario: of the world.
+        positions: of robots.
+        velocities: of robots.
+        victims: by slot.
+        obstacles: their centres.
+        headings: of robots on wheels.
+        step: of the episode.
+        pale: (R,) robots and (V,) slots of victims that are painted faintly; None: none.
 
     Returns:
         What a legend shows: label to symbol.
@@ -118,11 +133,14 @@ def paint_world(
     axes.set_ylabel("y [m]")
     _paint_arena(axes, scenario, obstacles)
     legend = _paint_sight(axes, scenario, positions, headings)
-    legend |= _paint_victims(axes, scenario, victims)
-    legend |= _paint_services(axes, scenario, victims)
-    legend |= _paint_times_left(axes, scenario, victims, step)
-    legend |= _paint_robots(axes, scenario, positions, velocities)
-    return legend | _paint_noses(axes, scenario, positions, headings)
+    pale_robots, pale_victims = pale or (np.zeros(len(positions)), np.zeros(len(victims)))
+    strength = np.where(pale_victims, PALE, 1.0)
+    legend |= _paint_victims(axes, scenario, victims, strength)
+    legend |= _paint_services(axes, scenario, victims, strength)
+    legend |= _paint_times_left(axes, scenario, victims, step, strength)
+    strength = np.where(pale_robots, PALE, 1.0)
+    legend |= _paint_robots(axes, scenario, positions, velocities, strength)
+    return legend | _paint_noses(axes, scenario, positions, headings, strength)
 
 
 def _paint_arena(axes: Axes, scenario: Scenario, obstacles: NDArray[np.float32]) -> None:
@@ -190,7 +208,9 @@ def _paint_sight(
     return legend
 
 
-def _paint_victims(axes: Axes, scenario: Scenario, victims: NDArray[np.void]) -> dict[str, Artist]:
+def _paint_victims(
+    axes: Axes, scenario: Scenario, victims: NDArray[np.void], strength: NDArray[np.float64]
+) -> dict[str, Artist]:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Circle
 
@@ -203,16 +223,20 @@ def _paint_victims(axes: Axes, scenario: Scenario, victims: NDArray[np.void]) ->
         )
     ring_style: dict[str, Any] = {"markerfacecolor": "none", "linestyle": "", "markersize": 13}
     legend["rescue radius"] = Line2D([], [], marker="o", color=_VICTIM_COLOUR, **ring_style)
-    for victim in victims[victims["present"].astype(bool)]:
+    there = victims["present"].astype(bool)
+    for victim, alpha in zip(victims[there], strength[there].tolist(), strict=True):
         x, y = float(victim["x"]), float(victim["y"])
-        axes.plot([x], [y], marker=markers[int(victim["task"])], zorder=2, **style)
-        ring = Circle((x, y), scenario.rescue_radius_m, fill=False, linestyle="--")
+        marker = markers[int(victim["task"])]
+        axes.plot([x], [y], marker=marker, zorder=2, alpha=alpha, **style)
+        ring = Circle((x, y), scenario.rescue_radius_m, fill=False, linestyle="--", alpha=alpha)
         ring.set_edgecolor(_VICTIM_COLOUR)
         axes.add_patch(ring)
     return legend
 
 
-def _paint_services(axes: Axes, scenario: Scenario, victims: NDArray[np.void]) -> dict[str, Artist]:
+def _paint_services(
+    axes: Axes, scenario: Scenario, victims: NDArray[np.void], strength: NDArray[np.float64]
+) -> dict[str, Artist]:
     """An arc around a victim, from the top to the right: the share of its service that it had."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Arc
@@ -221,14 +245,20 @@ def _paint_services(axes: Axes, scenario: Scenario, victims: NDArray[np.void]) -
         return {}
     style: dict[str, Any] = {"color": _VICTIM_COLOUR, "linewidth": 3.5, "zorder": 3.5}
     width = 2 * _SERVICE_REACH * scenario.arena_half_width_m
-    for victim in victims[victims["present"].astype(bool) & (victims["served"] > 0.0)]:
+    begun = victims["present"].astype(bool) & (victims["served"] > 0.0)
+    for victim, alpha in zip(victims[begun], strength[begun].tolist(), strict=True):
         place, had = (float(victim["x"]), float(victim["y"])), float(victim["served"])
-        axes.add_patch(Arc(place, width, width, theta1=90 - 360 * had, theta2=90, **style))
+        arc = Arc(place, width, width, theta1=90 - 360 * had, theta2=90, alpha=alpha, **style)
+        axes.add_patch(arc)
     return {_SERVED: Line2D([], [], color=_VICTIM_COLOUR, linewidth=3.5)}
 
 
 def _paint_times_left(
-    axes: Axes, scenario: Scenario, victims: NDArray[np.void], step: float | None
+    axes: Axes,
+    scenario: Scenario,
+    victims: NDArray[np.void],
+    step: float | None,
+    strength: NDArray[np.float64],
 ) -> dict[str, Artist]:
     """The seconds below a victim until it is lost."""
     from matplotlib.lines import Line2D
@@ -236,7 +266,8 @@ def _paint_times_left(
 
     if step is None or "deadline_step" not in (victims.dtype.names or ()):
         return {}
-    for victim in victims[victims["present"].astype(bool) & (victims["deadline_step"] >= 0)]:
+    ends = victims["present"].astype(bool) & (victims["deadline_step"] >= 0)
+    for victim, alpha in zip(victims[ends], strength[ends].tolist(), strict=True):
         left = max(int(victim["deadline_step"]) - step, 0.0) * scenario.dt_s
         axes.annotate(
             f"{left:.1f} s",
@@ -245,6 +276,7 @@ def _paint_times_left(
             textcoords="offset points",
             ha="center",
             va="top",
+            alpha=alpha,
             fontsize="small",
             path_effects=[withStroke(linewidth=2.5, foreground="white")],
             zorder=5,
@@ -258,6 +290,7 @@ def _paint_robots(
     scenario: Scenario,
     positions: NDArray[np.float32],
     velocities: NDArray[np.float32],
+    strength: NDArray[np.float64],
 ) -> dict[str, Artist]:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Circle, Patch
@@ -269,8 +302,8 @@ def _paint_robots(
     layers = scenario.layers
     edge: dict[str, Any]
     sides = _sides_of_names(axes, scenario, positions)
-    for robot, look, (x, y), velocity, side in zip(
-        scenario.robots, looks, positions, velocities, sides, strict=True
+    for robot, look, (x, y), velocity, side, alpha in zip(
+        scenario.robots, looks, positions, velocities, sides, strength.tolist(), strict=True
     ):
         colour = look.colour
         if robot.kind not in legend:
@@ -278,9 +311,9 @@ def _paint_robots(
                 [], [], color=colour, marker="o", linestyle="", markersize=11
             )
         edge = {"edgecolor": "k", "linestyle": _EDGES[layers.index(robot.layer) % len(_EDGES)]}
-        axes.add_patch(
-            Circle((float(x), float(y)), robot.radius_m, facecolor=colour, zorder=3, **edge)
-        )
+        place = float(x), float(y)
+        disc = Circle(place, robot.radius_m, facecolor=colour, zorder=3, alpha=alpha, **edge)
+        axes.add_patch(disc)
         if np.isnan(x):
             continue
         axes.annotate(
@@ -299,7 +332,7 @@ def _paint_robots(
                 "",
                 (float(x + _ARROW_S * velocity[0]), float(y + _ARROW_S * velocity[1])),
                 xytext=(float(x), float(y)),
-                arrowprops={"arrowstyle": "->", "linewidth": 1.5},
+                arrowprops={"arrowstyle": "->", "linewidth": 1.5, "alpha": alpha},
                 zorder=6,
             )
     for index, layer in enumerate(layers[1:], 1):
@@ -316,17 +349,21 @@ def _paint_noses(
     scenario: Scenario,
     positions: NDArray[np.float32],
     headings: NDArray[np.float32] | None,
+    strength: NDArray[np.float64],
 ) -> dict[str, Artist]:
     """Where robots on wheels point."""
     from matplotlib.lines import Line2D
 
     if headings is None or not scenario.has_wheels:
         return {}
-    for robot, (x, y), angle in zip(scenario.robots, positions, headings.tolist(), strict=True):
+    for robot, (x, y), angle, alpha in zip(
+        scenario.robots, positions, headings.tolist(), strength.tolist(), strict=True
+    ):
         if robot.has_wheels:
             ahead = robot.radius_m * np.array([np.cos(angle), np.sin(angle)])
             ends = [x, x + 1.5 * ahead[0]], [y, y + 1.5 * ahead[1]]
-            axes.plot(*ends, color="k", linewidth=3, solid_capstyle="butt", zorder=4)
+            look: dict[str, Any] = {"color": "k", "linewidth": 3, "solid_capstyle": "butt"}
+            axes.plot(*ends, alpha=alpha, zorder=4, **look)
     return {"heading": Line2D([], [], color="k", linewidth=3)}
 
 

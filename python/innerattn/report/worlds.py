@@ -22,6 +22,7 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
         "has_order": scenario.has_order,
         "robots_leave": scenario.robots_leave,
         "layers": scenario.layers,
+        "occlusion": scenario.occlusion,
         "limits_communication": scenario.limits_communication,
         "tasks": [
             {"name": task.name, "needs": list(task.needs), "amounts": task.sums}

@@ -85,6 +85,34 @@ def test_a_robot_put_beside_a_wall_measures_it(browser: Browser) -> None:
         assert not seen.serious_faults()
 
 
+def test_what_the_chosen_robot_does_not_see_is_faint(browser: Browser) -> None:
+    preset = Scenario.preset("mixed")
+    first, *others = preset.robots
+    scenario = preset.replace(robots=(first.replace(sight_m=0.5), *others))
+    with played(scripted_world(scenario)) as server, visit(browser, server.address) as seen:
+        page = seen.page
+        ready(page)
+        for robot, x, hidden in (
+            (1, 0.3, False),
+            (1, 0.7, True),
+            (2, -0.6, True),
+            (2, -0.4, False),
+        ):
+            for index, at in ((0, 0.0), (robot, x)):
+                message = {"do": "move_robot", "robot": index, "x": at, "y": 0.0}
+                page.evaluate("(message) => play.send(message)", message)
+                settle(page)
+            page.evaluate("play.setLook({ robot: 0 })")
+            settle(page)
+            page.wait_for_timeout(50)
+            assert (robot in page.evaluate("play.scene.unseen.robots")) == hidden
+            page.evaluate("(robot) => play.setLook({ robot })", robot)
+            settle(page)
+            page.wait_for_timeout(50)
+            assert page.evaluate("play.scene.unseen") == {"robots": [], "victims": []}
+        assert not seen.serious_faults()
+
+
 def test_no_switch_without_such_senses(browser: Browser) -> None:
     with played(scripted_world()) as server, visit(browser, server.address) as seen:
         ready(seen.page)

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.config import Robot
-from innerattn.envs.render import paint_world, positions_of
+from innerattn.config import Robot, Scenario
+from innerattn.envs.render import PALE, paint_world, positions_of
 from innerattn.errors import MissingLibraryError, RunError
 from innerattn.measures.moments import handoffs_of_all_robots, obstacle_places
 from innerattn.records.record import Record
 from innerattn.report.replay.data import refuse_what_cannot_replay
+from innerattn.report.replay.sight import in_sight, sees_all
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -166,7 +167,15 @@ def _paint(
         positions = positions_of(positions, kept["faults"]["unavailable"] < 1.0)
     headings = kept["headings"][:, 0] if "headings" in kept else None
     world = (positions, kept["velocities"], kept["victims"], obstacles, headings)
-    legend = paint_world(axes, record.scenario, *world, step=moment)
+    seen_by = record.robot_names.index(robots[0]) if len(robots) == 1 else None
+    pale = None
+    if seen_by is not None and not sees_all(record.scenario, seen_by):
+        pale = _out_of_sight(
+            record.scenario, seen_by, positions, headings, kept["victims"], obstacles
+        )
+    legend = paint_world(axes, record.scenario, *world, step=moment, pale=pale)
+    if pale is not None:
+        legend[f"out of sight\nof {_plain(robots[0])}"] = _pale_mark()
     discs = axes.patches[-record.scenario.num_robots :]
     axes.set(xlabel="", ylabel="", xticks=[], yticks=[])
     axes.set_axis_off()
@@ -188,6 +197,32 @@ def _paint(
             weights = kept["attention"].mean(0)[index]
             _paint_attention(axes, positions, index, weights, discs[index])
     return legend
+
+
+def _out_of_sight(
+    scenario: Scenario,
+    robot: int,
+    positions: NDArray[np.float32],
+    headings: NDArray[np.float32] | None,
+    victims: NDArray[np.void],
+    obstacles: NDArray[np.float32],
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """The other robots (R,) and the victims (V,) that a robot does not see."""
+    ahead = 0.0 if headings is None else float(headings[robot])
+    places = np.stack([victims["x"], victims["y"]], -1)
+    robots, slots = (
+        ~in_sight(scenario, robot, positions[robot], ahead, obstacles, some)
+        for some in (positions, places)
+    )
+    robots[robot] = False
+    return robots, slots & victims["present"].astype(bool)
+
+
+def _pale_mark() -> Artist:
+    from matplotlib.lines import Line2D
+
+    look: dict[str, Any] = {"color": "k", "linestyle": "", "markersize": 11}
+    return Line2D([], [], marker="o", alpha=PALE, **look)
 
 
 def _plain(text: str) -> str:

@@ -137,6 +137,11 @@ function fillLegend(list, worlds) {
   if (worlds.robots.some((robot) => robot.sight)) {
     row(symbol(svg("circle", { r: 9, fill: kind, "fill-opacity": 0.15, stroke: kind })), "pale area around a robot: how far it sees, unless an obstacle hides it");
   }
+  if (worlds.occlusion || worlds.robots.some((robot) => robot.sight)) {
+    const faint = svg("g", { opacity: 0.3 });
+    faint.append(disc(kind, "var(--ink)", 7));
+    row(symbol(faint), "faint robot or victim: out of sight of the chosen robot");
+  }
   row(symbol(disc("var(--floor)", kind)), "small disc at a victim: what it needs");
   row(symbol(disc(kind, kind)), "filled small disc: robots that offer it, enough of it, are inside the rescue radius");
   const ring = svg("circle", { r: 9, fill: "none", stroke: "var(--victim)", "stroke-dasharray": "4 3", "stroke-width": 1.5 });

@@ -4,6 +4,7 @@ const TRAIL_STEPS = 15;
 const FLASH_STEPS = 2.5;
 const WIDEST_ARROW = 0.055; // of the arena's half width, for a weight of 1
 const FEW_ROBOTS = 8;
+const FAINT = 0.3; // what the chosen robot does not see
 const BADGE = 8.5; // radius of what a victim needs, px
 
 /** The weight from which on arrows of all robots are drawn at first: of large teams the strongest. */
@@ -75,16 +76,25 @@ class Scene {
     drawGround(this);
     drawSenses(this);
     if (look.trails) worlds.robots.forEach((robot) => this.drawTrail(robot));
-    victims.forEach((victim) => this.drawVictim(victim));
+    this.unseen = outOfSight(this);
+    const { robots: away, victims: hidden } = this.unseen;
+    victims.forEach((victim) => this.faintly(hidden.includes(victim.id), () => this.drawVictim(victim)));
     run.rescues[episode].forEach((rescue) => this.drawFlash(rescue));
     drawHearing(this);
     if (run.attention) this.drawAttention();
     worlds.robots.forEach((robot) => this.drawFault(robot));
-    victims.forEach((victim) => this.drawNeeds(victim));
-    worlds.robots.forEach((robot) => this.drawRobot(robot));
+    victims.forEach((victim) => this.faintly(hidden.includes(victim.id), () => this.drawNeeds(victim)));
+    worlds.robots.forEach((robot) => this.faintly(away.includes(robot.index), () => this.drawRobot(robot)));
     // The list beside the arena has every weight.
     if (worlds.robots.length <= FEW_ROBOTS) this.labels.forEach(([text, places]) => this.writeAt(text, places, true));
     worlds.robots.forEach((robot) => this.drawName(robot));
+  }
+
+  /** What draws in full strength, or faintly. */
+  faintly(isFaint, draw) {
+    this.context.globalAlpha = isFaint ? FAINT : 1;
+    draw();
+    this.context.globalAlpha = 1;
   }
 
   drawTrail(robot) {

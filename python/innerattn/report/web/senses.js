@@ -20,7 +20,7 @@ function fillSenses(box, run, look, change) {
     box.append(element("label", { class: "inline" }, "Who hears whom ", select));
   }
   if (run.rays && robots.some((robot) => robot.range_sensor)) toggle("rays", "rays");
-  if (robots.some((robot) => robot.sight)) toggle("sight", "sight");
+  if (run.worlds.occlusion || robots.some((robot) => robot.sight)) toggle("sight", "sight");
   box.hidden = !box.children.length;
 }
 
@@ -48,6 +48,45 @@ function heardPairs(run, episode, step, look) {
 /** Robots whose rays and sight are drawn: the chosen one, or all. */
 function sensing({ worlds, look }) {
   return look.robot < 0 ? worlds.robots : [worlds.robots[look.robot]];
+}
+
+/** Robots and victims that the chosen robot does not see, by index and id; none while nobody is chosen. */
+function outOfSight({ run, worlds, look, episode, step }) {
+  const seer = look.sight ? worlds.robots[look.robot] : undefined;
+  if (!seer || !(seer.sight || worlds.occlusion)) return { robots: [], victims: [] };
+  const isHidden = ([x, y]) => !isInSight(run, episode, step, seer, x, y);
+  const others = worlds.robots.filter((one) => one !== seer && isHidden(run.place(episode, step, one.index)));
+  const victims = run.victims[episode].filter((one) => step >= one.from && step < one.to && isHidden([one.x, one.y]));
+  return { robots: others.map((one) => one.index), victims: victims.map((one) => one.id) };
+}
+
+/** Whether a robot sees a place [m]: as far, as wide, and with nothing in the way; faults are left out. */
+function isInSight(run, episode, step, seer, x, y) {
+  const { worlds } = run, from = run.place(episode, step, seer.index), way = [x - from[0], y - from[1]];
+  const { range_m: range, field_of_view_rad: field } = seer.sight ?? { range_m: null, field_of_view_rad: 2 * Math.PI };
+  if (range !== null && Math.hypot(...way) > range) return false;
+  if (field < 2 * Math.PI - 1e-6) {
+    const off = Math.atan2(way[1], way[0]) - (run.heading(episode, step, seer.index) ?? 0);
+    if (Math.abs(Math.atan2(Math.sin(off), Math.cos(off))) > field / 2) return false;
+  }
+  if (!worlds.occlusion) return true;
+  const blocks = (solid) => !solid.passed_by.includes(seer.layer);
+  const isCrossed = (shape, [cx, cy]) => leadsThrough(shape, [from[0] - cx, from[1] - cy], way);
+  if (worlds.obstacles.some((one, index) => blocks(one) && isCrossed(one, worlds.obstacle(episode, index)))) return false;
+  return !(worlds.map && blocks(worlds.map) && worlds.map.boxes.some(([cx, cy, ...half]) => (
+    isCrossed({ radius_m: null, half_extents_m: half }, [cx, cy])
+  )));
+}
+
+/** Whether a straight way leads through a disc or a box around the origin. */
+function leadsThrough({ radius_m: radius, half_extents_m: half }, [x, y], [wx, wy]) {
+  if (radius !== null) {
+    const share = Math.min(Math.max(-(x * wx + y * wy) / Math.max(wx * wx + wy * wy, 1e-12), 0), 1);
+    return Math.hypot(x + share * wx, y + share * wy) < radius;
+  }
+  const [mx, my] = [x + wx / 2, y + wy / 2], [rx, ry] = [Math.abs(wx) / 2, Math.abs(wy) / 2];
+  return Math.abs(mx) < half[0] + rx && Math.abs(my) < half[1] + ry
+    && Math.abs(mx * wy - my * wx) < half[0] * Math.abs(wy) + half[1] * Math.abs(wx);
 }
 
 /** Below robots and victims, and only inside the walls; `scene.rays` keeps the ends that it drew. */
