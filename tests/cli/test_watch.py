@@ -75,7 +75,7 @@ def test_a_training_goes_on_under_the_eyes_of_its_reader(run_dir: Path, tmp_path
             until(page, f"{INSIDE}.dataset.theme === 'dark'")
             page.get_by_role("button", name="after 400").click()  # loads the replay anew
             until(page, f"{INSIDE}.dataset.theme === 'dark'")
-            assert replay.locator("#theme").is_hidden()
+            replay.locator("#theme").wait_for(state="hidden")
             assert not Visit(page).serious_faults()
             page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
             until(page, f"document.documentElement.scrollWidth <= {PHONE[0]}")
