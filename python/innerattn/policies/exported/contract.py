@@ -126,6 +126,12 @@ class NeededAbilities:
     name: str
     needs: tuple[str, ...] | dict[str, float]
 
+    def amount(self, ability: str) -> float:
+        """How much of an ability is needed; of a list, how many robots."""
+        if isinstance(self.needs, dict):
+            return self.needs.get(ability, 0.0)
+        return float(self.needs.count(ability))
+
 
 @dataclass(frozen=True)
 class Entities:

@@ -7,7 +7,7 @@ where sight is limited not seen, is zeros, as under the fault `lost_communicatio
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -76,9 +76,7 @@ class RowBuilder:
         self._by_relevance = contract.victim_order == "relevant"
         self._most_position_m = 2.0 * contract.arena_half_width_m
         self._needs = {
-            task.name: np.array(
-                [1, *(_needed(task.needs, one) for one in layout.abilities)], np.float32
-            )
+            task.name: np.array([1, *(task.amount(one) for one in layout.abilities)], np.float32)
             for task in contract.tasks
         }
         own = set(self._own.abilities)
@@ -405,10 +403,3 @@ def _share_of(seconds: float) -> float:
     """The time since something was seen as a share, t / (t + 1 s)."""
     time = np.float32(seconds)
     return float(time / (time + np.float32(1.0)))
-
-
-def _needed(needs: Sequence[str] | Mapping[str, float], ability: str) -> float:
-    """How much of an ability is needed; of a list, how many robots."""
-    if isinstance(needs, Mapping):
-        return needs.get(ability, 0.0)
-    return float(needs.count(ability))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -109,12 +108,6 @@ def bodies_of(contract: Contract, order: list[int]) -> Bodies:
 
 def demand_of(contract: Contract) -> Array:
     """How much of each ability a victim needs on average over the tasks, (K,) float32."""
-
-    def amount(needs: tuple[str, ...] | dict[str, float], ability: str) -> float:
-        if isinstance(needs, Mapping):
-            return needs.get(ability, 0.0)
-        return float(needs.count(ability))
-
     tasks = contract.tasks
-    sums = [sum(amount(task.needs, one) for task in tasks) for one in contract.abilities]
+    sums = [sum(task.amount(one) for task in tasks) for one in contract.abilities]
     return np.array([total / len(tasks) for total in sums], np.float32)
