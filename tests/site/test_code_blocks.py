@@ -254,7 +254,7 @@ def test_other_commands_name_what_is_there() -> None:
                     started = rest[rest.index("-m") + 1 :]
                     assert started[0] == "innerattn"
                     _parse(started[1:])  # SystemExit if a word is wrong
-                case ["python" | "pytest", path, *_]:
+                case ["python" | "pytest" | "cp", path, *_]:
                     assert (ROOT / path).is_file(), line
                 case ["cargo", "test" | "bench", *_]:
                     named = [one for one in words if f'name = "{one}"' in manifests()]
