@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from innerattn.policies import best_script
+from innerattn.report.study.places import PlaceNames, named_values, set_there, varied_in
 from innerattn.report.study.search import (
     SearchFound,
     search_page,
@@ -29,7 +30,7 @@ from innerattn.studies.ledger import State
 from innerattn.studies.plan import TRAIN_SECONDS
 from innerattn.studies.results import RULES, Compared, Mean, Results, Values
 from innerattn.studies.shown import CONTRASTS, DATED_RULES, OVER_ALL, StudyTable
-from innerattn.studies.space import Length, Value
+from innerattn.studies.space import Length
 from innerattn.studies.study import RETAINED
 
 
@@ -138,13 +139,15 @@ def left_out(results: Results) -> list[str]:
 
     It is one line where a scenario lacks the same seeds everywhere, else one for each place.
     """
+    all_places = [run.place for run in results.planned]
+    keys = list(dict.fromkeys(["scenario", "method", *varied_in(all_places)]))
+    names = PlaceNames(all_places)
     places: dict[str, set[str]] = {}
     seeds: dict[tuple[str, str, str], list[int]] = {}
     for run in results.planned:
-        place = str(run).removesuffix(f", seed {run.seed}")
-        places.setdefault(str(run.place["scenario"]), set()).add(place)
+        places.setdefault(str(run.place["scenario"]), set()).add(names.name(run.place, keys))
     for run, reason in results.left_out:
-        place = str(run).removesuffix(f", seed {run.seed}")
+        place = names.name(run.place, keys)
         seeds.setdefault((str(run.place["scenario"]), place, reason), []).append(run.seed)
     alike: dict[tuple[str, str, tuple[int, ...]], list[str]] = {}
     for (scenario, place, reason), those in seeds.items():
@@ -208,7 +211,7 @@ def aggregates_table(aggregates: Mapping[Length, Mapping[str, Aggregate]]) -> Ta
 def algorithm_names(found: Sequence[Aggregate]) -> dict[str, Aggregate]:
     """Algorithms by a name of their own: what differs between their places in the grid."""
     varied = varied_in([one.algorithm for one in found]) or ["method"]
-    return {" ".join(_named(one.algorithm, varied)): one for one in found}
+    return {" ".join(named_values(one.algorithm, varied)): one for one in found}
 
 
 def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:
@@ -225,7 +228,7 @@ def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:
     rows = []
     for one in found:
         cells = [value_cell(x) if seeds else plus_minus(x.mean) for x in one.values.values()]
-        named = _named(one.place, always) + ([_set_there(one.place, partly)] if partly else [])
+        named = named_values(one.place, always) + ([set_there(one.place, partly)] if partly else [])
         rows.append([*named, format_seeds(one.seeds), *cells])
     heads = []
     for measure, length in found[0].values:
@@ -329,46 +332,15 @@ def _seeds(one: Compared) -> str:
 
 def _sides(compared: Sequence[Compared]) -> list[tuple[str, str]]:
     """What differs between both sides of each contrast, and what they share that others do not."""
-    varied = varied_in([place for one in compared for place in (one.a, one.b)])
+    sides = [place for one in compared for place in (one.a, one.b)]
+    varied, names = varied_in(sides), PlaceNames(sides)
     texts = []
     for one in compared:
         free = [key for key in varied if one.a.get(key) != one.b.get(key)]
         a, b = (" ".join(str(side[key]) for key in free if key in side) for side in (one.a, one.b))
-        shared = [str(one.a[key]) for key in varied if key not in free and key in one.a]
-        texts.append((f"{a} - {b}", " ".join(shared)))
+        shared = [key for key in varied if key not in free]
+        texts.append((f"{a} - {b}", names.name(one.a, shared)))
     return texts
-
-
-def _named(place: Mapping[str, Value], varied: Sequence[str]) -> list[str]:
-    """What differs of a place; a grid may leave out what another one sets."""
-    return [str(place.get(key, "default")) for key in varied]
-
-
-def _set_there(place: Mapping[str, Value], keys: Sequence[str]) -> str:
-    """Those of some keys that a place sets, by the last part of their names."""
-    return ", ".join(f"{key.rpartition('.')[2]} = {place[key]}" for key in keys if key in place)
-
-
-def varied_in(places: Sequence[Mapping[str, Value]]) -> list[str]:
-    """Coordinates that are not the same everywhere.
-
-    Keys of a run that all places set are left out where they follow from scenario, method, budget
-    and variant, such as a length of training for each scenario.
-    """
-    keys = dict.fromkeys(key for place in places for key in place)
-    varied = [key for key in keys if len({place.get(key) for place in places}) > 1]
-    named = [key for key in varied if "." not in key]
-    return [key for key in varied if key in named or not _follows(key, named, places)]
-
-
-def _follows(key: str, named: Sequence[str], places: Sequence[Mapping[str, Value]]) -> bool:
-    """Whether all places set a key, and to one value where they agree in the coordinates named."""
-    if any(key not in place for place in places):
-        return False
-    agreeing: dict[tuple[Value | None, ...], set[Value]] = {}
-    for place in places:
-        agreeing.setdefault(tuple(map(place.get, named)), set()).add(place[key])
-    return all(len(values) == 1 for values in agreeing.values())
 
 
 def _dated(one: Rules) -> str:

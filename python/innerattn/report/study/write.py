@@ -22,8 +22,8 @@ from innerattn.report.study.page import (
     Found,
     algorithm_names,
     study_page,
-    varied_in,
 )
+from innerattn.report.study.places import varied_in
 from innerattn.report.study.search import SearchFound, search_found
 from innerattn.studies.aggregates import aggregate
 from innerattn.studies.curves import LearningCurve, learning_curves
