@@ -14,8 +14,9 @@ from innerattn.evaluate import trained
 from innerattn.evaluate.faults.grid import Grid, play_all
 from innerattn.policies import Policy, scripted_policy
 from innerattn.report.study.write import write_study
-from innerattn.studies.faults import RunUnderFaults, retained, to_measure
+from innerattn.studies.afterwards import measured, to_measure
 from innerattn.studies.folder import StudyFolder, begin_study, open_study
+from innerattn.studies.measurement import Measurement
 from innerattn.studies.plan import plan_study
 from innerattn.studies.results import read_results, read_summaries
 from innerattn.studies.study import study_in
@@ -49,7 +50,7 @@ def done(finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Stu
     return open_study(tmp_path / "study")
 
 
-def measure(study: StudyFolder, most: int | None = None) -> list[RunUnderFaults]:
+def measure(study: StudyFolder, most: int | None = None) -> list[Measurement]:
     jobs = to_measure(study)[:most]
     for job in jobs:
         job.do(lambda _: None)
@@ -65,7 +66,7 @@ def test_each_run_meets_the_faults_once(done: StudyFolder) -> None:
         name = "hungarian" if run.config.train.method == "ppo-inner" else "greedy"
         grid = Grid(worlds, KINDS, episodes=4, seed=run.config.evaluate.seed)
         whole = play_all([("x", scripted_policy(name, worlds))], grid)["x"].by_kind().value
-        found = retained(done, run)
+        found = measured(done, run)
         assert found["retained_motor_gain"] == pytest.approx(whole[0])
         assert found["retained_unavailable"] == pytest.approx(whole[1])
         assert found["retained"] == pytest.approx(whole.mean())
@@ -75,15 +76,15 @@ def test_each_run_meets_the_faults_once(done: StudyFolder) -> None:
     report, files = write_study(done, results)
     (compared,) = report.compared
     differences = [
-        retained(done, a)["retained_unavailable"] - retained(done, b)["retained_unavailable"]  # type: ignore[operator]
+        measured(done, a)["retained_unavailable"] - measured(done, b)["retained_unavailable"]  # type: ignore[operator]
         for a, b in zip(done.planned[::2], done.planned[1::2], strict=True)
     ]
     assert compared.mean == pytest.approx(sum(differences) / 3)
     page = files[0].read_text()
     assert "retained, motor gain | retained, unavailable" in page
     assert "have not met the faults" not in page
-    assert [one.retained for one in read_summaries(done)] == [
-        one.retained for one in results.finished
+    assert [one.measured for one in read_summaries(done)] == [
+        one.measured for one in results.finished
     ]
 
 
@@ -112,7 +113,7 @@ def test_the_command_measures_what_is_missing(
     assert main(["study", "run", str(file), "--out", str(done.path)]) == 0
     assert "retained, unavailable" in capsys.readouterr().out
     assert to_measure(begun) == []
-    assert retained(begun, missing.run).keys() == {"retained", "retained_unavailable"}
+    assert measured(begun, missing.run).keys() == {"retained", "retained_unavailable"}
 
 
 @pytest.mark.long
@@ -121,7 +122,7 @@ def test_a_damaged_file_is_named_and_its_run_left_out(text: str, done: StudyFold
     (job,) = measure(done, 1)
     job.path.write_text(text)
     with pytest.raises(RunError, match=r"\.json: not a measurement under faults; remove it"):
-        retained(done, job.run)
+        measured(done, job.run)
     ((run, why),) = read_results(done).left_out
     assert run == job.run
     assert "not a measurement under faults" in why
@@ -133,7 +134,7 @@ def test_of_another_run_is_refused(done: StudyFolder) -> None:
     document = json.loads(second.path.read_text())
     first.path.write_text(json.dumps(document))
     with pytest.raises(RunError, match="not a measurement under faults"):
-        retained(done, first.run)
+        measured(done, first.run)
 
 
 @pytest.mark.parametrize(

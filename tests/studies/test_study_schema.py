@@ -17,7 +17,7 @@ from innerattn.studies.plan import plan_study
 from innerattn.studies.schema import COPY, study_schema_text
 from innerattn.studies.shown import Report, ReportPage, StudyTable
 from innerattn.studies.space import Search
-from innerattn.studies.study import Faults, Study, StudyContrast, study_in
+from innerattn.studies.study import Faults, Study, StudyContrast, UnseenTeams, study_in
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +40,7 @@ def test_the_copy_is_what_the_models_give() -> None:
         "[grid]\nseeds = [1, 2]",
         "[search]\nppo.gamma = {low = 0.9, high = 0.99}\nnetwork.encoder = ['flat', 'entities']",
         "[faults]\nkinds = ['blackout']",
+        "[grid]\nmethods = ['team-max']\n[unseen_teams]\nepisodes = 10",
     ],
 )
 def test_studies_are_valid(text: str, validator: Draft202012Validator) -> None:
@@ -87,11 +88,13 @@ def test_the_new_file_is_a_study_and_names_every_key(
     assert given["contrasts"][0].keys() == StudyContrast.model_fields.keys()
     assert given["tables"][0].keys() == StudyTable.model_fields.keys()
     assert given["faults"].keys() == Faults.model_fields.keys()
+    assert given["unseen_teams"].keys() == UnseenTeams.model_fields.keys()
     assert given["report"].keys() == Report.model_fields.keys()
     assert given["report"]["pages"][0].keys() <= ReportPage.model_fields.keys()
     assert given["search"].keys() == Search.model_fields.keys() | {"ppo"}
     assert validator.is_valid(given)
     del given["search"]  # it stands without the other parts
+    del given["unseen_teams"]  # its runs are for one team
     examples = study_in(tomli_w.dumps(given).encode(), "all.toml")
     assert len(plan_study(examples, Path)) == 20
     assert main(["new", "study", "sharing"]) == 1

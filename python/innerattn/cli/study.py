@@ -86,7 +86,7 @@ class Study(LongCommand):
             raise UsageError(f"--gpus = {self.gpus:g}: must be 0 to 64")
         if self.workers is not None and not 1 <= self.workers <= 256:
             raise UsageError(f"--workers = {self.workers}: must be 1 to 256")
-        from innerattn.studies.faults import to_measure
+        from innerattn.studies.afterwards import to_measure
 
         study = self._begun()
         if self.publish is not None:

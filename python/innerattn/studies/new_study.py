@@ -86,6 +86,11 @@ title = "Learning curves"
 # worlds in which each fault is tried
 #episodes = 100
 
+# Teams that no run has met, for methods team-... alone. They add the measures unseen_teams,
+# unseen_teams_worst and means of four groups: scores in 24 teams.
+#[unseen_teams]
+#episodes = 500
+
 # A search for better values (Optuna) instead of variants and contrasts: trials race over the seeds
 # of the grid. It needs innerattn[search].
 #[search]

@@ -18,7 +18,17 @@ from innerattn.errors import ConfigError
 from innerattn.experiments.plan import Case, of_seed
 from innerattn.measures.registry import MEASURES
 from innerattn.studies.space import Search, Value
-from innerattn.studies.study import RETAINED, Grid, Study, StudyContrast, Variant, coordinates
+from innerattn.studies.study import (
+    RETAINED,
+    UNSEEN,
+    Faults,
+    Grid,
+    Study,
+    StudyContrast,
+    UnseenTeams,
+    Variant,
+    coordinates,
+)
 
 SCORE_AS_SEEN = "score_as_seen"
 TRAIN_SECONDS = "train_seconds"
@@ -28,6 +38,8 @@ MOST_RUNS = 10_000
 RECIPE = "recipe"
 """The trial of a search that changes nothing, as its variant is called."""
 _NAMED_BY_THE_GRID = {"train.seed": "seeds", "train.method": "methods"}
+_SECTION = {RETAINED: Faults.place, UNSEEN: UnseenTeams.place}
+"""The section that adds a measure."""
 _MEASURED = ("scenario", "evaluate")
 """Sections that say what is measured, so that no search may change them."""
 
@@ -121,6 +133,9 @@ def plan_study(study: Study, find: Callable[[str], Path]) -> list[PlannedRun]:
                 if (other := known.setdefault(named, run)) is not run:
                     raise ConfigError(f"grid: {run} and {other} are the same run")
                 planned.setdefault((seed, *run.place.items()), run)  # several grids may have it
+    for part in study.afterwards:
+        if not any(part.takes(run.config) for run in planned.values()):
+            raise ConfigError(f"{part.place}: must stand beside a method for any team: team-...")
     places = list({tuple(run.place.items()): run.place for run in planned.values()}.values())
     for contrast in study.contrasts:
         _refuse_other_measure(
@@ -299,7 +314,9 @@ def _refuse_other_measure(where: str, measure: str, study: Study, length: str) -
         raise ConfigError(f"{where} = {measure!r}: has no value of long episodes")
     if measure not in (*MEASURES_OF_ALL, *MEASURES, *study.measures):
         known = ", ".join((*MEASURES_OF_ALL, *MEASURES, *study.measures))
-        needs = "; it needs [faults]" if measure.startswith(RETAINED) and not study.faults else ""
+        sections = {RETAINED: study.faults, UNSEEN: study.unseen_teams}
+        missing = [name for name, one in sections.items() if measure.startswith(name) and not one]
+        needs = f"; it needs [{_SECTION[missing[0]]}]" if missing else ""
         raise ConfigError(f"{where} = {measure!r}: must be one of {known}{needs}")
 
 

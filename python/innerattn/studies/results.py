@@ -15,7 +15,7 @@ from innerattn.stats import Estimate
 from innerattn.stats.aggregate import improvement_interval
 from innerattn.stats.comparison import ALPHA, Contrast, contrast, holm
 from innerattn.stats.seeds import seed_estimate
-from innerattn.studies.faults import retained
+from innerattn.studies.afterwards import measured
 from innerattn.studies.folder import StudyFolder
 from innerattn.studies.ledger import Ledger, State
 from innerattn.studies.plan import (
@@ -29,12 +29,12 @@ from innerattn.studies.plan import (
 from innerattn.studies.shown import StudyTable
 from innerattn.studies.space import Length, Value
 from innerattn.studies.study import (
-    RETAINED,
     SCORES,
     Direction,
     Study,
     StudyContrast,
     coordinates,
+    has_own_episodes,
 )
 
 LEAST_SEEDS = 3
@@ -61,21 +61,21 @@ class Result:
         run: which one.
         summary: its ``evaluation/summary.json``.
         finished: all that is known of it; None where only summaries were read.
-        retained: what it retains under the faults of the study, by measure; empty where it has not
-            met them.
+        measured: what it was measured in beside its own evaluation, such as faults, by measure;
+            empty where it has not been.
     """
 
     run: PlannedRun
     summary: Mapping[str, Any]
     finished: FinishedRun | None = None
-    retained: Mapping[str, float | None] = field(default_factory=dict)
+    measured: Mapping[str, float | None] = field(default_factory=dict)
 
     def value(self, measure: str, length: Length) -> float | None:
         """A measure of the run; None where it does not determine it."""
         part = self.summary if length == "standard" else self.summary["long"]
         found: Any
-        if measure.startswith(RETAINED):
-            found = self.retained.get(measure)
+        if has_own_episodes(measure):
+            found = self.measured.get(measure)
         elif measure == TRAIN_SECONDS:
             found = None if self.finished is None else self.finished.info.seconds
         elif measure == SCORE_AS_SEEN:
@@ -211,7 +211,7 @@ def read_results(study: StudyFolder, *, steps: bool = False, archived: bool = Tr
             else:
                 left_out.append((run, _why_left_out(run.key, states[run.key], ledger)))
                 continue
-            finished.append(Result(run, found.summary, found, retained(study, run)))
+            finished.append(Result(run, found.summary, found, measured(study, run)))
         except (InnerattnError, OSError) as error:
             left_out.append((run, f"unreadable: {one_line(error)}"))
     return Results(tuple(study.planned), tuple(finished), tuple(left_out))
@@ -250,7 +250,7 @@ def read_summaries(study: StudyFolder) -> list[Result]:
             summary = check_summary(path, document, run.config)
         else:
             continue
-        found.append(Result(run, summary, retained=retained(study, run)))
+        found.append(Result(run, summary, measured=measured(study, run)))
     return found
 
 

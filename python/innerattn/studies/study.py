@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, ValidationError, field_validator, model_
 from innerattn.config.files import toml_table_in
 from innerattn.config.model import Model, config_error
 from innerattn.config.near import did_you_mean
-from innerattn.config.run import digest_of
+from innerattn.config.run import RunConfig, digest_of
 from innerattn.envs.batch import FAULT_KINDS
 from innerattn.errors import ConfigError
 from innerattn.studies.seeds import listed_seeds
@@ -160,6 +160,13 @@ SCORES = StudyTable(title="Scores")
 RETAINED = "retained"
 """The measure of a run under faults: the share of its rescues that it retains. With a kind of fault
 behind it, as in "retained_blackout", it is that of this kind alone."""
+UNSEEN = "unseen_teams"
+"""The measure of a run in teams that it has never met: its mean score."""
+
+
+def has_own_episodes(measure: str) -> bool:
+    """Whether a measure is of worlds of its own, so that it has one length of episodes."""
+    return measure.startswith((RETAINED, UNSEEN))
 
 
 class Faults(Model):
@@ -183,6 +190,11 @@ class Faults(Model):
             raise ValueError(f"faults.kinds: {twice!r} stands twice")
         return kinds
 
+    @staticmethod
+    def takes(_: RunConfig) -> bool:
+        """Whether a run meets them: every one does."""
+        return True
+
     @property
     def measures(self) -> tuple[str, ...]:
         """The measures of a run that they add."""
@@ -193,6 +205,30 @@ class Faults(Model):
         """What is shown of them in a study that lists no tables."""
         title = "Share of the rescues that is retained under faults"
         return StudyTable(title=title, measures=self.measures, seeds=False)
+
+
+class UnseenTeams(Model):
+    """Teams that no run has met, in which each finished run of a policy for any team acts."""
+
+    place: ClassVar[str] = "unseen_teams"
+
+    episodes: int = Field(500, ge=2, le=100_000, description="episodes in each of the 24 teams")
+
+    @staticmethod
+    def takes(run: RunConfig) -> bool:
+        """Whether a run meets them: one of a policy for any team."""
+        return run.algorithm.for_any_team
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """The measures of a run that they add: a mean, the least, and means of groups."""
+        parts = ("worst", "mixtures", "sizes", "bodies", "changes")
+        return (UNSEEN, *(f"{UNSEEN}_{part}" for part in parts))
+
+    @property
+    def table(self) -> StudyTable:
+        """What is shown of them in a study that lists no tables."""
+        return StudyTable(title="Scores in unseen teams", measures=self.measures, seeds=False)
 
 
 class Study(Model):
@@ -220,6 +256,9 @@ class Study(Model):
         (), max_length=20, description="what is shown as learning curves"
     )
     faults: Faults | None = Field(None, description="faults that finished runs meet")
+    unseen_teams: UnseenTeams | None = Field(
+        None, description="teams that finished runs of policies for any team meet"
+    )
     search: Search | None = Field(None, description="which values of a run are to be found")
     report: Report | None = Field(
         None, description="what the report shows, and which pages take parts of it"
@@ -268,7 +307,7 @@ class Study(Model):
 
     def _check_search(self, search: Search) -> None:
         """Refuse what a search does not stand beside."""
-        for key in ("variants", "contrasts", "tables", "curves", "faults"):
+        for key in ("variants", "contrasts", "tables", "curves", "faults", "unseen_teams"):
             if getattr(self, key):
                 raise ValueError(f"search: must stand without {key}")
         lists: dict[str, tuple[Value, ...]] = {
@@ -292,14 +331,19 @@ class Study(Model):
     @property
     def measures(self) -> tuple[str, ...]:
         """The measures that its own parts add to those of every run."""
-        return () if self.faults is None else self.faults.measures
+        return tuple(measure for part in self.afterwards for measure in part.measures)
 
     @property
     def listed_tables(self) -> tuple[StudyTable, ...]:
         """Its tables, or those of a study that lists none."""
         if self.tables or self.search is not None:
             return self.tables
-        return (SCORES,) if self.faults is None else (SCORES, self.faults.table)
+        return (SCORES, *(part.table for part in self.afterwards))
+
+    @property
+    def afterwards(self) -> list[Faults | UnseenTeams]:
+        """What finished runs are measured in beside their own evaluation."""
+        return [one for one in (self.faults, self.unseen_teams) if one is not None]
 
     @property
     def shown(self) -> tuple[Shown, ...]:

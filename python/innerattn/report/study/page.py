@@ -31,7 +31,7 @@ from innerattn.studies.plan import TRAIN_SECONDS
 from innerattn.studies.results import RULES, Compared, Mean, Results, Values
 from innerattn.studies.shown import CONTRASTS, DATED_RULES, OVER_ALL, StudyTable
 from innerattn.studies.space import Length
-from innerattn.studies.study import RETAINED
+from innerattn.studies.study import RETAINED, UNSEEN, Faults, UnseenTeams, has_own_episodes
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,12 @@ def study_page(found: Found, figures: Mapping[str, str]) -> str:
         parts.insert(0, f"> **{found.note[:1].upper()}{found.note[1:]}.**\n")
     parts += [f"{one}\n" for one in answers(found)]
     parts += [f"{len(keys)} of {len(found.states)} runs are done.\n"]
-    if study.study.faults is not None and (without := _without_faults(results)):
-        parts += [f"{without} of these have not met the faults; `innerattn study run` lets them.\n"]
+    for part in study.study.afterwards:
+        if without := _not_measured(results, part):
+            what = part.place.replace("_", " ")
+            parts += [
+                f"{without} of these have not met the {what}; `innerattn study run` lets them.\n"
+            ]
     if results.left_out:
         parts += ["**Left out of all results:**\n", *map("- {}".format, left_out(results)), ""]
     if found.search is not None:
@@ -119,13 +123,15 @@ def _means_section(shown: StudyTable, rows: Sequence[Mean], planned: bool) -> li
     if not rows:
         return []
     of_faults = any(one.startswith(RETAINED) for one in shown.measures)
-    captions = [_SCORE, *[_PLANNED] * planned, *[_RETAINED] * of_faults]
+    of_teams = any(one.startswith(UNSEEN) for one in shown.measures)
+    captions = [_SCORE, *[_PLANNED] * planned, *[_RETAINED] * of_faults, *[_UNSEEN] * of_teams]
     return [markdown(means_table(rows, shown.seeds)), *captions]
 
 
-def _without_faults(results: Results) -> int:
-    """How many finished runs have not met the faults of the study."""
-    return len({one.run.key for one in results.finished if not one.retained})
+def _not_measured(results: Results, part: Faults | UnseenTeams) -> int:
+    """How many finished runs lack measures that a part of the study adds."""
+    able = [one for one in results.finished if part.takes(one.run.config)]
+    return len({one.run.key for one in able if not {*part.measures} <= {*one.measured}})
 
 
 def answers(found: Found) -> list[str]:
@@ -174,6 +180,12 @@ _RETAINED = (
     "Retained is the share of the rescues that a team keeps: a mean over its robots, each of which "
     "has the fault in turn, over severities, and over faults from the start and from the middle of "
     "the episode. Episodes are twice as long as those of the training.\n"
+)
+_UNSEEN = (
+    "Unseen teams are 24 that no run has met: eight draws of the family, eight sizes from 2 to 24 "
+    "robots, four with bodies outside of the family's ranges, and four in which a robot leaves, "
+    "joins or becomes slow at half time (changes). The score is that in each team, a mean over "
+    "them or the worst. Episodes have 50 steps.\n"
 )
 _DOTS = "A dot is a run; a bar is the mean over seeds with its 95 % interval.\n"
 _CURVES = (
@@ -232,9 +244,8 @@ def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:
         rows.append([*named, format_seeds(one.seeds), *cells])
     heads = []
     for measure, length in found[0].values:
-        if measure.startswith(RETAINED):  # its episodes have a length of their own
-            kind = measure.removeprefix(RETAINED).replace("_", " ").strip()
-            heads.append(f"{RETAINED}, {kind}" if kind else RETAINED)
+        if has_own_episodes(measure):
+            heads.append(_own_head(measure))
             continue
         if measure == TRAIN_SECONDS:
             heads.append("training [s]")
@@ -244,6 +255,13 @@ def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:
         heads.append(f"{_IN_WORDS.get(measure, measure.replace('_', ' '))}, {which}")
     named = [*always, "keys"] if partly else always
     return plain_table(columns(named, ["seeds", *heads]), rows)
+
+
+def _own_head(measure: str) -> str:
+    """A measure whose episodes have a length of their own, in words."""
+    whole = next(one for one in (RETAINED, UNSEEN) if measure.startswith(one))
+    part = measure.removeprefix(whole).replace("_", " ").strip()
+    return ", ".join(filter(None, (whole.replace("_", " "), part)))
 
 
 _IN_WORDS = {"rescues_per_episode": "rescues"}
@@ -281,7 +299,7 @@ def contrasts_tables(compared: Sequence[Compared]) -> str:
         ]
         heads = ["seeds", "difference [95 %]", "P(a > b) [95 %]", "Holm's p", "verdict"]
         words = measure.replace("_", " ")
-        episodes = "" if measure.startswith(RETAINED) else f", {length} episodes"
+        episodes = "" if has_own_episodes(measure) else f", {length} episodes"
         parts += [
             f"**{words[:1].upper()}{words[1:]}{episodes}**; within {margin:g} is alike.\n",
             markdown(plain_table(columns(["contrast", "a - b"], heads), rows)),

@@ -1,0 +1,83 @@
+"""What finished runs of a study are measured in beside their own evaluation.
+
+Each run is measured once, in a file beside the runs.
+"""
+
+from __future__ import annotations
+
+import json
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from innerattn.config.files import write_whole
+from innerattn.config.run import digest_of
+from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json, read_plain
+from innerattn.errors import RunError
+from innerattn.experiments.processes import Job
+from innerattn.studies.folder import StudyFolder
+from innerattn.studies.plan import PlannedRun
+
+
+@dataclass
+class Measurement(Job):
+    """A finished run that is to be measured; its result is a file, which appears whole.
+
+    Attributes:
+        section: of the study that asks for it, which the folder of its files is called as well.
+        values_key: under which its file has the measures.
+        damaged: what a file is said to be none of.
+        run: which one.
+        folder: of the run.
+        path: the file.
+    """
+
+    section: ClassVar[str]
+    values_key: ClassVar[str] = "values"
+    damaged: ClassVar[str]
+
+    run: PlannedRun
+    folder: Path
+    path: Path
+
+    def __str__(self) -> str:
+        return f"{self.section.replace('_', ' ')} of {self.run}"
+
+    @abstractmethod
+    def measured(self, report: Callable[[float], None]) -> dict[str, Any]:
+        """Play the worlds: the parts of the file's document, among them the measures."""
+
+    def do(self, report: Callable[[float], None]) -> None:
+        """Measure, and write the file."""
+        report(0.0)
+        document = {"schema_version": 1, "run": self.run.key, **self.measured(report)}
+        self.path.parent.mkdir(exist_ok=True)
+        write_whole(self.path, f"{json.dumps(document, indent=1, allow_nan=False)}\n".encode())
+
+    @classmethod
+    @abstractmethod
+    def of(cls, study: StudyFolder, run: PlannedRun) -> Self | None:
+        """That of a run; None where the study does not ask for it."""
+
+    @classmethod
+    def file(cls, study: StudyFolder, run: PlannedRun, rules: Mapping[str, Any]) -> Path:
+        """Where the result is that follows from some rules."""
+        return study.path / cls.section / f"{run.key}-{digest_of(dict(rules))[:8]}.json"
+
+    def read(self) -> Iterator[tuple[str, float | None]]:
+        """The measures in the file.
+
+        Raises:
+            RunError: it is damaged.
+            OSError: it cannot be read.
+        """
+        try:
+            document = parse_json(read_plain(self.path, MOST_JSON_BYTES))
+            if document["run"] != self.run.key:
+                raise ValueError("of another run")
+            for name, value in document[self.values_key].items():
+                yield str(name), None if value is None else float(value)
+        except (ValueError, LookupError, TypeError, AttributeError) as error:
+            raise RunError(f"{self.path}: not {self.damaged}; remove it") from error
