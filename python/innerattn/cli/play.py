@@ -84,7 +84,8 @@ class Play(Command):
         seed = settings.seed if self.seed is None else self.seed
         policies: dict[str, Policy] = {}
         if config is not None:
-            policies[self._name] = load_trained(self.policy, scenario)[1]
+            # Somebody may blind a robot.
+            policies[self._name] = load_trained(self.policy, scenario, each_sees=True)[1]
         others = [name for name in SCRIPTS if name != self.policy]
         for name in [self._name, *others] if config is None else others:
             policies[name] = scripted_policy(name, scenario, seed)

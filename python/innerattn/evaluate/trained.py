@@ -16,6 +16,7 @@ from innerattn.errors import RunError
 from innerattn.learn.types import Learner, RememberingLearner
 from innerattn.policies import PolicyInput
 from innerattn.train import load_policy
+from innerattn.train.teams.policy import TeamPolicy
 
 
 class TrainedPolicy:
@@ -51,7 +52,11 @@ class TrainedPolicy:
 
 
 def load_trained(
-    run: str | Path, scenario: Scenario | None = None, *, greedy: bool | None = None
+    run: str | Path,
+    scenario: Scenario | None = None,
+    *,
+    greedy: bool | None = None,
+    each_sees: bool = False,
 ) -> tuple[RunConfig, TrainedPolicy]:
     """The configuration of a run and its policy with the newest weights.
 
@@ -59,6 +64,8 @@ def load_trained(
         run: the run folder.
         scenario: the worlds it is to act in; none: those it was trained in.
         greedy: take the likeliest actions; none: as the configuration says.
+        each_sees: let each robot act on its own row, though no fault of ``scenario`` makes senses
+            fail; of policies for any team, as others always do.
 
     Raises:
         RunError: there is no readable run at ``run``, or its robots do not see in ``scenario`` what
@@ -80,6 +87,8 @@ def load_trained(
                 f"{run}: was trained with communication.delay_steps = {there}: must be {there} "
                 f"here, not {here}, because its robots have messages"
             )
+    if each_sees and isinstance(learner, TeamPolicy):
+        learner.let_each_see()
     greedy = config.evaluate.greedy_actions if greedy is None else greedy
     return config, TrainedPolicy(learner, config.train.method, greedy=greedy)
 

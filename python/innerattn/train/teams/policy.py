@@ -46,6 +46,10 @@ class TeamPolicy:
             found.append(self._sheet.own_rows(actions))
         return torch.cat(found).view(worlds, robots)
 
+    def let_each_see(self) -> None:
+        """Let each robot act on its own row from now on: senses may fail, whatever faults say."""
+        self._sheet = self._own_sheet
+
     @property
     def num_robots(self) -> int:
         """R."""
