@@ -24,7 +24,6 @@ from innerattn.zoo import zoo_names
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
-TEAMS = [name for name in zoo_names() if name != "any"]  # a page cannot play a policy for any team
 sys.path.insert(0, str(DOCS))
 
 project = "innerattn"
@@ -92,7 +91,7 @@ def link_teams(_: Sphinx, name: str, source: list[str]) -> None:
         text += " and break its robots.\n\n"
         source[0] = source[0].replace("## Two commands", f"{text}## Two commands", 1)
     elif name == "docs/zoo":
-        for team in TEAMS:
+        for team in zoo_names():
             to = f'<a href="../play/{team}.html">play in this browser</a>'
             source[0] = source[0].replace(f"| `zoo:{team}` |", f"| `zoo:{team}`, {to} |", 1)
 
@@ -102,7 +101,7 @@ def write_teams(app: Sphinx, failure: Exception | None) -> None:
     if failure is None and app.builder.format == "html":
         folder = Path(app.outdir) / "play"
         folder.mkdir(exist_ok=True)
-        for team in TEAMS:
+        for team in zoo_names():
             with redirect_stdout(StringIO()):
                 main(["page", f"zoo:{team}", "-o", str(folder / f"{team}.html")])
 

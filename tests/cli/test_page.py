@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from team_of_any import TEAM
 
 from innerattn.cli.main import main
 
@@ -52,13 +53,25 @@ def test_a_run_and_a_script_are_written(run_dir: Path, tmp_path: Path) -> None:
     assert len(given(out)["worlds"]["layers"]) == 2
 
 
+def test_a_policy_for_any_team_is_written_for_the_team_of_a_file(tmp_path: Path) -> None:
+    out, file = tmp_path / "team.html", tmp_path / "team.toml"
+    page = (Path(__file__).parents[2] / "docs" / "teams.md").read_text("utf-8")
+    file.write_text(page.split("```toml\n")[1].split("```")[0])
+    assert main(["page", "zoo:any", "--scenario", str(file), "-o", str(out)]) == 0
+    found = given(out)
+    assert [one["name"] for one in found["policies"]] == ["any", "random", "greedy", "hungarian"]
+    assert [one["name"] for one in found["worlds"]["robots"]] == [one.name for one in TEAM.robots]
+    assert len(found["policies"][0]["team"]["known"]["bodies"]) == 5
+
+
 @pytest.mark.long
-def test_a_team_of_the_package_needs_no_torch(tmp_path: Path) -> None:
+@pytest.mark.parametrize("team", ["mixed", "any"])
+def test_a_team_of_the_package_needs_no_torch(tmp_path: Path, team: str) -> None:
     out = str(tmp_path / "a.html")
     code = (
         "import sys\n"
         "from innerattn.cli.main import main\n"
-        f"code = main(['page', 'zoo:mixed', '-o', {out!r}])\n"
+        f"code = main(['page', 'zoo:{team}', '-o', {out!r}])\n"
         "sys.exit(code or bool({'torch', 'onnx', 'safetensors'} & sys.modules.keys()))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
@@ -70,7 +83,7 @@ def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     cases = [
         (1, ["nobody"], "nobody: neither a run's folder nor one of random, greedy, hungarian"),
         (1, ["oracle"], "oracle: a page has no such script"),
-        (1, ["zoo:any"], "a page cannot play it: train.method = 'team-inner'"),
+        (1, ["zoo:any", "--preset", "mixed-sight"], "policies for any team see everything"),
         (1, [str(tmp_path)], f"{tmp_path}/run.json: missing"),
         (2, ["random", "--seed", "-1"], "--seed -1: must be 0 to 2**63 - 1"),
         (2, ["random", "-o", "page.gif"], "-o page.gif: must end in .html"),

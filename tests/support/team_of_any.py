@@ -9,6 +9,7 @@ from innerattn.config import RunConfig, Scenario, load_run_config
 from innerattn.envs import BatchEnv
 from innerattn.policies.exported.contract import WEIGHTS, Contract, contract_in, contract_text
 from innerattn.policies.exported.pair_network import PairActor, PairLayers
+from innerattn.train import RunFolder
 from innerattn.train.export import export_run
 from innerattn.train.export.document import contract_document, network_of
 from innerattn.train.teams.policy import TeamPolicy
@@ -82,3 +83,11 @@ def actors_of(contract: Contract, policy: TeamPolicy) -> list[PairActor]:
     tensors = {name: one.numpy() for name, one in policy.actor.state_dict().items()}
     layers = PairLayers(contract.network, tensors)
     return [PairActor(contract, robot, layers) for robot in range(len(contract.robots))]
+
+
+def run_of(folder: Path, config: RunConfig) -> Path:
+    """A run folder with the weights of `policy_of`."""
+    run = RunFolder.create(folder, config, threads=1)
+    run.save_weights(policy_of(config).state(), 0)
+    run.mark("done", 0, 0, 0.0)
+    return folder

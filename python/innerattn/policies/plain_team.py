@@ -10,15 +10,16 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import RunConfig, Scenario
+from innerattn.config.team import TeamConfig
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
-from innerattn.policies.exported.contract import FrameColumns, Network
+from innerattn.policies.exported.contract import FrameColumns, Network, PairRules
 from innerattn.policies.exported.frame import Frame
 from innerattn.policies.exported.network import NumpyActor
 from innerattn.policies.policy import PolicyInput
@@ -32,6 +33,13 @@ LAYERS = ("first", "second", "output")
 _SLOPE = 0.01  # of the leaky ReLU, as in `innerattn.nn`
 _HANDED = (".fault.heading_bias", ".turn_rate", ".left")
 _MOST_BYTES = 1 << 26
+_POOLINGS: Mapping[str, Literal["attention", "mean", "max", "nearest"]] = {
+    "inner": "attention",
+    "uniform": "mean",
+    "max": "max",
+    "nearest": "nearest",
+}
+"""What the poolings of policies for any team are called in a contract."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +143,30 @@ def read_plain_team(run: str | Path, scenario: Scenario | None = None) -> PlainT
             f"{run}: was trained for other observations than these worlds give (another team, "
             "other tasks or another number of victims)"
         )
-    return PlainTeam(config, columns, _tensors(run, files.read(weights_name(files), _MOST_BYTES)))
+    return PlainTeam(config, columns, newest_tensors(files))
+
+
+def newest_tensors(files: RunFiles) -> Mapping[str, NDArray[np.float32]]:
+    """The float32 arrays of a run's newest weights that belong to actor or critic, by plain names.
+
+    Raises:
+        RunError: there are no weights, they cannot be read, or they hold a number that is not
+            finite.
+    """
+    return _tensors(files.path, files.read(weights_name(files), _MOST_BYTES))
+
+
+def pair_network(team: TeamConfig, scenario: Scenario) -> Network:
+    """That of a policy for any team in the worlds of ``scenario``."""
+    return Network(
+        encoder="pairs",
+        hidden_width=team.hidden_width,
+        leaky_relu_slope=0.0,
+        entities=None,
+        frame=None,
+        pooling=_POOLINGS[team.pooling],
+        pairs=PairRules(scenario.rescue_radius_m, scenario.robots_leave, team.key_width),
+    )
 
 
 def beyond_numpy(config: RunConfig) -> str | None:
@@ -191,8 +222,7 @@ def _columns(scenario: Scenario) -> tuple[str, ...]:
         return tuple(env.observation_names())
 
 
-def _tensors(run: str | Path, data: bytes) -> Mapping[str, NDArray[np.float32]]:
-    """The float32 arrays of a weights file that belong to actor or critic, by their plain names."""
+def _tensors(run: Path, data: bytes) -> Mapping[str, NDArray[np.float32]]:
     try:
         length = int.from_bytes(data[:8], "little")
         header = json.loads(data[8 : 8 + length])

@@ -23,7 +23,10 @@ from innerattn.report.play.state import playable_worlds
 WORLDS = "worlds.wasm"
 """The compiled worlds, beside this file; `make wasm` makes them."""
 _FOLDER = files("innerattn.report.page")
-_SCRIPTS = ("rust.js", "team.js", "scripts.js", "engine.js")
+_SCRIPTS = (
+    *("rust.js", "team.js", "roles.js", "pairs.js", "any_team.js"),
+    *("scripts.js", "engine.js"),
+)
 _POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline' 'wasm-unsafe-eval'"
 )

@@ -14,15 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import RunConfig, Scenario
+from innerattn.config.team import TeamConfig
 from innerattn.errors import RunError
 from innerattn.policies.exported.frame import Frame
 from innerattn.policies.plain_team import (
     LAYERS,
     PUSHES,
+    PlainTeam,
     beyond_numpy,
     read_plain_team,
 )
-from innerattn.records.run_folder import read_config
+from innerattn.records.run_files import RunFiles
+from innerattn.records.run_folder import config_of
+from innerattn.report.page.any_team import any_team_document
+from innerattn.report.page.weights import Weights
 
 _ACTOR = tuple(f"actor.{layer}" for layer in LAYERS)
 _ENCODERS = ("critic.state_encoder", "critic.action_encoder")
@@ -35,7 +40,7 @@ class PageTeam:
 
     Attributes:
         config: that of its run.
-        document: what the page's `Team` takes, as JSON.
+        document: what the page's `Team` or `AnyTeam` takes, as JSON.
         weights: (N,) float32, all numbers of its networks.
     """
 
@@ -59,11 +64,23 @@ def read_team(run: str | Path, scenario: Scenario | None = None) -> PageTeam:
     Raises:
         RunError: there is no readable run with weights, a page cannot compute what its policy is,
             or its robots do not see in ``scenario`` what they saw in training.
-        ConfigError: its configuration is not valid.
+        ConfigError: its configuration is not valid, or ``scenario`` has what a policy for any team
+            does not know.
     """
-    if key := beyond_numpy(read_config(run)):
+    files = RunFiles(run)
+    config = config_of(files)
+    if isinstance(config.algorithm, TeamConfig):
+        worlds = config.scenario if scenario is None else scenario
+        document, weights = any_team_document(files, config, config.algorithm, worlds)
+    elif key := beyond_numpy(config):
         raise RunError(f"{run}: a page cannot play it: {key}; innerattn play can")
-    team = read_plain_team(run, scenario)
+    else:
+        document, weights = _one_team_document(read_plain_team(run, scenario), run)
+    return PageTeam(config, document | {"tensors": weights.places}, weights.numbers())
+
+
+def _one_team_document(team: PlainTeam, run: str | Path) -> tuple[dict[str, Any], Weights]:
+    """What the page's `Team` takes, as JSON, and its weights."""
     tensors, network = team.tensors, team.config.network
     attends = (
         network.attention
@@ -74,13 +91,11 @@ def read_team(run: str | Path, scenario: Scenario | None = None) -> PageTeam:
     if attends in ("inner", "frozen"):
         wanted += [f"{layer}.{part}" for layer in _ENCODERS for part in ("weight", "bias")]
         wanted += _LOOKS
-    places, numbers, begin = {}, [], 0
+    weights = Weights()
     for name in wanted:
         if name not in tensors:
             raise RunError(f"{run}: a page cannot play it: its weights hold no {name}")
-        places[name] = {"begin": begin, "shape": list(tensors[name].shape)}
-        numbers.append(tensors[name].ravel())
-        begin += tensors[name].size
+        weights.add(name, tensors[name])
     document = {
         "width": len(team.columns),
         "actions": len(PUSHES),
@@ -90,9 +105,8 @@ def read_team(run: str | Path, scenario: Scenario | None = None) -> PageTeam:
         "uniform": attends == "uniform",
         "available": team.columns.index("own.available") if network.mask_unavailable else -1,
         "frame": None if team.frame is None else _tables(team.frame),
-        "tensors": places,
     }
-    return PageTeam(team.config, document, np.concatenate(numbers))
+    return document, weights
 
 
 def _tables(frame: Frame) -> dict[str, Any]:

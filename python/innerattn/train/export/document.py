@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from hashlib import sha256
 from importlib.metadata import version
-from typing import Any, Literal
+from typing import Any
 
 from innerattn.config import Robot, RunConfig, Scenario
 from innerattn.config.team import TeamConfig
@@ -20,10 +20,10 @@ from innerattn.policies.exported.contract import (
     FrameColumns,
     LogStd,
     Network,
-    PairRules,
     digest_of,
 )
 from innerattn.policies.exported.frame import Frame
+from innerattn.policies.plain_team import pair_network
 from innerattn.train.export.about import about
 from innerattn.train.frames import turning_columns
 
@@ -192,7 +192,7 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
 def network_of(config: RunConfig, names: Sequence[str], entities: EntityColumns | None) -> Network:
     """What numpy needs to know of the actors."""
     if isinstance(config.algorithm, TeamConfig):
-        return _pairs_network(config.algorithm, config.scenario)
+        return pair_network(config.algorithm, config.scenario)
     frame = None
     if config.network.symmetry == "canonical":
         found = turning_columns(config.scenario, names)
@@ -210,28 +210,6 @@ def network_of(config: RunConfig, names: Sequence[str], entities: EntityColumns 
         frame=frame,
         log_std=_log_std() if config.scenario.actions == "continuous" else None,
         pooling=config.network.pooling,
-    )
-
-
-_POOLINGS: Mapping[str, Literal["attention", "mean", "max", "nearest"]] = {
-    "inner": "attention",
-    "uniform": "mean",
-    "max": "max",
-    "nearest": "nearest",
-}
-"""What the poolings of policies for any team are called in a contract."""
-
-
-def _pairs_network(team: TeamConfig, scenario: Scenario) -> Network:
-    """That of a policy for any team, in these worlds."""
-    return Network(
-        encoder="pairs",
-        hidden_width=team.hidden_width,
-        leaky_relu_slope=0.0,
-        entities=None,
-        frame=None,
-        pooling=_POOLINGS[team.pooling],
-        pairs=PairRules(scenario.rescue_radius_m, scenario.robots_leave, team.key_width),
     )
 
 

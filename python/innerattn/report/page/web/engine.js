@@ -75,7 +75,7 @@ class Engine {
   policyOf({ name, team, weights, motion }) {
     if (motion) return new (name === "greedy" ? Greedy : Hungarian)(name, motion, this.continuous);
     if (!team) return new Chance(name, this.size, this.continuous);
-    return new Team(name, team, new Float32Array(bytesOf(weights).buffer));
+    return new (team.known ? AnyTeam : Team)(name, team, new Float32Array(bytesOf(weights).buffer));
   }
 
   answer(message) {
