@@ -30,6 +30,8 @@ def played(make: Callable[[], InteractiveWorld], name: str = "team") -> Iterator
     server = LocalServer(play_pages(name), take=Sessions(make).take)
     thread = threading.Thread(target=server.serve)
     thread.start()
-    yield server
-    server.close()
-    thread.join()
+    try:
+        yield server
+    finally:
+        server.close()
+        thread.join()

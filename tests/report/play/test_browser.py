@@ -240,6 +240,24 @@ def test_one_robot_is_steered_by_keys_and_pushed(browser: Browser) -> None:
         assert vx == pytest.approx(2 * vy, rel=0.05)
 
 
+def test_a_rescue_is_told_once(browser: Browser) -> None:
+    with played(scripted_world()) as server, visit(browser, server.address) as seen:
+        page = seen.page
+        ready(page)
+        page.keyboard.press("n")
+        settle(page)
+        page.evaluate(
+            "(async () => { do { await play.send({ do: 'step' }); } "
+            "while (!play.run.now.rescues.length); })()"
+        )
+        settle(page)
+        before = page.locator("#events li").count()
+        page.evaluate("play.send({ do: 'steer', robot: 0 })")
+        page.evaluate("play.send({ do: 'policy', name: 'greedy' })")
+        settle(page)
+        assert page.locator("#events li").count() == before > 0
+
+
 def test_everything_is_reached_without_a_mouse(browser: Browser) -> None:
     with played(scripted_world()) as server, visit(browser, server.address) as seen:
         page = seen.page

@@ -25,8 +25,10 @@ class LiveRun {
   take(state) {
     const before = this.now, again = this.continues(state);
     if (!again) this.clear();
-    if (again && state.step === before.step) this.moments[this.moments.length - 1] = state;
-    else this.moments.push(state);
+    if (again && state.step === before.step) {
+      state = { ...state, rescues: [], lost: [], handoffs: [] }; // told before
+      this.moments[this.moments.length - 1] = state;
+    } else this.moments.push(state);
     if (this.moments.length > KEPT_STEPS) this.moments.shift();
     this.first = this.moments[0].step;
     this.worlds.places = state.obstacles.flat();
