@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -64,6 +65,25 @@ def test_a_policy_for_any_team_is_written_for_the_team_of_a_file(tmp_path: Path)
     assert len(found["policies"][0]["team"]["known"]["bodies"]) == 5
 
 
+def test_two_policies_stand_side_by_side(
+    run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "two.html"
+    assert main(["page", "greedy", str(run_dir), "-o", str(out)]) == 0
+    assert f": greedy beside {run_dir.name}, " in capsys.readouterr().out
+    assert f'data-beside="{run_dir.name}"' in out.read_text()
+    names = [one["name"] for one in given(out)["policies"]]
+    assert names == ["greedy", run_dir.name, "random", "hungarian"]
+    copy = Path(shutil.copytree(run_dir, tmp_path / "copy" / run_dir.name))
+    assert main(["page", str(run_dir), str(copy), "-o", str(out)]) == 0
+    names = [one["name"] for one in given(out)["policies"]]
+    assert names[:2] == [str(run_dir), str(copy)]
+    assert main(["page", "greedy", "greedy", "-o", str(out)]) == 0
+    assert 'data-beside="greedy"' in out.read_text()
+    assert main(["page", "greedy", "-o", str(out)]) == 0
+    assert 'data-beside=""' in out.read_text()
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("team", ["mixed", "any"])
 def test_a_team_of_the_package_needs_no_torch(tmp_path: Path, team: str) -> None:
@@ -82,6 +102,9 @@ def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     other.write_text("max_victims = 5\n")
     cases = [
         (1, ["nobody"], "nobody: neither a run's folder nor one of random, greedy, hungarian"),
+        (2, ["random", "greedy", "hungarian"], "3 policies: must be 1 or 2 of RUN|POLICY"),
+        (1, ["random", "oracle"], "oracle: a page has no such script"),
+        (1, ["zoo:mixed", "zoo:mixed-8"], "was trained for other observations"),
         (1, ["oracle"], "oracle: a page has no such script"),
         (1, ["zoo:any", "--preset", "mixed-sight"], "policies for any team see everything"),
         (1, [str(tmp_path)], f"{tmp_path}/run.json: missing"),

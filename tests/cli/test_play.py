@@ -29,14 +29,14 @@ def posted(address: str, path: str, message: object) -> tuple[int, dict[str, obj
 @pytest.mark.long
 @pytest.mark.usefixtures("interruptible")
 def test_a_run_is_played(run_dir: Path) -> None:
-    command = [sys.executable, "-m", "innerattn", "play", str(run_dir), "--seed", "3"]
+    command = [sys.executable, "-m", "innerattn", "play", str(run_dir), "oracle", "--seed", "3"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     try:
         address = process.stdout.readline().split()[-1]
         status, opened = posted(address, "sessions", {})
         assert status == 200
-        scripts = ["random", "greedy", "hungarian", "planner", "oracle", "greedy-seen"]
+        scripts = ["oracle", "random", "greedy", "hungarian", "planner", "greedy-seen"]
         assert opened["policies"] == [run_dir.name, *scripts]
         assert opened["attention"]
         for name in ("oracle", run_dir.name, "random"):
@@ -64,6 +64,8 @@ def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
         )
         cases = [
             (1, ["nobody"], nobody),
+            (1, ["greedy", "nobody"], nobody),
+            (2, ["greedy", "oracle", "random"], "3 policies: must be 1 or 2 of RUN|POLICY"),
             (1, [str(tmp_path)], f"{tmp_path}/run.json: missing"),
             (2, ["greedy", "--port", "70000"], "--port 70000: must be 0 to 65,535"),
             (2, ["greedy", "--seed", "-1"], "--seed -1: must be 0 to 2**64 - 1"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from innerattn.cli.main import main
-from innerattn.cli.runs import existing_run, named_policy, named_run
+from innerattn.cli.runs import existing_run, named_policy, named_run, shown_names
 from innerattn.errors import RunError
 from innerattn.zoo import run_path
 
@@ -145,3 +145,14 @@ def test_teams_of_the_package_are_not_gone_on_with(capsys: pytest.CaptureFixture
         "innerattn: error: zoo:mixed: a team of the package is done, nothing to go on from"
     ]
     assert sorted(run_path("zoo:mixed").rglob("*")) == before
+
+
+def test_two_policies_have_two_names() -> None:
+    def shown(*policies: str) -> list[str]:
+        return shown_names(policies, ("greedy", "random"))
+
+    assert shown("runs/a", "greedy") == ["a", "greedy"]
+    assert shown("runs/a", "other/a") == ["runs/a", "other/a"]
+    assert shown("runs/a", "runs/a") == ["a", "a"]
+    assert shown("greedy", "runs/greedy") == ["greedy", "greedy (run)"]
+    assert shown("x/greedy", "y/greedy") == ["x/greedy", "y/greedy"]

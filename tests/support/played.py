@@ -25,9 +25,11 @@ def scripted_world(scenario: Scenario | None = None, *names: str) -> Callable[[]
 
 
 @contextmanager
-def played(make: Callable[[], InteractiveWorld], name: str = "team") -> Iterator[LocalServer]:
+def played(
+    make: Callable[[], InteractiveWorld], name: str = "team", beside: str = ""
+) -> Iterator[LocalServer]:
     """A server of such worlds."""
-    server = LocalServer(play_pages(name), take=Sessions(make).take)
+    server = LocalServer(play_pages(name, beside), take=Sessions(make).take)
     thread = threading.Thread(target=server.serve)
     thread.start()
     try:

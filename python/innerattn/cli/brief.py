@@ -135,29 +135,32 @@ BRIEF: Mapping[str, Brief] = {
         ("latest", "runs", "runs/a-s0 runs/a-s1"),
     ),
     "play": Brief(
-        "[OPTIONS] RUN|POLICY",
+        "[OPTIONS] RUN|POLICY [RUN|POLICY]",
         (
             (
                 "RUN|POLICY",
                 "a run (also zoo:NAME), or a script: random, greedy, greedy-seen, hungarian, "
-                "planner, oracle",
+                "planner, oracle; two stand side by side",
             ),
             ("--scenario FILE", "TOML file with the scenario to play in (that of the run)"),
             ("--seed N", "seed of the world"),
             ("--port N", "port of 127.0.0.1; 0: any that is free ({port})"),
         ),
-        ("zoo:mixed", "latest --scenario flood.toml"),
+        ("zoo:mixed", "zoo:mixed greedy", "latest --scenario flood.toml"),
     ),
     "page": Brief(
-        "[OPTIONS] RUN|POLICY",
+        "[OPTIONS] RUN|POLICY [RUN|POLICY]",
         (
-            ("RUN|POLICY", "a run (also zoo:NAME), or random, greedy, hungarian"),
+            (
+                "RUN|POLICY",
+                "a run (also zoo:NAME), or random, greedy, hungarian; two stand side by side",
+            ),
             ("-o, --output FILE", "page to write: .html ({output})"),
             ("--preset NAME", "built-in scenario to play in (that of the run, or mixed)"),
             ("--scenario FILE", "TOML file with the scenario to play in, instead"),
             ("--seed N", "seed of the world"),
         ),
-        ("zoo:mixed", "latest -o team.html", "random --preset mixed-wheels"),
+        ("zoo:mixed", "zoo:mixed greedy -o two.html", "zoo:any --scenario my_team.toml"),
     ),
     "export": Brief(
         "[OPTIONS] RUN",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from innerattn.cli.options import Command, UsageError, check_seed, check_target
-from innerattn.cli.runs import named_policy
+from innerattn.cli.runs import named_policy, shown_names
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
 from innerattn.policies import SCRIPTS
@@ -22,16 +22,17 @@ if TYPE_CHECKING:
 class Page(Command):
     """Write one HTML file in which a team acts live, to play with: no server and no network."""
 
-    policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
-    """A run, or a script that a page can compute: random, greedy, hungarian."""
+    policies: Annotated[tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN|POLICY ...")]
+    """Runs, or scripts that a page can compute: random, greedy, hungarian; two are shown side by
+    side, in the same world."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("page.html")
     """File to write."""
     preset: str | None = None
-    """Built-in scenario to play in; None: that of the run, or mixed."""
+    """Built-in scenario to play in; None: that of the first run, or mixed."""
     scenario: Path | None = None
-    """TOML file with the scenario to play in; None: that of the run, or mixed."""
+    """TOML file with the scenario to play in; None: that of the first run, or mixed."""
     seed: int | None = None
-    """Seed of the world; None: as the run says, or 12345."""
+    """Seed of the world; None: as the first run says, or 12345."""
 
     def run(self) -> int:
         """Write the file.
@@ -48,33 +49,32 @@ class Page(Command):
         from innerattn.report.page.scripts import page_scripts
         from innerattn.report.page.team import read_team
 
-        worlds = self._worlds()
+        names, worlds = shown_names(self.policies, SCRIPTS), self._worlds()
         policies: dict[str, PageTeam | None] = {}
-        settings, name = EvaluateConfig(), self.policy
-        if self.policy not in SCRIPTS:
-            team = read_team(self.policy, worlds)
-            worlds, settings = worlds or team.config.scenario, team.config.evaluate
-            name = Path(self.policy).resolve().name
-            name = f"{name} (run)" if name in SCRIPTS else name
-            policies[name] = team
-        worlds = worlds or Scenario.preset("mixed")
-        scripts = page_scripts(worlds)
-        if not policies:
-            scripts = tuple(dict.fromkeys([self.policy, *scripts]))
+        settings: EvaluateConfig | None = None
+        for name, policy in zip(names, self.policies, strict=True):
+            policies[name] = team = None if policy in SCRIPTS else read_team(policy, worlds)
+            if team is not None:
+                worlds, settings = worlds or team.config.scenario, settings or team.config.evaluate
+        worlds, settings = worlds or Scenario.preset("mixed"), settings or EvaluateConfig()
         seed = settings.seed if self.seed is None else self.seed
-        page = worlds_page(name, worlds, policies | dict.fromkeys(scripts), seed)
+        scripts = {one: None for one in page_scripts(worlds) if one not in policies}
+        title, beside = " beside ".join(names), names[1] if len(names) > 1 else ""
+        page = worlds_page(title, worlds, policies | scripts, seed, beside)
         write_whole(self.output, page.encode(errors="backslashreplace"))
-        print(f"{self.output}: {name}, {self.output.stat().st_size / 1e6:.1f} MB")
+        print(f"{self.output}: {title}, {self.output.stat().st_size / 1e6:.1f} MB")
         return 0
 
     def _check(self) -> None:
+        if not 1 <= len(self.policies) <= 2:
+            raise UsageError(f"{len(self.policies)} policies: must be 1 or 2 of RUN|POLICY")
         if self.preset is not None and self.scenario is not None:
             raise UsageError("--preset and --scenario: only one of them")
         if self.output.suffix != ".html":
             raise UsageError(f"-o {self.output}: must end in .html")
         check_seed(self.seed)
         check_target(self.output)
-        self.policy = named_policy(self.policy, SCRIPTS)
+        self.policies = [named_policy(one, SCRIPTS) for one in self.policies]
 
     def _worlds(self) -> Scenario | None:
         if self.scenario is not None:

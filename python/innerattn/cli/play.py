@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from innerattn.cli.options import Command, UsageError, check_seed
-from innerattn.cli.runs import named_policy
+from innerattn.cli.runs import named_policy, shown_names
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.policies import SCRIPTS
 
@@ -24,12 +24,13 @@ if TYPE_CHECKING:
 class Play(Command):
     """Play with a team in a browser on this machine: move, push, break robots; Ctrl-C ends it."""
 
-    policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
-    """A run, or one of random, greedy, hungarian, planner, oracle, greedy-seen; it acts first."""
+    policies: Annotated[tyro.conf.Positional[list[str]], tyro.conf.arg(metavar="RUN|POLICY ...")]
+    """Runs, or random, greedy, hungarian, planner, oracle, greedy-seen; two are shown side by side,
+    in the same world. All can take over later."""
     scenario: Path | None = None
-    """TOML file with the scenario to play in; None: that of the run, or mixed."""
+    """TOML file with the scenario to play in; None: that of the first run, or mixed."""
     seed: int | None = None
-    """Seed of the world; None: as the run says, or 12345."""
+    """Seed of the world; None: as the first run says, or 12345."""
     port: int = 0
     """Port of 127.0.0.1; 0: any that is free."""
 
@@ -49,7 +50,9 @@ class Play(Command):
 
         self._world()
         sessions = Sessions(self._world)
-        server = LocalServer(play_pages(self._name), self.port, sessions.take)
+        names = self._names
+        title, beside = " beside ".join(names), names[1] if len(names) > 1 else ""
+        server = LocalServer(play_pages(title, beside), self.port, sessions.take)
         greeting = f"Play at {server.address}\nCtrl-C ends it."
         try:
             server.serve(partial(print, greeting, flush=True))
@@ -58,37 +61,36 @@ class Play(Command):
         return 0
 
     def _check(self) -> None:
+        if not 1 <= len(self.policies) <= 2:
+            raise UsageError(f"{len(self.policies)} policies: must be 1 or 2 of RUN|POLICY")
         if not 0 <= self.port < 65536:
             raise UsageError(f"--port {self.port}: must be 0 to 65,535")
         check_seed(self.seed, bits=64)
-        self.policy = named_policy(self.policy, SCRIPTS)
+        self.policies = [named_policy(one, SCRIPTS) for one in self.policies]
 
     @property
-    def _name(self) -> str:
-        """What to call the team: the script, or the run's folder."""
-        if self.policy in SCRIPTS:
-            return self.policy
-        name = Path(self.policy).resolve().name
-        return f"{name} (run)" if name in SCRIPTS else name
+    def _names(self) -> list[str]:
+        return shown_names(self.policies, SCRIPTS)
 
     def _world(self) -> InteractiveWorld:
-        """A world of its own for a page, with the newest weights of the run."""
+        """A world of its own for an arena of a page, with the newest weights of runs."""
         from innerattn.evaluate.interactive import InteractiveWorld, endless
         from innerattn.evaluate.trained import load_trained
         from innerattn.policies import scripted_policy
         from innerattn.records.run_folder import read_config
 
-        config = None if self.policy in SCRIPTS else read_config(self.policy)
+        runs = [one for one in self.policies if one not in SCRIPTS]
+        config = read_config(runs[0]) if runs else None
         scenario = endless(self._scenario(config))
         settings = EvaluateConfig() if config is None else config.evaluate
         seed = settings.seed if self.seed is None else self.seed
+        named = dict(zip(self._names, self.policies, strict=True))
         policies: dict[str, Policy] = {}
-        if config is not None:
-            # Somebody may blind a robot.
-            policies[self._name] = load_trained(self.policy, scenario, each_sees=True)[1]
-        others = [name for name in SCRIPTS if name != self.policy]
-        for name in [self._name, *others] if config is None else others:
-            policies[name] = scripted_policy(name, scenario, seed)
+        for name, policy in {**named, **{one: one for one in SCRIPTS}}.items():
+            if policy in SCRIPTS:
+                policies[name] = scripted_policy(policy, scenario, seed)
+            else:  # somebody may blind a robot
+                policies[name] = load_trained(policy, scenario, each_sees=True)[1]
         return InteractiveWorld(scenario, policies, seed)
 
     def _scenario(self, config: RunConfig | None) -> Scenario:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection
+from collections import Counter
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from innerattn.config.near import did_you_mean
@@ -85,6 +86,24 @@ def named_policy(name: str, scripts: Collection[str]) -> str:
             f"{_meant(name, [*scripts, LATEST])}"
         )
     return str(found)
+
+
+def shown_names(policies: Sequence[str], scripts: Collection[str]) -> list[str]:
+    """What to call policies, as of `named_policy`: a script by its name, a run by its folder's.
+
+    Two runs in folders of one name are called by their paths.
+    """
+
+    def folder_of(run: str) -> str:
+        return Path(run).resolve().name
+
+    runs = {one for one in policies if one not in scripts}
+    folders = Counter(map(folder_of, runs))
+    names = []
+    for one in policies:
+        name = one if one in scripts or folders[folder_of(one)] > 1 else folder_of(one)
+        names.append(f"{name} (run)" if one in runs and name in scripts else name)
+    return names
 
 
 def _meant(name: str, words: Collection[str]) -> str:

@@ -33,7 +33,11 @@ _POLICY = (
 
 
 def worlds_page(
-    title: str, scenario: Scenario, policies: Mapping[str, PageTeam | None], seed: int
+    title: str,
+    scenario: Scenario,
+    policies: Mapping[str, PageTeam | None],
+    seed: int,
+    beside: str = "",
 ) -> str:
     """A page in which a person plays with a team; it loads nothing from elsewhere.
 
@@ -42,6 +46,8 @@ def worlds_page(
         scenario: the worlds.
         policies: teams by the name to show; None: the script of that name. The first one acts.
         seed: of the worlds, 0 to 2**63 - 1.
+        beside: which of the policies acts in a second arena beside the first, in the same world;
+            empty: there is none.
 
     Raises:
         ConfigError: a page cannot compute such a script in these worlds.
@@ -52,6 +58,7 @@ def worlds_page(
     return filled_page(
         title,
         [(_FOLDER / "web" / name).read_text("utf-8") for name in _SCRIPTS],
+        beside,
         head=f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n',
         given=f'<script id="given" type="application/json">{json_text(given)}</script>\n',
     )

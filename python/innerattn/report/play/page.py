@@ -15,23 +15,28 @@ _SHARED = (
     *("dom.js", "theme.js", "worlds.js", "story.js", "ground.js", "room.js"),
     *("senses.js", "scene.js", "marks.js", "charts.js", "panel.js"),
 )
-_BEFORE, _AFTER = ("live.js", "link.js"), ("hands.js", "forms.js", "about.js", "app.js")
+_BEFORE = ("live.js", "balance.js", "link.js")
+_AFTER = ("hands.js", "forms.js", "about.js", "arena.js", "app.js")
 
 
-def play_page(name: str) -> str:
-    """The page; it asks the server that sent it for a world.
+def play_page(name: str, beside: str = "") -> str:
+    """The page; it asks the server that sent it for a world, or for two.
 
     Args:
         name: what is played, in the title; any text.
+        beside: as of `filled_page`.
     """
-    return filled_page(name, [_text("server.js")])
+    return filled_page(name, [_text("server.js")], beside)
 
 
-def filled_page(name: str, answering: Sequence[str], head: str = "", given: str = "") -> str:
+def filled_page(
+    name: str, answering: Sequence[str], beside: str = "", head: str = "", given: str = ""
+) -> str:
     """The page with the scripts that answer its messages.
 
     Args:
         name: what is played, in the title; any text.
+        beside: policy that acts in a second arena beside the first; empty: there is none.
         answering: scripts that have a function `transport`, as in `web/server.js`.
         head: elements to add to its head.
         given: elements before its scripts, for these.
@@ -40,6 +45,7 @@ def filled_page(name: str, answering: Sequence[str], head: str = "", given: str 
     return fill(
         _text("play.html"),
         title=escape(name),
+        beside=escape(beside),
         head=head,
         given=given,
         style=f"{shared_text('colours.css', 'arena.css')}\n{_text('play.css')}",
@@ -47,9 +53,9 @@ def filled_page(name: str, answering: Sequence[str], head: str = "", given: str 
     )
 
 
-def play_pages(name: str) -> dict[str, partial[Answer]]:
-    """All pages by name, for `innerattn.report.local_server.LocalServer`."""
-    return {"": partial(Answer, "text/html", play_page(name))}
+def play_pages(name: str, beside: str = "") -> dict[str, partial[Answer]]:
+    """All pages by name, for `innerattn.report.local_server.LocalServer`; see `play_page`."""
+    return {"": partial(Answer, "text/html", play_page(name, beside))}
 
 
 def _text(name: str) -> str:

@@ -2,7 +2,7 @@
 
 const MOST_TASKS = 3;
 
-function aboutText(worlds, attends) {
+function aboutText(worlds, attends, areTwo) {
   const { robots, tasks } = worlds;
   const needs = tasks.map(({ name, needs: all, amounts }) => `${listed(withAmounts(all, amounts))} (${name})`);
   const which = tasks.length > MOST_TASKS ? "" : `: ${needs.join(" or ")}`;
@@ -11,6 +11,10 @@ function aboutText(worlds, attends) {
       `when robots that offer what it needs are beside it at the same time${which}.`,
     "Each robot acts by itself. Drag one, break one, and watch what the others do.",
   ];
+  if (areTwo) {
+    says.push("Both arenas begin alike and keep the same time; only who drives the robots differs. " +
+      "What you do in one happens in both, unless you switch that off.");
+  }
   if (attends) {
     says.push("Lines from the chosen robot show attention: how much its critic, which judged the team in " +
       "training, looks at each teammate.");

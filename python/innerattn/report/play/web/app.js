@@ -10,30 +10,27 @@ const NOTICE_MS = 7000;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 class App {
-  constructor(link, opened) {
-    const { worlds, policies } = opened;
-    this.link = link;
-    this.worlds = new Worlds(worlds, opened.obstacles.flat(), 1);
-    this.policies = policies;
-    this.run = new LiveRun(document.title, this.worlds);
+  /** `sessions`: the link and the opening document of each arena. */
+  constructor(sessions) {
+    Object.assign(this, { running: false, due: 0, charted: 0, times: [], drive: [] });
     this.look = { robot: 0, received: false, all: false, least: 0, head: -1, trails: true, ...SENSES };
+    this.events = new EventLog($("events"), $("no-events"), (robot, arena) => {
+      this.show(arena);
+      this.choose(robot);
+    });
+    $("panes").dataset.count = String(sessions.length);
+    this.arenas = sessions.map(({ link, opened }, index) => new Arena(this, link, opened, index, sessions.length));
+    [this.arena] = this.arenas;
     this.look.least = strongWeight(this.worlds.robots.length);
-    // Only this page changes them: what was asked for last is so, though the answer is on its way.
-    Object.assign(this, { steered: opened.steered, policy: opened.policy });
-    Object.assign(this, { running: false, due: 0, arrived: 0, charted: 0, times: [], drive: [], moving: null });
-    this.events = new EventLog($("events"), $("no-events"), (robot) => this.choose(robot));
     this.charts = new Charts($("charts"), () => {});
-    this.scene = new Scene($("arena"), this.run);
-    this.hands = new Hands(this.scene, this.acts());
     this.panel = new RobotPanel(
-      this.worlds, (values) => this.send({ do: "faults", robot: this.look.robot, values }),
-      (x, y) => this.send({ do: "move_robot", robot: this.look.robot, x, y }),
+      this.worlds, (values) => this.reach({ do: "faults", robot: this.look.robot, values }),
+      (x, y) => this.reach({ do: "move_robot", robot: this.look.robot, x, y }),
     );
     this.victims = new VictimPanel(
-      this.worlds, (slot, x, y) => this.send({ do: "move_victim", slot, x, y }),
-      (task, x, y) => this.send({ do: "add_victim", task, x, y }),
+      this.worlds, (victim, x, y) => this.arena.moveVictim(victim, x, y),
+      (task, x, y) => this.arena.addVictim(task, x, y),
     );
-    this.take(opened);
     this.fillControls();
     this.listen();
     startTheme(() => this.takeTheme());
@@ -43,30 +40,79 @@ class App {
     requestAnimationFrame((now) => this.frame(now));
   }
 
-  /** What hands in the arena may do. */
-  acts() {
-    return {
-      choose: (robot) => this.choose(robot),
-      move: (robot, x, y, drop) => this.moveRobot(robot, x, y, drop),
-      push: (robot, vx, vy) => this.send({ do: "push_robot", robot, vx, vy }),
-      moveVictim: (victim, x, y) => this.send({ do: "move_victim", slot: victim.slot, x, y })
-        .finally(() => (victim.held = false)),
-      addVictim: (task, x, y) => {
-        if (this.run.now.victims.length < this.worlds.num_victims) this.send({ do: "add_victim", task, x, y });
-        else this.tell($("victim-places").textContent);
-      },
-      redraw: () => (this.stale = true),
-    };
+  // What buttons and lists show is of the arena that was chosen last.
+  get link() {
+    return this.arena.link;
+  }
+
+  get run() {
+    return this.arena.run;
+  }
+
+  get worlds() {
+    return this.arena.worlds;
+  }
+
+  get scene() {
+    return this.arena.scene;
+  }
+
+  get hands() {
+    return this.arena.hands;
+  }
+
+  get movesNow() {
+    return this.arena.movesNow;
+  }
+
+  /** The arenas that a hand in one of them reaches. */
+  reached(arena = this.arena) {
+    return $("both").checked ? this.arenas : [arena];
+  }
+
+  /** Sends what a hand does. */
+  reach(message, arena = this.arena) {
+    for (const one of this.reached(arena)) one.send(message);
+  }
+
+  /** Sends what the arenas always do together. */
+  async sendAll(message) {
+    await Promise.all(this.arenas.map((one) => one.send(message)));
+  }
+
+  /** Sends to the chosen arena alone. */
+  send(message) {
+    return this.arena.send(message);
   }
 
   fillControls() {
-    $("subtitle").textContent = aboutText(this.worlds, this.run.heads > 0);
-    fillSelect($("policy"), this.policies.map((name) => [name, name]), this.run.now.policy);
+    const areTwo = this.arenas.length > 1, attends = this.arenas.some(({ run }) => run.heads > 0);
+    $("subtitle").textContent = aboutText(this.worlds, attends, areTwo);
+    for (const id of ["both-box", "sides", "key-other", "about-balance"]) $(id).hidden = !areTwo;
+    $("policy-box").hidden = areTwo;
+    if (areTwo) this.fillSides();
+    fillSelect($("policy"), this.arena.policies.map((name) => [name, name]), this.run.now.policy);
     fillSelect($("speed"), SPEEDS.map((speed) => [String(speed), `${speed}×`]), "");
     fillSelect($("task"), this.worlds.tasks.map(({ name }, task) => [String(task), name]), "0");
     fillLegend($("legend"), this.worlds);
     fillSenses($("senses"), this.run, this.look, (look) => this.setLook(look));
-    $("arena").setAttribute("aria-label", "Arena");
+  }
+
+  /** Buttons that choose one of two arenas. */
+  fillSides() {
+    this.sides = this.arenas.map((arena) => {
+      const button = element("button", { type: "button" });
+      button.addEventListener("click", () => this.show(arena));
+      $("which").append(button);
+      return button;
+    });
+  }
+
+  /** Shows an arena in buttons and lists. */
+  show(arena) {
+    if (arena === this.arena) return;
+    this.arena = arena;
+    this.setLook({});
   }
 
   listen() {
@@ -76,10 +122,10 @@ class App {
     on("restart", "click", () => this.restart());
     on("from-seed", "submit", (event) => {
       event.preventDefault();
-      this.send({ do: "restart", seed: Number(event.target.elements.seed.value) });
+      this.sendAll({ do: "restart", seed: Number(event.target.elements.seed.value) });
     });
     on("speed", "change", () => this.setSpeed(Number($("speed").value)));
-    on("policy", "change", () => this.choosePolicy($("policy").value));
+    on("policy", "change", () => this.arena.choosePolicy($("policy").value));
     on("head", "change", () => this.setLook({ head: Number($("head").value) }));
     on("all", "change", () => this.setLook({ all: $("all").checked }));
     on("least", "input", () => this.setLook({ least: $("least").value / 100 }));
@@ -94,12 +140,8 @@ class App {
     document.addEventListener("keydown", (event) => pressed(this, event));
     document.addEventListener("keyup", (event) => this.release(event.key));
     window.addEventListener("blur", () => this.release());
-    window.addEventListener("pagehide", () => this.link.end());
+    window.addEventListener("pagehide", () => this.arenas.forEach(({ link }) => link.end()));
     window.addEventListener("pageshow", (event) => event.persisted && location.reload());
-    new ResizeObserver(() => {
-      this.scene.fit();
-      this.stale = true;
-    }).observe($("arena"));
   }
 
   /** An arrow button drives while it is held, or pushes once. */
@@ -118,24 +160,15 @@ class App {
 
   /** Whether the chosen robot is steered by hand. */
   get steers() {
-    return this.steered === this.look.robot;
+    return this.arena.steered === this.look.robot;
   }
 
-  async send(message) {
-    try {
-      const state = await this.link.send(message);
-      this.take(state, message.do === "step");
-    } catch (error) {
-      this.fail(error);
-    }
-  }
-
-  fail(error) {
+  fail(error, link) {
     if (error instanceof Refusal && !error.ended) return this.tell(error.message);
     this.setRunning(false);
     const again = element("button", { type: "button" }, "Begin again");
     again.addEventListener("click", () => location.reload());
-    const text = error instanceof Refusal ? error.message : this.link.transport.lost(error);
+    const text = error instanceof Refusal ? error.message : link.transport.lost(error);
     clearTimeout(this.telling);
     $("problem").replaceChildren(text, again);
     $("problem").hidden = false;
@@ -148,67 +181,28 @@ class App {
     this.telling = setTimeout(() => ($("problem").hidden = true), NOTICE_MS);
   }
 
-  /** Shows a state. */
-  take(state, isStep = false) {
-    if (!this.run.continues(state)) this.events.clear();
-    const events = this.run.take(state);
-    this.events.add(events, this.worlds.dt_s);
-    if (isStep) this.arrived = performance.now();
-    this.happened = events.length ? events : this.happened?.filter((one) => state.step - one.step < 10) ?? [];
-    this.fresh = this.stale = this.chartsAreOld = true;
-  }
-
-  /** Moves a robot as fast as the server takes it; the last place counts. */
-  moveRobot(robot, x, y, drop) {
-    this.moving = { robot, x, y, drop };
-    if (!this.movesNow) this.sendMoves();
-  }
-
-  async sendMoves() {
-    this.movesNow = true;
-    while (this.moving) {
-      const { robot, x, y, drop } = this.moving;
-      this.moving = null;
-      await this.send({ do: "move_robot", robot, x, y });
-      if (drop && !this.moving) this.run.held = null;
-    }
-    this.movesNow = false;
-    this.stale = true;
-  }
-
   step() {
     this.setRunning(false);
-    this.send({ do: "step" });
+    this.sendAll({ do: "step" });
   }
 
   restart() {
-    this.send({ do: "restart" });
+    this.sendAll({ do: "restart" });
   }
 
-  push([x, y]) {
-    const [vx, vy] = this.run.now.velocities[this.look.robot];
-    const most = (speed) => Math.min(Math.max(speed, -this.worlds.most_push_mps), this.worlds.most_push_mps);
-    const pushed = { vx: most(vx + PUSH_MPS * x), vy: most(vy + PUSH_MPS * y) };
-    this.send({ do: "push_robot", robot: this.look.robot, ...pushed });
+  push(way) {
+    for (const arena of this.reached()) arena.push(this.look.robot, way);
   }
 
-  nudge([x, y]) {
-    const { robot } = this.look, [ax, ay] = this.run.now.positions[robot];
-    const most = this.worlds.half_width_m - this.worlds.robots[robot].radius_m - 1e-4;
-    const inside = (metres) => Math.min(Math.max(metres, -most), most);
-    this.send({ do: "move_robot", robot, x: inside(ax + NUDGE_M * x), y: inside(ay + NUDGE_M * y) });
+  nudge(way) {
+    for (const arena of this.reached()) arena.nudge(this.look.robot, way);
   }
 
   toggleSteering() {
+    const robot = this.steers ? null : this.look.robot;
     this.drive = [];
-    this.steered = this.steers ? null : this.look.robot;
-    this.send({ do: "steer", robot: this.steered });
-    if (this.steered !== null) this.setRunning(true);
-  }
-
-  choosePolicy(name) {
-    this.policy = name;
-    this.send({ do: "policy", name });
+    for (const arena of this.reached()) arena.steer(robot);
+    if (robot !== null) this.setRunning(true);
   }
 
   /** Drives the steered robot that way until the key is released; the latest key counts. */
@@ -225,12 +219,16 @@ class App {
   }
 
   sendDrive() {
-    const [x, y] = this.drive.at(-1)?.way ?? [0, 0];
-    if (this.steered !== null) this.send({ do: "steer", robot: this.steered, x, y });
+    // Where hands let go, no robot goes on.
+    const { way } = this.drive.at(-1) ?? {};
+    for (const arena of way ? this.reached() : this.arenas) arena.drive(way ?? [0, 0]);
   }
 
   stayAlive() {
-    if (performance.now() - this.link.sent > ALIVE_MS && this.link.session) this.send({ do: "look" });
+    for (const arena of this.arenas) {
+      const { sent, session } = arena.link;
+      if (performance.now() - sent > ALIVE_MS && session) arena.send({ do: "look" });
+    }
   }
 
   choose(robot) {
@@ -245,7 +243,7 @@ class App {
   }
 
   setTool(tool) {
-    Object.assign(this.hands, { tool, task: Number($("task").value) });
+    for (const { hands } of this.arenas) Object.assign(hands, { tool, task: Number($("task").value) });
     document.querySelector(`[name=tool][value=${tool}]`).checked = true;
   }
 
@@ -275,26 +273,23 @@ class App {
   }
 
   frame(now) {
-    if (this.running && !this.link.busy && now >= this.due) {
+    if (this.running && !this.arenas.some(({ link }) => link.busy) && now >= this.due) {
       this.due = (now - this.due > 3 * this.period ? now : this.due) + this.period;
-      this.send({ do: "step" });
+      this.sendAll({ do: "step" });
     }
-    const share = Math.min((performance.now() - this.arrived) / this.period, 1);
-    const at = this.run.last - (this.run.moments.length > 1 ? 1 - share : 0);
+    const moments = this.arenas.map((arena) => arena.at(this.period));
     const chartsAreDue = this.chartsAreOld && now - this.charted > CHART_MS;
-    if (this.stale || chartsAreDue || at !== this.hands.step) {
+    if (this.stale || chartsAreDue || this.arenas.some(({ hands }, index) => moments[index] !== hands.step)) {
       this.stale = false;
-      this.draw(at, now);
+      this.draw(moments, now);
     }
     requestAnimationFrame((next) => this.frame(next));
   }
 
-  /** Draws the moment; keeps how long the script took [ms], of the last thousand frames. */
-  draw(at, now) {
+  /** Draws a moment of each arena; keeps how long the script took [ms], of the last thousand frames. */
+  draw(moments, now) {
     const begin = performance.now();
-    this.hands.step = at;
-    this.scene.draw(0, at, this.look, this.paint);
-    this.hands.draw();
+    this.arenas.forEach((arena, index) => arena.draw(moments[index], this.look, this.paint));
     if (this.fresh) {
       this.fresh = false;
       this.showTexts();
@@ -317,13 +312,19 @@ class App {
     if (String(run.heads) !== $("head").dataset.heads) this.showHeads();
     look.head = Math.min(look.head, run.heads - 1);
     $("head").value = String(look.head);
-    $("policy").value = this.policy;
+    $("policy").value = this.arena.policy;
     this.robots.show(run, 0, now.step, look);
-    this.panel.show(run, look.robot, this.steered);
+    this.panel.show(run, look.robot, this.arena.steered, this.arena.mark);
     this.victims.show(now.victims);
-    $("clock").textContent = `${(now.step * worlds.dt_s).toFixed(1)} s · ${counted(now.rescued, "rescue")}`;
-    const says = this.happened.map(({ text }) => `${text}.`);
-    says.push(...run.hopeless().map(([need, tasks]) => `Nobody offers ${need} now: ${listed(tasks)} must wait.`));
+    this.arenas.forEach((arena, index) => {
+      arena.showCaption(arena === this.arena);
+      if (!this.sides) return;
+      this.sides[index].textContent = `${arena.mark}: ${arena.policy}`;
+      this.sides[index].setAttribute("aria-pressed", String(arena === this.arena));
+    });
+    const rescues = this.sides ? "" : ` · ${counted(now.rescued, "rescue")}`;
+    $("clock").textContent = `${(now.step * worlds.dt_s).toFixed(1)} s${rescues}`;
+    const says = this.arenas.flatMap((arena) => arena.says());
     says.push(worlds.robots.length > 1 ? attentionText(run, 0, now.step, look) : "");
     $("now").textContent = says.filter(Boolean).join(" ");
   }
@@ -351,7 +352,8 @@ function pressed(app, event) {
     n: () => app.restart(),
     r: () => app.choose((look.robot + 1) % app.worlds.robots.length),
     s: () => app.toggleSteering(),
-    p: () => app.choosePolicy(next(app.policies, app.policy)),
+    p: () => app.arena.choosePolicy(next(app.arena.policies, app.arena.policy)),
+    x: () => app.show(next(app.arenas, app.arena)),
     h: () => app.setLook({ head: ((look.head + 2) % (app.run.heads + 1)) - 1 }),
     g: () => app.setLook({ received: !look.received }),
     a: () => app.setLook({ all: !look.all }),
@@ -362,17 +364,24 @@ function pressed(app, event) {
   let action = actions[key];
   if (way) {
     if (event.shiftKey) action = () => event.repeat || app.push(way);
-    else action = app.steered !== null ? () => app.hold(key, way) : () => app.nudge(way);
+    else action = app.arena.steered !== null ? () => app.hold(key, way) : () => app.nudge(way);
   }
   if (!action || (event.repeat && !way)) return;
   event.preventDefault();
   action();
 }
 
+/** The session of an arena; the policy that it begins with, if that is not the first one. */
+async function session(answering, policy) {
+  const link = new Link(answering), opened = await link.open();
+  return { link, opened: policy ? { ...opened, ...await link.send({ do: "policy", name: policy }) } : opened };
+}
+
 async function start() {
-  const link = new Link(await transport()), opened = await link.open();
+  const answering = await transport(), { beside } = $("main").dataset, sessions = [await session(answering)];
+  if (beside) sessions.push(await session(answering, beside));
   $("main").hidden = false;
-  window.play = new App(link, opened);
+  window.play = new App(sessions);
 }
 
 start().catch((error) => {

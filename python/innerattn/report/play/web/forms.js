@@ -47,9 +47,10 @@ class RobotPanel {
     this.change({ [kind]: kind in this.wrong ? healthy : value });
   }
 
-  show(run, robot, steered) {
+  /** `mark` is of the arena, if there are two. */
+  show(run, robot, steered, mark = "") {
     this.wrong = run.now.faults[robot];
-    $("chosen").replaceChildren(this.worlds.robots[robot].name);
+    $("chosen").replaceChildren(this.worlds.robots[robot].name, mark && ` in ${mark}`);
     BREAKS.forEach(({ kind }, index) => {
       this.buttons[index].setAttribute("aria-pressed", String(kind in this.wrong));
     });
@@ -79,7 +80,7 @@ class VictimPanel {
       event.preventDefault();
       const [what, number] = which.value.split(" "), place = [Number(x.value), Number(y.value)];
       if (what === "new") add(Number(number), ...place);
-      else put(Number(number), ...place);
+      else put(this.victims.find((one) => one.slot === Number(number)), ...place);
     });
     which.addEventListener("change", () => {
       const [what, slot] = which.value.split(" ");
@@ -99,10 +100,14 @@ class VictimPanel {
     const fresh = free ? tasks.map(({ name }, task) => [`new ${task}`, `new, ${name}`]) : [];
     const options = [...fresh, ...there];
     fillSelect(which, options, options.some(([value]) => value === chosen) ? chosen : options[0]?.[0]);
-    $("victim-places").textContent = free ?
-      `${victims.length} of ${counted(most, "place")} taken.` :
-      `${most === 1 ? "The only place is" : `All ${most} places are`} taken: move a victim, or wait for a rescue.`;
+    $("victim-places").textContent = placesText(victims.length, most);
   }
+}
+
+/** How many places for victims are taken. */
+function placesText(taken, most) {
+  if (taken < most) return `${taken} of ${counted(most, "place")} taken.`;
+  return `${most === 1 ? "The only place is" : `All ${most} places are`} taken: move a victim, or wait for a rescue.`;
 }
 
 /** The newest events, the latest first. */
@@ -111,12 +116,14 @@ class EventLog {
     Object.assign(this, { list, empty, choose });
   }
 
-  add(events, dt) {
+  /** Adds what happened in an arena. */
+  add(events, dt, arena) {
+    const before = arena.mark && `${arena.mark}: `;
     for (const event of events) {
       const time = element("time", {}, `${(event.step * dt).toFixed(1)} s`);
       const button = element("button", { type: "button" }, time, symbol(eventMark(event.type, 0, 0)),
-        element("span", {}, event.text));
-      button.addEventListener("click", () => this.choose(event.robots[0]));
+        element("span", {}, before + event.text));
+      button.addEventListener("click", () => this.choose(event.robots[0], arena));
       this.list.prepend(element("li", {}, button));
     }
     while (this.list.children.length > MOST_EVENTS) this.list.lastChild.remove();
