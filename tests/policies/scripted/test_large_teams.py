@@ -1,15 +1,12 @@
-"""Scripts where victims need many robots: whole teams are formed, one victim after the other."""
+"""Scripts where robots might wait for each other: whole teams are formed, one after the other."""
 
 from typing import Any
 
 import pytest
 
-from innerattn.config import SCENARIOS, Scenario
-from innerattn.config.instances import WorldInstance, read_any
+from innerattn.config import Scenario
 from innerattn.evaluate.play import run_episodes
-from innerattn.policies.scripted.assignment import Needs
 from innerattn.policies.scripted.dispatch import scripted_policy
-from innerattn.report.page.scripts import page_scripts
 
 SIX = {"name": "six", "needs": ["lift"] * 6}
 SUM = {"name": "sum", "needs": {"lift": 6.0}}
@@ -51,20 +48,9 @@ def test_nobody_waits_for_those_who_wait_elsewhere(
     assert record.rescue_counts().min() >= least
 
 
-def test_no_scenario_of_the_package_has_such_teams() -> None:
-    """What scripts do in them is as it was measured."""
-    scenarios = [Scenario.preset(name) for name in SCENARIOS]
-    scenarios += [one.scenario for one in read_any("standard") if isinstance(one, WorldInstance)]
-    assert len(scenarios) > 300
-    assert not any(Needs(one).has_large_teams for one in scenarios)
-    assert Needs(lifting(6, SIX)).has_large_teams
-
-
-def test_a_page_does_not_have_the_script_there() -> None:
-    needs = [["lift"] * count for count in (5, 6)]
-    plain = {"kind": "lifter", "abilities": ["lift"], "max_speed_mps": 1.0, "mass_kg": 0.5}
-    robots = [{"name": f"lifter_{index}", **plain} for index in range(6)]
-    worlds = lifting(6, SIX).replace(robots=robots)
-    five, six = (worlds.replace(tasks=[{"name": "a", "needs": one}]) for one in needs)
-    assert page_scripts(five) == ("random", "greedy", "hungarian")
-    assert page_scripts(six) == ("random", "greedy")
+def test_two_who_wait_for_each_other_form_a_team() -> None:
+    """Each digger is nearer to another victim, and each victim needs both."""
+    places = {"max_victims": 2, "victim_places_m": [[-1.5, 0.0], [1.5, 0.0], [0.0, 1.5]]}
+    worlds = lifting(2, {"name": "two", "needs": ["lift", "lift"]}, **places)
+    record = run_episodes(scripted_policy("hungarian", worlds), worlds, 20, 7)
+    assert record.rescue_counts().min() >= 5

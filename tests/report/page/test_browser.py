@@ -300,11 +300,20 @@ def plain_worlds() -> dict[str, Scenario]:
     mixed = Scenario.preset("mixed")
     swift = [robot.replace(drive="velocity") for robot in mixed.robots]
     many = mixed.replace(max_victims=8)
+    starts = [[-0.8, -0.8], [0.8, -0.8], [0.8, 0.8], [-0.8, 0.8], [0.0, 0.0]]
+    lifters = [
+        robot.replace(name=f"lifter_{at}", kind="lifter", abilities={"lift": 1.0}, start_m=start)
+        for at, (robot, start) in enumerate(
+            zip([*mixed.robots, mixed.robots[0]], starts, strict=True)
+        )
+    ]
+    tasks = [{"name": str(count), "needs": ["lift"] * count} for count in (2, 3)]
     return {
         **{name: Scenario.preset(name) for name in ("mixed", "mixed-8", "mixed-sight")},
         "continuous": mixed.replace(actions="continuous"),
         "velocity": mixed.replace(robots=swift),
         "more needs than robots": many,
+        "whole teams": mixed.replace(robots=lifters, tasks=tasks, max_victims=5),
     }
 
 

@@ -18,9 +18,6 @@ from innerattn.config import Scenario
 FORBIDDEN = 1e7
 """Cost of a pair that cannot be [s]; so much that a permitted pair is always preferred."""
 
-_LARGE_TEAM = 6
-"""Needs of a victim from which on whole teams come first. Smaller teams may wait for each other,
-too; they are assigned at the least total cost alone, so that what was measured stays comparable."""
 _MOST_PLANS = 1000  # beyond, solving each world on its own is the faster way
 _OWN_SHARE = 0.3
 _HOLD_S = 2e4
@@ -47,11 +44,6 @@ class Needs:
         most = max(len(task.needs) for task in scenario.tasks)
         rows = [[abilities.index(need) for need in task.needs] for task in scenario.tasks]
         self.of_task = np.array([row + [-1] * (most - len(row)) for row in rows], np.int64)
-
-    @property
-    def has_large_teams(self) -> bool:
-        """Whether some victim needs so many robots that teams must be formed one by one."""
-        return bool(self.of_task.shape[1] >= _LARGE_TEAM)
 
     def permitted(self, present: NDArray[np.bool_], task: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which robot can fill which need.

@@ -20,7 +20,6 @@ from innerattn.errors import ConfigError
 from innerattn.policies.policy import Policy, PolicyInput, WorldState
 from innerattn.policies.scripted.assignment import (
     Needs,
-    assign,
     assign_whole_teams,
     can_be_rescued,
     pair_costs,
@@ -226,8 +225,7 @@ class HungarianPolicy(_Dispatcher):
             permitted &= self._timing.in_time(state, times, permitted)[:, None, :, None]
             held = self._timing.held(state, times)
         costs = pair_costs(times, permitted, held, blocked)
-        large = self.needs.has_large_teams
-        need = assign_whole_teams(costs, whole) if large else assign(costs)
+        need = assign_whole_teams(costs, whole)
         return np.where(need >= 0, need // permitted.shape[-1], -1)
 
     def _hopeful(

@@ -2,7 +2,7 @@
 
 `web/scripts.js` drives straight to victims as `innerattn.policies.scripted` does. Worlds in which
 that takes more (ways around obstacles, wheels, times, batteries, loads, amounts) have `random`
-alone, and those whose victims need many robots lack `hungarian`.
+alone.
 """
 
 from __future__ import annotations
@@ -19,9 +19,7 @@ from innerattn.policies.scripted.steering import Steering
 def page_scripts(scenario: Scenario) -> tuple[str, ...]:
     """The scripts that a page can compute in the worlds of ``scenario``."""
     winding = scenario.blocks_ways or scenario.has_wheels
-    if winding or scenario.asks_for_plans:
-        return ("random",)
-    return ("random", "greedy") if Needs(scenario).has_large_teams else SCRIPTED
+    return ("random",) if winding or scenario.asks_for_plans else SCRIPTED
 
 
 def script_document(name: str, scenario: Scenario) -> dict[str, Any]:

@@ -113,9 +113,8 @@ class Hungarian extends Dispatcher {
         costs[one][slot * needs + need] = Math.max(times[one][slot], last) + OWN_SHARE * times[one][slot];
       }));
     });
-    return cheapest(costs).map((need, robot) => (
-      need >= 0 && costs[robot][need] < FORBIDDEN ? Math.floor(need / needs) : -1
-    ));
+    const wanted = victims.map(({ present, task }) => (present ? this.needs[task].filter((one) => one >= 0).length : 0));
+    return wholeTeams(costs, wanted, needs).map((slot) => (slot >= 0 ? Math.floor(slot / needs) : -1));
   }
 
   /** When a robot could be within the rescue radius of a victim, s. */
@@ -126,6 +125,34 @@ class Hungarian extends Dispatcher {
     return Math.min(gap / speed + Math.max(robot.lag * (1 - towards / speed), 0), NEVER_S);
   }
 }
+
+/** As `assigned`, but where no victim would get all its helpers, whole teams come first: the soonest, then the next. */
+function wholeTeams(costs, wanted, needs) {
+  const plain = assigned(costs), helpers = wanted.map(() => 0);
+  plain.forEach((slot) => slot >= 0 && helpers[Math.floor(slot / needs)]++);
+  if (!helpers.some(Boolean) || helpers.some((count, victim) => count && count === wanted[victim])) return plain;
+  const left = costs.map((row) => [...row]), chosen = costs.map(() => -1);
+  for (let round = 0; round < wanted.length; round++) {
+    const teams = wanted.map((count, victim) => {
+      const start = victim * needs, own = assigned(left.map((row) => row.slice(start, start + needs)));
+      const latest = Math.max(...own.map((need, robot) => (need >= 0 ? left[robot][start + need] : -Infinity)));
+      return { start, own, latest: count && count === own.filter((need) => need >= 0).length ? latest : Infinity };
+    });
+    const { start, own, latest } = teams.reduce((first, one) => (one.latest < first.latest ? one : first));
+    if (latest === Infinity) break;
+    own.forEach((need, robot) => {
+      if (need >= 0) [chosen[robot], left[robot]] = [start + need, left[robot].fill(FORBIDDEN)];
+    });
+    left.forEach((row) => row.fill(FORBIDDEN, start, start + needs));
+  }
+  const rest = assigned(left);
+  return chosen.map((slot, robot) => (slot >= 0 ? slot : rest[robot]));
+}
+
+/** The cheapest column of each row, as `cheapest`; -1 where it is forbidden. */
+const assigned = (costs) => cheapest(costs).map((column, row) => (
+  column >= 0 && costs[row][column] < FORBIDDEN ? column : -1
+));
 
 /** The column of each row, -1 for none: as many pairs as there can be, at the least total cost. */
 function cheapest(costs) {
