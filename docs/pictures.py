@@ -1,4 +1,4 @@
-"""Draws the pictures of the first page and of docs/concepts.md: `make docs`.
+"""Draws the pictures of the first page, of docs/concepts.md and of crowds: `make docs`.
 
 `python docs/pictures.py RUN` draws the first page's moving picture for a run, with attention as
 arrows. Without arguments the script `hungarian` drives the team, and all pictures are drawn.
@@ -19,12 +19,20 @@ from innerattn.envs import BatchEnv
 from innerattn.envs.render import paint_figure
 from innerattn.experiments.archive import read_archive
 from innerattn.experiments.run import FinishedRun
+from innerattn.stats.seeds import seed_estimate
 
 IMAGES = Path(__file__).parent / "images"
 RECORDS = Path(__file__).parent / "records"
 RIGHT, LEFT = 1, 2  # actions
 SCRIPT = ("hungarian", "--seed", "99")
 INK, GREY, BLUE, ORANGE = "#1f2933", "#7b8794", "#2b6cb0", "#c05621"
+OTHER_CRITICS = (
+    ("ppo-uniform", "uniform weights", BLUE),
+    ("ppo-max", "largest values", "#2f855a"),
+    ("ppo-oracle", "the right partners", "#6b46c1"),
+    ("ppo-independent", "no teammate", INK),
+    ("mappo", "a central critic", ORANGE),
+)
 
 
 def figure_of(width: float, height: float) -> tuple[Figure, Axes]:
@@ -176,9 +184,41 @@ def _how_it_sees(config: RunConfig) -> str:
     return "0.8 m, learnt messages" if config.network.message_width else "0.8 m, silent"
 
 
+def crowd() -> Figure:
+    """What learnt attention gains in a crowd: runs of examples/studies/crowd.toml, full length."""
+    scores: dict[str, dict[int, dict[int, float]]] = {}
+    for run in read_archive(RECORDS / "crowd.parquet"):
+        config, method = run.config, run.config.train.method
+        robots = len(config.scenario.robots)
+        if config.scenario.observed_teammates == 0 and _site_steps(config) > 350_000:
+            of_size = scores.setdefault(method, {}).setdefault(robots, {})
+            of_size[config.train.seed] = run.summary["score"]["mean"]
+    figure, axes = figure_of(7.2, 3.2)
+    learnt = scores.pop("ppo-inner")
+    for place, (method, name, colour) in enumerate(OTHER_CRITICS):
+        for robots, found in sorted(scores[method].items()):
+            seeds = sorted(found.keys() & learnt[robots].keys())
+            gain = seed_estimate([learnt[robots][seed] - found[seed] for seed in seeds])
+            at = robots * 1.06 ** (place - 2)
+            axes.plot([at, at], [gain.low, gain.high], color=colour, lw=1.5)
+            axes.plot(at, gain.mean, "o", color=colour, ms=4, label=name)
+            name = "_"  # once in the legend
+    axes.axhspan(-0.03, 0.03, color=GREY, alpha=0.15, lw=0)
+    axes.set(xscale="log", xlabel="robots", ylabel="score, learnt attention - other")
+    axes.set_xticks(sorted(learnt), [str(robots) for robots in sorted(learnt)])
+    axes.minorticks_off()
+    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
+    return figure
+
+
+def _site_steps(config: RunConfig) -> int:
+    return config.train.env_steps * len(config.scenario.tasks)
+
+
 if __name__ == "__main__":
     code = main(["replay", *(sys.argv[1:] or SCRIPT), "-o", str(IMAGES / "rescue.gif")])
     if not sys.argv[1:]:
         for draw in (world, contacts, critic, score, sight):
             draw().savefig(IMAGES / f"concept_{draw.__name__}.png")
+        crowd().savefig(IMAGES / "attention_crowd.png")
     sys.exit(code)

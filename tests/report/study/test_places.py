@@ -33,9 +33,9 @@ def names_of(places: list[dict[str, Value]]) -> list[str]:
 def test_a_key_stands_only_where_it_tells_places_apart() -> None:
     assert names_of([LONG, SHORT, SHORTER, NEAR]) == [
         "crowd_3",
-        "crowd_9 (env_steps = 100)",
-        "crowd_9 (env_steps = 50)",
-        "crowd_9 (env_steps = 100, observed_teammates = 2)",
+        "crowd_9 [env_steps = 100]",
+        "crowd_9 [env_steps = 50]",
+        "crowd_9 [env_steps = 100, observed_teammates = 2]",
     ]
     assert names_of([LONG, SHORT]) == ["crowd_3", "crowd_9"]
 

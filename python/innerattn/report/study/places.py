@@ -24,7 +24,7 @@ class PlaceNames:
         words = " ".join(str(place[key]) for key in keys if "." not in key and key in place)
         telling = self._keys[_coordinates(place)]
         of_runs = set_there(place, [key for key in keys if key in telling])
-        return f"{words} ({of_runs})" if words and of_runs else words or of_runs
+        return f"{words} [{of_runs}]" if words and of_runs else words or of_runs
 
 
 def varied_in(places: Sequence[Mapping[str, Value]]) -> list[str]:
