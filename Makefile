@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PYTHONDONTWRITEBYTECODE := # compiled modules are kept: the tests begin many processes
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train robot test test-pool test-asan test-gpu test-slow examples study-kill reliability soak lint lint-rust lint-python format bench lock docs site schemas dist policies-wheel smoke bounds wasm setup clean
+.PHONY: train robot test test-pool test-asan test-gpu test-slow examples study-kill reliability soak lint lint-rust lint-python format bench lock docs site schemas dist wheels policies-wheel smoke bounds wasm setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -154,6 +154,12 @@ dist: $(VENV)/.installed ## wheel for manylinux2014 and source archive, into dis
 	pip install ziglang
 	maturin build --release --locked --zig --compatibility manylinux2014 --out dist
 	maturin sdist --out dist
+
+WHEELS ?=# names of the wheels to build; all, if there is none
+
+wheels: $(VENV)/.installed ## wheels for Linux, macOS and Windows, into dist/ (docs/wheels.md); needs the sources of Rust's standard library, RUST_SRC=FOLDER says where
+	pip install ziglang
+	python packages/wheels/build.py --out dist --rust-src $(RUST_SRC) $(WHEELS)
 
 policies-wheel: ## the wheel for robots, innerattn-policies, into dist/policies; pure Python, with numpy alone
 	$(PYTHON) packages/policies/build_wheel.py
