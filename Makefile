@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PYTHONDONTWRITEBYTECODE := # compiled modules are kept: the tests begin many processes
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: train robot test test-pool test-asan test-gpu test-slow examples study-kill reliability soak lint lint-rust lint-python format bench lock docs site schemas dist wheels policies-wheel smoke bounds wasm setup clean
+.PHONY: train robot test test-pool test-asan test-gpu test-slow examples study-kill reliability soak lint lint-rust lint-python format bench lock docs site schemas dist wheels wheels-check policies-wheel smoke bounds wasm setup clean
 
 train: setup ## train PPO with inner attention on mixed rescue worlds, then evaluate it
 	@innerattn train $(TRAIN)
@@ -160,6 +160,10 @@ WHEELS ?=# names of the wheels to build; all, if there is none
 wheels: $(VENV)/.installed ## wheels for Linux, macOS and Windows, into dist/ (docs/wheels.md); needs the sources of Rust's standard library, RUST_SRC=FOLDER says where
 	pip install ziglang
 	python packages/wheels/build.py --out dist --rust-src $(RUST_SRC) $(WHEELS)
+
+wheels-check: setup ## try the wheel for 64-bit ARM on Debian under QEMU: worlds and a team must do the same as here
+	test -e build/arm/export || innerattn export zoo:mixed -o build/arm/export
+	python packages/wheels/on_arm.py dist/*manylinux*_aarch64.whl build/arm/export
 
 policies-wheel: ## the wheel for robots, innerattn-policies, into dist/policies; pure Python, with numpy alone
 	$(PYTHON) packages/policies/build_wheel.py
