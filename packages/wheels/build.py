@@ -109,6 +109,30 @@ def sources_wanted(rust_src: Path) -> str | None:
     )
 
 
+def for_windows(target: str, folder: Path) -> dict[str, str]:
+    """What zig needs in the environment to compile and link for Windows.
+
+    The sources of mimalloc have a date, which zig takes for an error; not so on other systems. And
+    zig must be told what a module exports. maturin writes that into a file, but names the function
+    after the whole path, ``PyInit_innerattn._core``, which no module has. A folder in the place of
+    its file keeps it from that.
+
+    Args:
+        target: Rust's name of the system.
+        folder: where cargo builds; it gets the list with the right name.
+    """
+    place = folder / "maturin" / "innerattn._core.def"
+    if place.is_file():
+        place.unlink()
+    place.mkdir(parents=True, exist_ok=True)
+    exports = place / "exports.def"
+    exports.write_text("LIBRARY _core\nEXPORTS\n    PyInit__core\n", "utf-8")
+    return {
+        f"CFLAGS_{target.replace('-', '_')}": "-Wno-error=date-time",
+        "CARGO_ENCODED_RUSTFLAGS": f"-C\x1flink-arg={exports}",
+    }
+
+
 def build(wheel: Wheel, out: Path, rust_src: Path) -> Path:
     """Build one wheel, and return its file.
 
@@ -128,8 +152,7 @@ def build(wheel: Wheel, out: Path, rust_src: Path) -> Path:
     env = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     env.setdefault("CARGO_TARGET_DIR", str(ROOT / "target" / "wheels"))
     if "windows" in wheel.target:
-        # mimalloc's sources have a date, which zig takes for an error; not so on other systems.
-        env[f"CFLAGS_{wheel.target.replace('-', '_')}"] = "-Wno-error=date-time"
+        env |= for_windows(wheel.target, ROOT / env["CARGO_TARGET_DIR"])
     if not has_library(wheel.target):
         wanted = sources_wanted(rust_src)
         if wanted is not None:

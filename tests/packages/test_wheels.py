@@ -109,6 +109,21 @@ def test_a_wheel_is_refused_whose_name_or_module_is_of_another_system(
         build.check(a_wheel(tmp_path, "win_amd64", b"MZ"), build.WHEELS["windows-x86_64"])
 
 
+def test_zig_is_told_the_name_that_the_windows_module_exports(
+    build: ModuleType, tmp_path: Path
+) -> None:
+    (tmp_path / "maturin").mkdir()
+    (tmp_path / "maturin" / "innerattn._core.def").write_text("of an earlier maturin")
+    for _ in range(2):
+        env = build.for_windows("x86_64-pc-windows-gnu", tmp_path)
+        flag = env["CARGO_ENCODED_RUSTFLAGS"].split("\x1f")
+        assert flag[0] == "-C"
+        exports = Path(flag[1].removeprefix("link-arg=")).read_text("utf-8").split()
+        assert exports == ["LIBRARY", "_core", "EXPORTS", "PyInit__core"]
+        assert env["CFLAGS_x86_64_pc_windows_gnu"] == "-Wno-error=date-time"
+    assert (tmp_path / "maturin" / "innerattn._core.def").is_dir()  # maturin cannot write it
+
+
 def test_messages_say_what_is_needed(
     build: ModuleType,
     tmp_path: Path,
