@@ -238,6 +238,16 @@ def test_other_commands_name_what_is_there() -> None:
                     pass
                 case ["uvx", "innerattn", *rest]:
                     _parse(rest)
+                case ["uv", "run", *rest]:
+                    own = rest.index("innerattn")
+                    options, extras = rest[:own:2], rest[1:own:2]
+                    assert {*options} <= {"--extra"}, line
+                    assert {*extras} <= {*project["optional-dependencies"]}, line
+                    _parse(rest[own + 1 :])
+                case ["docker", "build", *_, "."]:
+                    assert (ROOT / "Dockerfile").is_file(), line
+                case ["docker", "run", *rest]:
+                    _parse(rest[rest.index("innerattn") + 1 :])
                 case ["make", target, *_]:
                     assert target in targets, line
                 case ["pip", "install", "-e" | "-r", path]:
