@@ -11,6 +11,9 @@ from innerattn.config.scenario import Robot, Scenario
 from innerattn.config.task import Arrival
 from innerattn.errors import ConfigError
 
+_ELEMENTS = 8
+"""Turns and mirrors of the square; see `innerattn.nn.symmetry`."""
+
 
 def check_frames(config: RunConfig) -> None:
     """Refuse a run whose frames cannot turn its worlds.
@@ -101,3 +104,29 @@ def range_sensors(scenario: Scenario) -> list[tuple[int, Robot, RangeSensor]]:
     """Robots with a range sensor, with their indices."""
     robots = enumerate(scenario.robots)
     return [(at, one, one.range_sensor) for at, one in robots if one.range_sensor is not None]
+
+
+def ray_turns(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
+    """Which ray reads, for each element of the group, what each ray reads in a turned world.
+
+    All sensors are alike; nothing where there are none. Rays from a heading turn with it, and
+    change sides in a mirrored world.
+    """
+    sensing = range_sensors(scenario)
+    if not sensing:
+        return ()
+    _, robot, sensor = sensing[0]
+    count = sensor.rays
+    turns = []
+    for element in range(_ELEMENTS):
+        rays = list(range(count))
+        if robot.has_wheels:
+            fan = sensor.field_of_view_deg < 360.0
+            mirrored = [count - 1 - ray if fan else -ray % count for ray in rays]
+            rays = mirrored if element.bit_count() % 2 else rays
+        else:  # back to the world as it was: first the swap of x and y, then the mirrors
+            rays = [(count // 4 - ray) % count for ray in rays] if element & 4 else rays
+            rays = [(count // 2 - ray) % count for ray in rays] if element & 1 else rays
+            rays = [-ray % count for ray in rays] if element & 2 else rays
+        turns.append(tuple(rays))
+    return tuple(turns)
