@@ -1,12 +1,13 @@
 """A trained team from its run folder, computed by numpy alone: no torch, no export.
 
-What takes more than the actors' linear layers, such as a memory, is refused.
+What needs more than what a robot sees now, such as a memory, is refused.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +18,11 @@ from numpy.typing import NDArray
 
 from innerattn.config import RunConfig, Scenario
 from innerattn.config.team import TeamConfig
+from innerattn.config.turning import ray_turns
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
-from innerattn.policies.exported.contract import FrameColumns, Network, PairRules
+from innerattn.policies.columns import able_columns, entity_columns, frame_columns
+from innerattn.policies.exported.contract import CONTINUOUS_OUTPUTS, LogStd, Network, PairRules
 from innerattn.policies.exported.frame import Frame
 from innerattn.policies.exported.network import NumpyActor
 from innerattn.policies.policy import PolicyInput
@@ -28,10 +31,9 @@ from innerattn.records.run_folder import config_of, weights_name
 
 PUSHES = [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)]
 """Direction of each action: stay, +x, -x, +y, -y."""
-LAYERS = ("first", "second", "output")
-"""Of an actor, from observation to logits."""
+LOG_STD = LogStd(-3.0, 0.5, math.log(2.5))
+"""Of continuous actions, as `innerattn.nn.actions` has it."""
 _SLOPE = 0.01  # of the leaky ReLU, as in `innerattn.nn`
-_HANDED = (".fault.heading_bias", ".turn_rate", ".left")
 _MOST_BYTES = 1 << 26
 _POOLINGS: Mapping[str, Literal["attention", "mean", "max", "nearest"]] = {
     "inner": "attention",
@@ -65,11 +67,40 @@ class PlainTeam:
         return tuple(list(dict.fromkeys(names)).index(name) for name in names)
 
     @property
-    def frame(self) -> Frame | None:
-        """The frames that it sees in; None where it sees the world as it is."""
+    def continuous(self) -> bool:
+        """Whether actions are vectors."""
+        return self.config.scenario.actions == "continuous"
+
+    @property
+    def outputs(self) -> int:
+        """O, numbers that an actor gives, as `Contract.outputs`."""
+        return CONTINUOUS_OUTPUTS if self.continuous else len(PUSHES)
+
+    @property
+    def able(self) -> tuple[int, ...]:
+        """Columns that are all above 0 where a robot can act; none where it acts as it likes."""
+        return able_columns(self.columns) if self.config.network.mask_actions else ()
+
+    @property
+    def network(self) -> Network:
+        """How the actors' layers make a policy."""
+        chosen = self.config.network
+        return Network(
+            encoder=chosen.encoder,
+            hidden_width=chosen.hidden_width,
+            leaky_relu_slope=_SLOPE,
+            entities=entity_columns(self.columns) if chosen.encoder == "entities" else None,
+            frame=None,  # one for each drive
+            log_std=LOG_STD if self.continuous else None,
+            pooling=chosen.pooling,
+        )
+
+    def frame_of(self, drive: str) -> Frame | None:
+        """The frames that robots with a drive see in; None where they see the world as it is."""
         if self.config.network.symmetry != "canonical":
             return None
-        return Frame(frame_columns(self.columns), len(self.columns), PUSHES)
+        turning = frame_columns(self.columns, ray_turns(self.config.scenario))
+        return Frame(turning, len(self.columns), None if self.continuous else PUSHES, drive)
 
 
 class PlainPolicy:
@@ -97,24 +128,47 @@ class PlainPolicy:
         self.name = team.config.train.method
         self.greedy = team.config.evaluate.greedy_actions if greedy is None else greedy
         self._draws = np.random.default_rng(0)
-        width, frame = len(team.columns), team.frame
-        network = Network("flat", team.config.network.hidden_width, _SLOPE, None, None)
+        if key := beyond_numpy(team.config):
+            raise RunError(f"numpy alone cannot compute it: {key}")
+        self._able, network = list(team.able), team.network
+        drives = [robot.drive for robot in team.config.scenario.robots]
+        kinds = list(zip(team.groups, drives, strict=True))
         try:
-            made = [
-                NumpyActor(network, _actor(team, group), width, len(PUSHES), frame)
-                for group in range(max(team.groups) + 1)
-            ]
+            made = {
+                kind: NumpyActor(
+                    network,
+                    _actor(team, kind[0]),
+                    len(team.columns),
+                    team.outputs,
+                    team.frame_of(kind[1]),
+                )
+                for kind in dict.fromkeys(kinds)
+            }
         except (ValueError, IndexError) as error:
             raise RunError(f"the weights do not fit the configuration: {error}") from error
-        self._actors = [made[group] for group in team.groups]
+        self._actors = [made[kind] for kind in kinds]
 
     def act(self, view: PolicyInput) -> NDArray[Any]:
-        """Choose actions (E, R); see `Policy.act`."""
+        """Choose actions (E, R) or (E, R, 2); see `Policy.act`."""
         robots = [actor.logits(view.obs[:, robot]) for robot, actor in enumerate(self._actors)]
-        logits = np.stack(robots, axis=1)
+        outputs = np.stack(robots, axis=1)
+        if self.team.continuous:
+            return self._vectors(outputs)
+        if self._able:
+            unable = (view.obs[:, :, self._able] <= 0.0).any(axis=2)
+            outputs[unable, 1:] = np.finfo(np.float32).min
         if self.greedy:
-            return np.asarray(logits.argmax(axis=-1))
-        return np.asarray((logits + self._draws.gumbel(size=logits.shape)).argmax(axis=-1))
+            return np.asarray(outputs.argmax(axis=-1))
+        return np.asarray((outputs + self._draws.gumbel(size=outputs.shape)).argmax(axis=-1))
+
+    def _vectors(self, outputs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Vectors (E, R, 2) of means and log standard deviations (E, R, 4)."""
+        mean, log_std = outputs[..., :2], outputs[..., 2:]
+        if not self.greedy:
+            noise: NDArray[np.float32] = np.exp(log_std)
+            noise *= self._draws.standard_normal(mean.shape, np.float32)
+            mean = mean + noise
+        return np.tanh(mean)
 
     def reset(self, seed: int) -> None:
         """See `Policy.reset`."""
@@ -129,20 +183,18 @@ def read_plain_team(run: str | Path, scenario: Scenario | None = None) -> PlainT
         scenario: the worlds it is to act in; None: its own.
 
     Raises:
-        RunError: there is no readable run with weights, numpy alone cannot compute what its policy
-            is, or its robots do not see in ``scenario`` what they saw in training.
+        RunError: there is no readable run with weights, its policy is one for any team, or its
+            robots do not see, hear or do in ``scenario`` what they did in training.
         ConfigError: its configuration is not valid.
     """
     files = RunFiles(run)
     config = config_of(files)
-    if key := beyond_numpy(config):
+    if config.algorithm.for_any_team:
+        key = f"train.method = {config.train.method!r}"
         raise RunError(f"{run}: numpy alone cannot compute it: {key}")
     columns = _columns(config.scenario)
-    if scenario is not None and _columns(scenario) != columns:
-        raise RunError(
-            f"{run}: was trained for other observations than these worlds give (another team, "
-            "other tasks or another number of victims)"
-        )
+    if scenario is not None:
+        _refuse_other_worlds(run, config, scenario, columns)
     return PlainTeam(config, columns, newest_tensors(files))
 
 
@@ -171,50 +223,39 @@ def pair_network(team: TeamConfig, scenario: Scenario) -> Network:
 
 def beyond_numpy(config: RunConfig) -> str | None:
     """The key and value that make a policy more than numpy alone computes; None: it can."""
-    network, scenario = config.network, config.scenario
-    turns = network.symmetry == "canonical"
+    network = config.network
     refused = [
-        (config.algorithm.for_any_team, f"train.method = {config.train.method!r}"),
-        (network.encoder != "flat", f"network.encoder = {network.encoder!r}"),
         (network.memory_width > 0, f"network.memory_width = {network.memory_width}"),
         (network.message_width > 0, f"network.message_width = {network.message_width}"),
-        (network.mask_actions, "network.mask_actions = true"),
-        (scenario.actions != "discrete", f"scenario.actions = {scenario.actions!r}"),
-        (turns and scenario.has_wheels, "network.symmetry = 'canonical' with robots on wheels"),
-        (
-            turns and any(robot.range_sensor is not None for robot in scenario.robots),
-            "network.symmetry = 'canonical' with range sensors",
-        ),
     ]
     return next((key for is_so, key in refused if is_so), None)
 
 
-def frame_columns(names: Sequence[str]) -> FrameColumns:
-    """The columns that turn with the world, and those that choose the frame.
-
-    Args:
-        names: of all columns, as the worlds name them.
-    """
-    place = {name: column for column, name in enumerate(names)}
-    stems = [name.removesuffix(".x") for name in names if name.endswith(".x")]
-    pairs = {stem: (place[f"{stem}.x"], place[f"{stem}.y"]) for stem in stems}
-    anchors = [stem for stem in stems if stem.startswith("victim_")]
-    anchors += ["own.position", "own.velocity"]
-    if "teammate_0.seen" in place:
-        teammates = [stem for stem in stems if stem.startswith("teammate_")]
-        anchors += ["own.heading", *(stem for stem in teammates if stem.endswith("_position"))]
-    return FrameColumns(
-        vectors=tuple(pairs.values()),
-        handed=tuple(place[name] for name in names if name.endswith(_HANDED)),
-        anchors=tuple(pairs[stem] for stem in anchors if stem in pairs),
-    )
+def _refuse_other_worlds(
+    run: str | Path, config: RunConfig, scenario: Scenario, columns: tuple[str, ...]
+) -> None:
+    """Refuse worlds in which robots do not see, hear or do what they did in training."""
+    if _columns(scenario) != columns or scenario.actions != config.scenario.actions:
+        raise RunError(
+            f"{run}: was trained for other observations than these worlds give (another team, "
+            "other tasks or another number of victims)"
+        )
+    there, here = config.scenario.message_delay_steps, scenario.message_delay_steps
+    if config.network.message_width and there != here:
+        raise RunError(
+            f"{run}: was trained with communication.delay_steps = {there}: must be {there} here, "
+            f"not {here}, because its robots have messages"
+        )
 
 
 def _actor(team: PlainTeam, group: int) -> dict[str, NDArray[np.float32]]:
     """The arrays of one of the G networks, by the names that `NumpyActor` knows."""
-    names = [f"{layer}.{part}" for layer in LAYERS for part in ("weight", "bias")]
-    found = {name: team.tensors.get(f"actor.{name}") for name in names}
-    return {name: values[group] for name, values in found.items() if values is not None}
+    prefix = "actor."
+    return {
+        name.removeprefix(prefix): values[group]
+        for name, values in team.tensors.items()
+        if name.startswith(prefix)
+    }
 
 
 def _columns(scenario: Scenario) -> tuple[str, ...]:
@@ -230,10 +271,16 @@ def _tensors(run: Path, data: bytes) -> Mapping[str, NDArray[np.float32]]:
         for name, entry in header.items():
             if name.startswith(("actor.", "critic.")) and entry["dtype"] == "F32":
                 begin, end = entry["data_offsets"]
-                plain = name.replace(".parametrizations.", ".").removesuffix(".original")
-                found[plain] = np.frombuffer(body[begin:end], "<f4").reshape(entry["shape"])
+                values = np.frombuffer(body[begin:end], "<f4").reshape(entry["shape"])
+                found[_plain_name(name)] = values
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{run}: its weights cannot be read ({error})") from error
     if not all(np.isfinite(values).all() for values in found.values()):
         raise RunError(f"{run}: its weights hold a number that is not finite; it is damaged")
     return found
+
+
+def _plain_name(name: str) -> str:
+    """The name of an array without the parts that say how networks hold each other."""
+    parts = name.removesuffix(".original").split(".")
+    return ".".join(part for part in parts if part not in ("network", "parametrizations"))

@@ -1,7 +1,6 @@
 """The page of one file in a real browser: its worlds, its team and its answers are Python's."""
 
 import base64
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from answers import ANSWER, drawn_messages, like, served
 from browser import PHONE, WIDE, Visit, opened_browser, until, visit
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page
@@ -24,7 +24,6 @@ from innerattn.policies import Exported, PolicyInput, scripted_policy
 from innerattn.report.page.page import page_document, worlds_page
 from innerattn.report.page.scripts import page_scripts
 from innerattn.report.page.team import read_team
-from innerattn.report.play.sessions import Sessions
 from innerattn.train import load_policy
 from innerattn.train.export import export_run
 from innerattn.train.export.actors import inner_actor
@@ -67,22 +66,6 @@ ACT = """(steps) => {
     }
     return found;
   });
-}"""
-
-# Begins a world of another document, and answers messages; gives all states, or what was refused.
-ANSWER = """async ([given, messages]) => {
-  const { rust, constructor: Inside, given: own } = play.link.transport;
-  const inside = new Inside(rust, given ?? own), opened = await inside.ask("sessions", {});
-  const found = [opened];
-  for (const message of messages) {
-    try {
-      found.push(await inside.ask(`sessions/${opened.session}`, message));
-    } catch (error) {
-      found.push({ schema_version: 1, error: error.message });
-    }
-  }
-  inside.leave(`sessions/${opened.session}`);
-  return found;
 }"""
 
 
@@ -201,68 +184,12 @@ def test_its_attention_is_that_of_the_critic(page: Page) -> None:
     assert np.ptp(weights, axis=0).max() > 0.5
 
 
-def served(make: Any, messages: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """What the server of `innerattn play` answers."""
-    sessions, found = Sessions(make), []
-    path = "sessions"
-    for message in [{}, *messages]:
-        found.append(json.loads(sessions.take(path, json.dumps(message).encode()).text))
-        path = f"sessions/{found[0]['session']}"
-    return found
-
-
-def like(ours: Any, theirs: Any, place: str = "answer") -> None:
-    """The same but for the last digit of numbers that were rounded."""
-    if isinstance(theirs, dict):
-        assert sorted(ours) == sorted(theirs), place
-        for key in theirs:
-            if key != "session":
-                like(ours[key], theirs[key], f"{place}.{key}")
-    elif isinstance(theirs, list):
-        assert len(ours) == len(theirs), place
-        for index, (one, other) in enumerate(zip(ours, theirs, strict=True)):
-            like(one, other, f"{place}[{index}]")
-    elif isinstance(theirs, float) and not isinstance(ours, bool):
-        assert ours == pytest.approx(theirs, abs=2e-3 if "attention" in place else 2e-5), place
-    else:
-        assert ours == theirs, place
-
-
-def drawn_messages(count: int) -> list[dict[str, Any]]:
-    """Steps, and now and then a hand that reaches in; some of it is refused."""
-    draws = np.random.default_rng(11)
-    at = lambda most=1.0: round(float(draws.uniform(-most, most)), 3)  # noqa: E731
-    found: list[dict[str, Any]] = []
-    for _ in range(count):
-        robot = int(draws.integers(4))
-        wrong = {"motor_gain": 0.2, "heading_bias": 0.5, "unavailable": 1.0, "blackout": 1.0}
-        kind = list(wrong)[draws.integers(4)]
-        reached: list[dict[str, Any]] = [
-            {"do": "look"},
-            {"do": "move_robot", "robot": robot, "x": at(), "y": at()},
-            {"do": "push_robot", "robot": robot, "vx": at(5.5), "vy": at(5.5)},
-            {"do": "faults", "robot": robot, "values": {kind: wrong[kind]}},
-            {"do": "faults", "robot": robot, "values": {"motor_gain": 1.0, kind: 2.0}},
-            {"do": "faults", "robot": robot, "values": {"unavailable": 0.0, "blackout": 0.0}},
-            {"do": "move_victim", "slot": int(draws.integers(2)), "x": at(), "y": at()},
-            {"do": "add_victim", "task": int(draws.integers(2)), "x": at(), "y": at()},
-            {"do": "steer", "robot": robot, "x": at(), "y": at()},
-            {"do": "steer", "robot": None},
-            {"do": "policy", "name": "mixed"},
-            {"do": "restart"},
-            {"do": "restart", "seed": int(draws.integers(20_000))},
-        ]
-        found.append(reached[draws.integers(len(reached))])
-        found += [{"do": "step"}] * 12
-    return found
-
-
 @pytest.mark.parametrize("blocks", [pytest.param(False, marks=pytest.mark.long), True])
 def test_it_answers_as_the_server_does(page: Page, blocks: bool) -> None:
     box = Obstacle(shape="box", half_extents_m=(0.3, 0.05), position_m=(0.0, 0.2))
     disc = Obstacle(shape="disc", radius_m=0.15)
     scenario = Scenario.preset("mixed").replace(obstacles=(box, disc) if blocks else ())
-    messages = drawn_messages(60)
+    messages = drawn_messages(60, "mixed")
 
     def make() -> InteractiveWorld:
         worlds = endless(scenario)

@@ -24,7 +24,8 @@ WORLDS = "worlds.wasm"
 """The compiled worlds, beside this file; `make wasm` makes them."""
 _FOLDER = files("innerattn.report.page")
 _SCRIPTS = (
-    *("rust.js", "team.js", "roles.js", "pairs.js", "any_team.js"),
+    *("rust.js", "layers.js", "frame.js", "encoder.js", "memory.js", "messages.js"),
+    *("attention.js", "team.js", "roles.js", "pairs.js", "any_team.js"),
     *("scripts.js", "engine.js"),
 )
 _POLICY = (

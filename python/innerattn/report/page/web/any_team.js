@@ -44,16 +44,16 @@ class AnyTeam extends Team {
   /** The log-probabilities of a robot's actions in the world. */
   logits(robot, row) {
     const seen = this.views[robot].relate(row), { proposed, own } = this.proposed(seen);
-    const home = this.layer("home_out", 0, rectified(this.layer("home", 0, [...seen.home, ...own])));
+    const home = this.layer("home_out", rectified(this.layer("home", [...seen.home, ...own])));
     const proposals = [...proposed, home].map((one) => one.map((value) => SHARPNESS * value));
     return mixture(proposals, [...seen.frames, seen.homeFrame]);
   }
 
   /** Weight and actions of each own pair, and what the robot makes of all. */
   proposed({ cells, at, masks, times, turning }) {
-    const size = this.rows.length, { shape: [, width] } = this.tensors["first.weight"], nothing = Array(width).fill(0);
+    const size = this.rows.length, [, width] = this.tensors.shape("first.weight"), nothing = Array(width).fill(0);
     if (!at.length) return { proposed: [], own: nothing };
-    const hidden = (name, values) => rectified(this.layer(name, 0, values));
+    const hidden = (name, values) => rectified(this.layer(name, values));
     const rows = cells.map((robots) => robots.map((columns) => columns && hidden("first", columns)));
     const most = Array.from({ length: size }, (_, robot) => (
       rows.map((robots) => robots[robot]).filter(Boolean).reduce(largest, nothing)
@@ -67,7 +67,7 @@ class AnyTeam extends Team {
         this.pooled(who, there[pair], masks[pair][part], times[victim])
       ));
       const parts = [...cells[victim][0], ...turning[pair], ...there[pair][0], ...pooled, ...own];
-      return this.layer("out", 0, hidden("fourth", hidden("third", parts)));
+      return this.layer("out", hidden("fourth", hidden("third", parts)));
     });
     return { proposed, own };
   }
@@ -84,15 +84,18 @@ class AnyTeam extends Team {
     if (this.pooling === "nearest") {
       return there[robots.reduce((best, robot) => (times[robot] < times[best] ? robot : best))];
     }
-    const query = this.layer(`${who}.query`, 0, there[0]), scale = 1 / Math.sqrt(query.length);
-    const { shape: [, keys], values } = this.tensors[`${who}.key.weight`];
+    const query = this.layer(`${who}.query`, there[0]), scale = 1 / Math.sqrt(query.length);
     const powers = robots.map((robot) => {
-      const key = product(values, 0, keys, there[robot]);
-      const logit = scale * query.reduce((all, value, index) => all + value * key[index], 0);
+      const logit = scale * dot(query, this.tensors.times(`${who}.key.weight`, there[robot]));
       return Math.exp(Math.min(logit, LARGEST_LOGIT));
     });
     const total = powers.reduce((all, power) => all + power, 0) + ALMOST_NOTHING;
     return sum(powers.map((power) => power / total));
+  }
+
+  /** The outputs of a layer of the one network. */
+  layer(name, values) {
+    return this.tensors.layer(name, 0, values);
   }
 
   /** Its critic has none. */

@@ -1,11 +1,4 @@
-// A trained team that acts in the page, and its critic's attention.
-
-const SLOPE = 0.01; // of leaky ReLU
-const HIDDEN = -1e30;
-
-function leaky(values) {
-  return values.map((value) => (value > 0 ? value : SLOPE * value));
-}
+// A trained team that acts in the page.
 
 /** Numbers that look random, and follow from a seed alone. */
 class Draws {
@@ -20,124 +13,90 @@ class Draws {
     mixed = (mixed + Math.imul(mixed ^ (mixed >>> 7), 61 | mixed)) ^ mixed;
     return (((mixed ^ (mixed >>> 14)) >>> 0) + 0.5) / 4294967296;
   }
+
+  /** The next one of a normal distribution. */
+  normal() {
+    return Math.sqrt(-2 * Math.log(this.next())) * Math.cos(2 * Math.PI * this.next());
+  }
 }
 
 /** A trained team: every robot sees its own row of numbers and chooses its own action. */
 class Team {
-  /** `described` is of innerattn.report.page.team; `numbers` are its weights, a Float32Array. */
+  /** `described` is of innerattn.report.page.one_team; `numbers` are its weights, a Float32Array. */
   constructor(name, described, numbers) {
-    Object.assign(this, { name }, described);
+    Object.assign(this, { name }, described, { tensors: new Tensors(described.tensors, numbers, described.rows) });
     this.robots = this.rows.length;
-    this.tensors = Object.fromEntries(Object.entries(described.tensors).map(([key, { begin, shape }]) => (
-      [key, { shape, values: numbers.subarray(begin, begin + shape.reduce((all, one) => all * one, 1)) }]
-    )));
+    this.frame = new Frame(described.frame);
+    const encoder = (layer) => new Encoder(this.tensors, layer, this.entities, this.pooling);
+    this.first = encoder("actor.first");
+    this.memory = Memory.in(this.tensors, "actor.memory");
+    this.messages = this.hearing ? new Messages(this.tensors, encoder("actor.messages.encoder"), this.hearing) : null;
+    this.critic = this.heads ? new Attention(this) : null;
     this.reset(0);
   }
 
+  /** Begins an episode. */
   reset(seed) {
     this.draws = new Draws(seed);
+    for (const part of [this.memory, this.messages, this.critic]) part?.forget();
   }
 
-  /** The actions of all robots for their observations, R × D. */
+  /** The actions of all robots for their observations, R × D, which they remember from now on. */
   act(obs) {
-    return Array.from({ length: this.robots }, (_, robot) => this.chosen(this.logits(robot, this.row(obs, robot))));
+    return this.outputs(obs).map((one) => this.chosen(one));
+  }
+
+  /** What the policies of all robots give for one more step of the world. */
+  outputs(obs) {
+    const rows = this.rowsIn(obs), heard = this.messages?.heard(rows.map((row) => this.seen(row))) ?? [];
+    return rows.map((row, robot) => this.logits(robot, row, heard[robot]));
+  }
+
+  rowsIn(obs) {
+    return Array.from({ length: this.robots }, (_, robot) => this.row(obs, robot));
   }
 
   row(obs, robot) {
     return obs.subarray(robot * this.width, (robot + 1) * this.width);
   }
 
-  chosen(logits) {
-    const worth = this.greedy ? logits : logits.map((logit) => logit - Math.log(-Math.log(this.draws.next())));
+  /** A row in its frame, and the element that turned it. */
+  seen(row) {
+    const turn = this.frame.of(row);
+    return { row: this.frame.turned(row, turn), turn };
+  }
+
+  /** The likeliest action, or a drawn one. */
+  chosen(outputs) {
+    if (this.continuous) {
+      const [x, y, ...logStd] = outputs;
+      const away = logStd.map((one) => (this.greedy ? 0 : Math.exp(one) * this.draws.normal()));
+      return [x, y].map((mean, axis) => Math.fround(Math.tanh(mean + away[axis])));
+    }
+    const worth = this.greedy ? outputs : outputs.map((logit) => logit - Math.log(-Math.log(this.draws.next())));
     return worth.reduce((best, one, action) => (one > worth[best] ? action : best), 0);
   }
 
-  /** The logits of a robot's actions in the world. */
-  logits(robot, row) {
-    const element = this.element(row), layer = (name, values) => this.layer(`actor.${name}`, robot, values);
-    const hidden = leaky(layer("second", leaky(layer("first", this.turned(row, element)))));
-    const inside = layer("output", hidden);
-    return this.frame ? inside.map((_, action) => inside[this.frame.forward[element][action]]) : inside;
+  /** What a robot's policy gives for the actions of the world: their logits, or means and log standard deviations. */
+  logits(robot, row, heard = []) {
+    const { row: turned, turn } = this.seen(row), known = [...turned, ...heard];
+    this.critic?.see(robot, turned, turn);
+    if (this.memory) known.push(...this.memory.after(robot, known, turn));
+    const hidden = leaky(this.tensors.layer("actor.second", robot, leaky(this.first.of(robot, known))));
+    const outputs = this.frame.back(this.spread(this.tensors.layer("actor.output", robot, hidden)), robot, turn);
+    const stays = this.able.some((column) => !(row[column] > 0));
+    return stays ? outputs.map((logit, action) => (action ? HIDDEN : logit)) : outputs;
+  }
+
+  /** Outputs with log standard deviations in the place of what they are made of, where actions are vectors. */
+  spread(outputs) {
+    if (!this.continuous) return outputs;
+    const { lowest, highest, shift } = this.logStd;
+    return outputs.map((value, at) => (at < 2 ? value : lowest + (highest - lowest) * sigmoid(value + shift)));
   }
 
   /** What the critic of each robot looks at: weights by head, robot and teammate; null without attention. */
   attention(obs, actions) {
-    const robots = Array.from({ length: this.robots }, (_, robot) => robot);
-    if (!this.heads || this.robots < 2) return null;
-    const there = robots.map((robot) => (
-      this.available < 0 || this.row(obs, robot)[this.available] > 0.5
-    ));
-    const seen = (one, other) => one !== other && there[other];
-    if (this.uniform) {
-      const share = (one) => 1 / Math.max(robots.filter((other) => seen(one, other)).length, 1);
-      const weights = robots.map((one) => robots.map((other) => (seen(one, other) ? share(one) : 0)));
-      return Array.from({ length: this.heads }, () => weights);
-    }
-    const encoded = robots.map((robot) => this.encoded(obs, robot, actions[robot]));
-    const depth = encoded[0].query.length / this.heads;
-    return Array.from({ length: this.heads }, (_, head) => robots.map((one) => {
-      const score = (other) => {
-        let sum = 0;
-        for (let at = head * depth; at < (head + 1) * depth; at++) {
-          sum += encoded[one].query[at] * encoded[other].key[at];
-        }
-        return sum / Math.sqrt(depth);
-      };
-      const scores = robots.map((other) => (seen(one, other) ? score(other) : HIDDEN));
-      const most = Math.max(...scores);
-      const powers = scores.map((value, other) => (seen(one, other) ? Math.exp(value - most) : 0));
-      const sum = powers.reduce((all, power) => all + power, 0) || 1;
-      return powers.map((power) => power / sum);
-    }));
+    return this.critic && this.robots > 1 ? this.critic.weights(this.rowsIn(obs), actions) : null;
   }
-
-  /** A robot's question to its teammates, and what it shows them. */
-  encoded(obs, robot, action) {
-    const row = this.row(obs, robot), element = this.element(row), turned = this.turned(row, element);
-    const taken = this.frame ? this.frame.forward[element][action] : action;
-    const doing = Array.from({ length: this.actions }, (_, one) => Number(one === taken));
-    const own = leaky(this.layer("critic.state_encoder", robot, turned));
-    const other = leaky(this.layer("critic.action_encoder", robot, [...turned, ...doing]));
-    return { query: this.times("critic.attention.query", own), key: this.times("critic.attention.key", other) };
-  }
-
-  /** weight x + bias of a layer that each robot, or each kind, has of its own. */
-  layer(name, robot, values) {
-    const { shape: [, outputs, inputs], values: weight } = this.tensors[`${name}.weight`];
-    const bias = this.tensors[`${name}.bias`].values, row = this.rows[robot];
-    return product(weight, row * outputs * inputs, outputs, values).map((sum, output) => (
-      sum + bias[row * outputs + output]
-    ));
-  }
-
-  times(name, values) {
-    const { shape: [outputs], values: weight } = this.tensors[name];
-    return product(weight, 0, outputs, values);
-  }
-
-  /** Which turn of the world brings a row into its frame: bit 0 mirrors x, bit 1 y, bit 2 swaps both. */
-  element(row) {
-    if (!this.frame) return 0;
-    const x = this.frame.x.map((column) => row[column]), y = this.frame.y.map((column) => row[column]);
-    const isNegative = (values) => (values.find((value) => value !== 0) ?? 0) < 0;
-    const mirrorX = isNegative(x), mirrorY = isNegative(y);
-    const apart = x.map((value, at) => (mirrorX ? -value : value) - (mirrorY ? -y[at] : y[at]));
-    return Number(mirrorX) + 2 * Number(mirrorY) + 4 * Number(isNegative(apart));
-  }
-
-  turned(row, element) {
-    if (!this.frame) return Array.from(row);
-    const { signs, order } = this.frame, mirrored = Array.from(row, (value, at) => value * signs[element][at]);
-    return order[element].map((column) => mirrored[column]);
-  }
-}
-
-/** Sums of weights times values, for some rows of a matrix that begin at a place. */
-function product(weight, begin, outputs, values) {
-  const count = values.length;
-  return Array.from({ length: outputs }, (_, output) => {
-    let sum = 0;
-    for (let at = 0, place = begin + output * count; at < count; at++) sum += weight[place + at] * values[at];
-    return sum;
-  });
 }
