@@ -1,0 +1,96 @@
+"""The worlds of pages without a browser: Node.js runs them, and they are Python's."""
+
+import json
+import os
+import shutil
+import subprocess
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import playwright
+import pytest
+from numpy.typing import NDArray
+from sensing import sensing
+
+from innerattn.config import Scenario
+from innerattn.config.streams import stream_seed
+from innerattn.envs import BatchEnv
+from innerattn.report.page.page import WORLDS
+
+FOLDER = files("innerattn.report.page")
+STEPS, SEED = 10_000, 12_345
+
+# Plays worlds with the actions that it is told; writes the bytes of all observations.
+PLAY = """
+const { readFileSync } = require("node:fs");
+const [glue, code] = process.argv.slice(1).map((file) => readFileSync(file));
+const { scenario, seed, actions } = JSON.parse(readFileSync(0, "utf8"));
+const { Rust } = new Function(`class Refusal extends Error {}\\n${glue}\\nreturn { Rust };`)();
+Rust.load(code).then((rust) => {
+  const world = rust.open(scenario, BigInt(seed)), parts = [];
+  const look = () => parts.push(Buffer.from(Float32Array.from(world.take("observations")).buffer));
+  world.restart();
+  look();
+  for (const one of actions) {
+    world.step(one.flat());
+    look();
+  }
+  world.close();
+  process.stdout.write(Buffer.concat(parts));
+});
+"""
+
+
+@pytest.fixture(scope="module")
+def node() -> str:
+    """Node.js: that which Playwright brings, else one that is installed."""
+    name = "node.exe" if os.name == "nt" else "node"
+    brought = Path(playwright.__file__).parent / "driver" / name
+    found = str(brought) if brought.is_file() else shutil.which("node")
+    if found is None:
+        pytest.skip("there is no Node.js: pip install playwright brings one")
+    return found
+
+
+def worlds(name: str) -> Scenario:
+    """Worlds of some sort."""
+    made = {
+        "sensing": sensing,
+        "continuous": lambda: Scenario.preset("mixed-faults").replace(actions="continuous"),
+    }
+    return made[name]() if name in made else Scenario.preset(name)
+
+
+def drawn_actions(scenario: Scenario) -> NDArray[Any]:
+    """Random actions (T, 1, R) or (T, 1, R, 2)."""
+    draws = np.random.default_rng(5)
+    if scenario.actions == "continuous":
+        return draws.uniform(-1, 1, (STEPS, 1, scenario.num_robots, 2)).astype(np.float32)
+    return draws.integers(0, 5, (STEPS, 1, scenario.num_robots))
+
+
+@pytest.mark.parametrize("name", ["mixed", "air-ground", "continuous", "sensing"])
+def test_they_give_the_same_observations_to_the_bit(node: str, name: str) -> None:
+    scenario, seed = worlds(name), stream_seed(SEED, "evaluation")
+    actions = drawn_actions(scenario)
+    told = {
+        "scenario": scenario.model_dump_json(),
+        "seed": str(seed),
+        "actions": actions[:, 0].tolist(),
+    }
+    done = subprocess.run(
+        [node, "-e", PLAY, str(FOLDER / "web" / "rust.js"), str(FOLDER / WORLDS)],
+        input=json.dumps(told).encode(),
+        capture_output=True,
+        timeout=200,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr.decode()
+    with BatchEnv(scenario, 1, seed, num_threads=1) as env:
+        here = np.stack([env.reset(), *(env.step(one).obs for one in actions)])
+        assert env.episodes()[0] == STEPS // scenario.episode_steps
+    there = np.frombuffer(done.stdout, "<f4").reshape(here.shape)
+    different = np.flatnonzero((there.view(np.uint32) != here.view(np.uint32)).any(axis=(1, 2, 3)))
+    assert not len(different), f"first at step {different[0]}"
