@@ -190,14 +190,14 @@ def run_of(folder: Path, config: RunConfig) -> Path:
 
 
 def driven(scenario: Scenario, steps: int) -> NDArray[np.float32]:
-    """Observations (T, E, R, D) of worlds in which robots drive at random and some are blind."""
+    """Observations (T, E, R, D); robots drive at random, and are blind at times."""
     rng = np.random.default_rng(2)
     with closing(BatchEnv(scenario, 4, seed=3, num_threads=1)) as env:
         found = [env.reset()]
         for _ in range(steps - 1):
             found.append(env.step(drawn(rng, scenario, found[-1].shape[:2])).obs)
     obs = np.stack(found)
-    obs[:, -1][rng.random(obs.shape[0]) < 0.2] = 0.0
+    obs[rng.random(obs.shape[:3]) < 0.1] = 0.0
     return obs
 
 
@@ -307,3 +307,25 @@ def test_vectors_are_drawn_as_often_as_they_should_be(page: Page, tmp_path: Path
     np.testing.assert_allclose(found.mean(axis=0), outputs[:2], atol=0.04)
     np.testing.assert_allclose(found.std(axis=0), np.exp(outputs[2:]), rtol=0.03)
     assert abs(np.corrcoef(found.T)[0, 1]) < 0.03
+
+
+def test_a_team_that_remembers_and_speaks_plays_without_a_word_in_the_console(
+    page: Page, tmp_path: Path
+) -> None:
+    team = read_team(run_of(tmp_path / "run", config_of("all at once")))
+    path = tmp_path / "page.html"
+    path.write_text(worlds_page("all", team.config.scenario, {"all": team}, SEED), "utf-8")
+    assert path.stat().st_size < 3_000_000
+    browser, said = page.context.browser, []
+    assert browser is not None
+    for seen in ready(browser, path):
+        seen.on("console", lambda message: said.append(message.text))
+        play = "async (steps) => { while (steps--) await play.send({ do: 'step' }); }"
+        seen.evaluate(play, 200)
+        seen.keyboard.press("o")
+        seen.get_by_role("button", name="New start").click()
+        until(seen, "!play.link.busy && !play.movesNow && !play.stale")
+        seen.evaluate(play, 50)
+        assert seen.evaluate("play.run.now.step") >= 50
+        assert np.ptp(np.array(seen.evaluate("play.run.now.attention"))) > 0.1
+    assert not said
