@@ -162,7 +162,7 @@ wheels: $(VENV)/.installed ## wheels for Linux, macOS and Windows, into dist/ (d
 	python packages/wheels/build.py --out dist --rust-src $(RUST_SRC) $(WHEELS)
 
 wheels-check: setup ## try the wheel for 64-bit ARM on Debian under QEMU: worlds and a team must do the same as here
-	test -e build/arm/export || innerattn export zoo:mixed -o build/arm/export
+	mkdir -p build/arm && test -e build/arm/export || innerattn export zoo:mixed -o build/arm/export
 	python packages/wheels/on_arm.py dist/*manylinux*_aarch64.whl build/arm/export
 
 policies-wheel: ## the wheel for robots, innerattn-policies, into dist/policies; pure Python, with numpy alone
