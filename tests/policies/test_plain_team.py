@@ -147,7 +147,6 @@ def test_columns_are_those_of_training(name: str) -> None:
     assert turning.pop("width") == len(names)
     assert asdict(plain.frame_columns(names, turns)) == turning
     assert asdict(plain.entity_columns(names)) == asdict(trained.entity_columns(names))
-    assert plain.able_columns(names) == trained.able_columns(names)
 
 
 def test_what_it_cannot_compute_is_refused() -> None:

@@ -1,6 +1,6 @@
 """What the columns of an observation are, found out from their names; without torch.
 
-`innerattn.train.columns` has the same for training. Names are as the worlds give them.
+`innerattn.train.columns` has what training needs beside. Names are as the worlds give them.
 """
 
 from __future__ import annotations
@@ -9,7 +9,8 @@ from collections.abc import Sequence
 
 from innerattn.policies.exported.contract import Entities, FrameColumns
 
-_HANDED = (".fault.heading_bias", ".turn_rate", ".left")
+HANDED = (".fault.heading_bias", ".turn_rate", ".left")
+"""Ends of names of columns that change their sign in a mirrored world."""
 _PLACE = ("relative_position.x", "relative_position.y")
 
 
@@ -63,7 +64,7 @@ def frame_columns(
         anchors += ["own.heading", *(stem for stem in teammates if stem.endswith("_position"))]
     return FrameColumns(
         vectors=tuple(pairs.values()),
-        handed=tuple(place[name] for name in names if name.endswith(_HANDED)),
+        handed=tuple(place[name] for name in names if name.endswith(HANDED)),
         anchors=tuple(pairs[stem] for stem in anchors if stem in pairs),
         rays=tuple(place[name] for name in names if name.startswith("own.ray.")),
         ray_turns=ray_turns,

@@ -21,13 +21,8 @@ from innerattn.learn.framed import FramedLearner
 from innerattn.learn.networks import draw_networks
 from innerattn.learn.types import Learner, LearnerClass, Team
 from innerattn.nn import PartnerColumns, SquareSymmetry
-from innerattn.train.columns import (
-    able_columns,
-    entity_columns,
-    hearing,
-    partner_columns,
-    state_columns,
-)
+from innerattn.policies.columns import able_columns
+from innerattn.train.columns import entity_columns, hearing, partner_columns, state_columns
 from innerattn.train.frames import turning_columns
 from innerattn.train.teams.learner import team_networks, team_section
 from innerattn.train.teams.policy import TeamPolicy

@@ -7,14 +7,7 @@ from itertools import zip_longest
 
 from innerattn.errors import ConfigError
 from innerattn.nn import EntityColumns, Hearing, PartnerColumns, VectorColumns
-
-_HANDED = (".fault.heading_bias", ".turn_rate", ".left")
-"""Ends of names of columns that change their sign in a mirrored world."""
-
-
-def able_columns(names: Sequence[str]) -> tuple[int, ...]:
-    """The columns that are all above 0 where a robot can act: it is available and has charge."""
-    return tuple(names.index(one) for one in ("own.available", "own.charge") if one in names)
+from innerattn.policies.columns import HANDED, frame_columns
 
 
 def entity_columns(names: Sequence[str]) -> EntityColumns:
@@ -82,19 +75,14 @@ def vector_columns(
             "network.symmetry = 'canonical' or 'augmented': an observation needs own.position, and "
             f"a column .y for every column .x; {(missing or ['own.position'])[0]} lacks it"
         )
-    pairs = {stem: (place[f"{stem}.x"], place[f"{stem}.y"]) for stem in stems}
-    anchors = [stem for stem in stems if stem.startswith("victim_")]
-    anchors += ["own.position", "own.velocity"]
-    if "teammate_0.seen" in place:
-        teammates = [stem for stem in stems if stem.startswith("teammate_")]
-        anchors += ["own.heading", *(stem for stem in teammates if stem.endswith("_position"))]
+    found = frame_columns(names, ray_turns)
     return VectorColumns(
         width=len(names),
-        vectors=tuple(pairs.values()),
-        handed=tuple(place[name] for name in names if name.endswith(_HANDED)),
-        anchors=tuple(pairs[stem] for stem in anchors if stem in pairs),
-        rays=tuple(place[name] for name in names if name.startswith("own.ray.")),
-        ray_turns=ray_turns,
+        vectors=found.vectors,
+        handed=found.handed,
+        anchors=found.anchors,
+        rays=found.rays,
+        ray_turns=found.ray_turns,
     )
 
 
@@ -115,7 +103,7 @@ def state_columns(names: Sequence[str]) -> VectorColumns:
     return VectorColumns(
         width=len(names),
         vectors=tuple(pairs.values()),
-        handed=tuple(place[name] for name in names if name.endswith(_HANDED)),
+        handed=tuple(place[name] for name in names if name.endswith(HANDED)),
         anchors=(*victims, *robots),
     )
 
