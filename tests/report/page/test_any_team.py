@@ -1,6 +1,5 @@
 """Policies for any team in the page: they choose as those in numpy do, for teams of all sorts."""
 
-import json
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -8,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import PHONE, WIDE, opened_browser, until, visit
+from answers import ANSWER, served
+from browser import PHONE, WIDE, until, visit
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page
 from team_of_any import TEAM, actors_of, config_of, contract_of, policy_of, run_of
@@ -23,7 +23,6 @@ from innerattn.evaluate.trained import load_trained
 from innerattn.policies import Exported
 from innerattn.report.page.page import page_document, worlds_page
 from innerattn.report.page.team import read_team
-from innerattn.report.play.sessions import Sessions
 from innerattn.train import RunFolder
 
 SEED = 12_345
@@ -52,23 +51,6 @@ ACT = """async (steps) => {
   inside.leave(`sessions/${session}`);
   return found;
 }"""
-
-
-# Begins a world of another document, and answers messages; gives all states.
-ANSWER = """async ([given, messages]) => {
-  const { rust, constructor: Inside } = play.link.transport;
-  const inside = new Inside(rust, given), opened = await inside.ask("sessions", {});
-  const path = `sessions/${opened.session}`, found = [opened];
-  for (const message of messages) found.push(await inside.ask(path, message));
-  inside.leave(path);
-  return found;
-}"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with opened_browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")
@@ -182,18 +164,14 @@ def test_the_team_of_the_package_acts_as_its_export_does(page: Page, any_team: P
 
 def test_it_answers_as_the_server_of_play_does(page: Page) -> None:
     """Blind robots and broken motors too: each robot acts on what it sees itself."""
-    worlds, path = endless(TEAM), "sessions"
+    worlds = endless(TEAM)
     policy = load_trained("zoo:any", worlds, each_sees=True)[1]
-    sessions = Sessions(lambda: InteractiveWorld(worlds, {"any": policy}, SEED))
     step = {"do": "step"}
     messages: list[dict[str, Any]] = [step] * 60
     for robot, kind in ((0, "blackout"), (3, "unavailable"), (4, "lost_communication")):
         messages += [{"do": "faults", "robot": robot, "values": {kind: 1.0}}, *[step] * 25]
     messages += [{"do": "move_robot", "robot": 2, "x": 0.5, "y": -0.5}, *[step] * 20]
-    theirs = []
-    for message in [{}, *messages]:
-        theirs.append(json.loads(sessions.take(path, json.dumps(message).encode()).text))
-        path = f"sessions/{theirs[0]['session']}"
+    theirs = served(lambda: InteractiveWorld(worlds, {"any": policy}, SEED), messages)
     given = page_document(TEAM, {"any": read_team("zoo:any", TEAM)}, SEED)
     ours = page.evaluate(ANSWER, [given, messages])
     for at, (one, other) in enumerate(zip(ours, theirs, strict=True)):

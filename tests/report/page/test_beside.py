@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import PHONE, WIDE, Visit, opened_browser, until, visit
+from browser import PHONE, WIDE, Visit, until, visit
 from played import played, scripted_world
 from playwright.sync_api import Browser, Page
 
@@ -40,12 +40,6 @@ ALONE = """async ([policy, steps]) => {
   inside.leave(path);
   return state;
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with opened_browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 from answers import ANSWER, drawn_messages, like, served
-from browser import PHONE, WIDE, Visit, opened_browser, until, visit
+from browser import PHONE, WIDE, Visit, until, visit
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page
 from sensing import sensing
@@ -67,12 +67,6 @@ ACT = """(steps) => {
     return found;
   });
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with opened_browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

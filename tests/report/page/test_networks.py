@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 from answers import ANSWER, drawn_messages, like, served
-from browser import opened_browser, until, visit
+from browser import until, visit
 from fresh_run import run_config
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page
@@ -61,11 +61,10 @@ DRAW = """([given, outputs, count]) => {
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+def page(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     path = tmp_path_factory.mktemp("page") / "page.html"
     path.write_text(worlds_page("any", Scenario(), {"random": None}, SEED), "utf-8")
-    with opened_browser() as browser:
-        yield from ready(browser, path)
+    yield from ready(browser, path)
 
 
 def ready(browser: Browser, path: Path) -> Iterator[Page]:

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 from importlib.resources import files
 from pathlib import Path
@@ -43,15 +42,8 @@ Rust.load(code).then((rust) => {
 """
 
 
-@pytest.fixture(scope="module")
-def node() -> str:
-    """Node.js: that which Playwright brings, else one that is installed."""
-    name = "node.exe" if os.name == "nt" else "node"
-    brought = Path(playwright.__file__).parent / "driver" / name
-    found = str(brought) if brought.is_file() else shutil.which("node")
-    if found is None:
-        pytest.skip("there is no Node.js: pip install playwright brings one")
-    return found
+NODE = Path(playwright.__file__).parent / "driver" / ("node.exe" if os.name == "nt" else "node")
+"""Node.js, which Playwright brings."""
 
 
 def worlds(name: str) -> Scenario:
@@ -72,7 +64,7 @@ def drawn_actions(scenario: Scenario) -> NDArray[Any]:
 
 
 @pytest.mark.parametrize("name", ["mixed", "air-ground", "continuous", "sensing"])
-def test_they_give_the_same_observations_to_the_bit(node: str, name: str) -> None:
+def test_they_give_the_same_observations_to_the_bit(name: str) -> None:
     scenario, seed = worlds(name), stream_seed(SEED, "evaluation")
     actions = drawn_actions(scenario)
     told = {
@@ -81,7 +73,7 @@ def test_they_give_the_same_observations_to_the_bit(node: str, name: str) -> Non
         "actions": actions[:, 0].tolist(),
     }
     done = subprocess.run(
-        [node, "-e", PLAY, str(FOLDER / "web" / "rust.js"), str(FOLDER / WORLDS)],
+        [str(NODE), "-e", PLAY, str(FOLDER / "web" / "rust.js"), str(FOLDER / WORLDS)],
         input=json.dumps(told).encode(),
         capture_output=True,
         timeout=200,
