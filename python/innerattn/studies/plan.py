@@ -314,9 +314,9 @@ def _refuse_other_measure(where: str, measure: str, study: Study, length: str) -
         raise ConfigError(f"{where} = {measure!r}: has no value of long episodes")
     if measure not in (*MEASURES_OF_ALL, *MEASURES, *study.measures):
         known = ", ".join((*MEASURES_OF_ALL, *MEASURES, *study.measures))
-        sections = {RETAINED: study.faults, UNSEEN: study.unseen_teams}
-        missing = [name for name, one in sections.items() if measure.startswith(name) and not one]
-        needs = f"; it needs [{_SECTION[missing[0]]}]" if missing else ""
+        sections = [one for name, one in _SECTION.items() if measure.startswith(name)]
+        missing = [one for one in sections if getattr(study, one) is None]
+        needs = f"; it needs [{missing[0]}]" if missing else ""
         raise ConfigError(f"{where} = {measure!r}: must be one of {known}{needs}")
 
 
