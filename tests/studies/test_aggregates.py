@@ -182,10 +182,13 @@ def test_the_score_as_seen_takes_the_script_that_knows_as_much(
     for length in ("standard", "long"):
         assert found.value("score_as_seen", length) == wanted  # type: ignore[arg-type]
     assert found.value("train_seconds", "standard") is None
+    assert found.value("train_cpu_seconds", "standard") is None
 
 
 def test_the_seconds_of_a_training_are_those_of_its_run(tmp_path: Path) -> None:
     run = made_run(tmp_path, "mixed", "td-inner", 0)
     planned = PlannedRun({"scenario": "mixed"}, 0, run.config, "")
+    run = replace(run, info=replace(run.info, cpu_seconds=12.5))
     found = Result(planned, run.summary, run)
     assert found.value("train_seconds", "standard") == run.info.seconds
+    assert found.value("train_cpu_seconds", "standard") == 12.5

@@ -55,10 +55,11 @@ def test_create_makes_a_run_that_is_running(small_config: Configure, tmp_path: P
 
 def test_mark_is_read_back(small_config: Configure, tmp_path: Path) -> None:
     folder = RunFolder.create(tmp_path / "run", small_config(), threads=1)
+    folder.mark("interrupted", 120, 5, 1.23456, 2.00049)
     folder.mark("interrupted", 120, 5, 1.23456)
     info = read_info(folder.path)
     assert (info.state, info.env_steps, info.updates) == ("interrupted", 120, 5)
-    assert info.seconds == pytest.approx(1.235)
+    assert (info.seconds, info.cpu_seconds) == (1.235, 2.0)
 
 
 @pytest.mark.parametrize("kind", ["folder", "file", "dangling link"])

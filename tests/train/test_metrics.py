@@ -45,6 +45,24 @@ def test_rates_are_of_the_interval_alone(monkeypatch: pytest.MonkeyPatch) -> Non
     assert (line["seconds"], line["env_steps_per_s"], line["updates_per_s"]) == (15.0, 600.0, 2.0)
 
 
+def test_processor_time_goes_on_after_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr("innerattn.train.metrics.time.process_time", lambda: now[0])
+    interval = Interval()
+    now[0] = 103.0
+    assert interval.cpu_seconds == 3.0
+    state = interval.resume_state()
+    now[0] = 1.0  # of another process
+    other = Interval()
+    other.load_resume_state(state)
+    now[0] = 1.5
+    assert other.cpu_seconds == 3.5
+    del state["cpu_seconds"]
+    other.load_resume_state(state)
+    assert other.cpu_seconds is None
+    assert "cpu_seconds" not in other.resume_state()
+
+
 def test_lines_are_appended_whole(tmp_path: Path) -> None:
     file = MetricsFile(tmp_path / "metrics.jsonl")
     lines = [{"env_steps": n, "losses": {"critic_loss": 0.1 * n}} for n in range(3)]

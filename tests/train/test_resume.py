@@ -226,14 +226,18 @@ def test_a_run_that_was_cut_is_the_run_that_was_not(
     # The middle of the imitation, where there is one, or before the memory is full; then later.
     with pytest.raises(KeyboardInterrupt):
         train(small_config(**{**SMALL, **CASES[case]}), run, progress=stopped_after(17))
-    assert read_info(run).state == "interrupted"
+    first = read_info(run)
+    assert first.state == "interrupted"
     with pytest.raises(KeyboardInterrupt):
         resume(run, progress=stopped_after(16))
-    assert read_info(run).env_steps == 33 * 12
+    second = read_info(run)
+    assert second.env_steps == 33 * 12
     resume(run)
     assert left_by(run) == whole(case)
     info = read_info(run)
     assert (info.state, info.resumed) == ("done", 2)
+    times = [one.cpu_seconds or 0.0 for one in (first, second, info)]
+    assert 0.0 < times[0] < times[1] < times[2], "what was spent before a stop counts"
     with pytest.raises(NothingToResumeError, match="is done"):
         resume(run)
 

@@ -22,7 +22,8 @@ class RunInfo:
     ``weights_sha256`` is the digest of its newest weights, see `innerattn.train.weights.digest_of`;
     runs made before it was written down have none. ``sealed`` says that ``manifest.json`` holds
     the digests of all files, this one's too. ``resumed`` counts how often
-    training went on from a checkpoint.
+    training went on from a checkpoint. ``cpu_seconds`` is the processor time of the training's
+    process, of several workers the first one's; runs made before it was written down have none.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid", strict=True)
@@ -43,6 +44,7 @@ class RunInfo:
     weights_sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")] | None = None
     sealed: bool = False
     resumed: _Count = 0
+    cpu_seconds: Annotated[float, Field(ge=0, lt=1e12, allow_inf_nan=False)] | None = None
 
 
 _CHECK = TypeAdapter(RunInfo)

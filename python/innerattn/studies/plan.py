@@ -32,7 +32,10 @@ from innerattn.studies.study import (
 
 SCORE_AS_SEEN = "score_as_seen"
 TRAIN_SECONDS = "train_seconds"
-MEASURES_OF_ALL = ("score", "rescues_per_episode", SCORE_AS_SEEN, TRAIN_SECONDS)
+TRAIN_CPU_SECONDS = "train_cpu_seconds"
+TIMES = {TRAIN_SECONDS: "seconds", TRAIN_CPU_SECONDS: "cpu_seconds"}
+"""What training took: a measure, and its name in the record of a run."""
+MEASURES_OF_ALL = ("score", "rescues_per_episode", SCORE_AS_SEEN, *TIMES)
 """What every run has beside the registered measures."""
 MOST_RUNS = 10_000
 RECIPE = "recipe"

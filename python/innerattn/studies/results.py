@@ -21,7 +21,7 @@ from innerattn.studies.ledger import Ledger, State
 from innerattn.studies.plan import (
     MEASURES_OF_ALL,
     SCORE_AS_SEEN,
-    TRAIN_SECONDS,
+    TIMES,
     PlannedRun,
     pairs,
     run_digest,
@@ -76,8 +76,9 @@ class Result:
         found: Any
         if has_own_episodes(measure):
             found = self.measured.get(measure)
-        elif measure == TRAIN_SECONDS:
-            found = None if self.finished is None else self.finished.info.seconds
+        elif measure in TIMES:
+            info = None if self.finished is None else self.finished.info
+            found = getattr(info, TIMES[measure], None)
         elif measure == SCORE_AS_SEEN:
             found = _score_as_seen(part)
         elif measure in MEASURES_OF_ALL:

@@ -131,8 +131,8 @@ class StudyContrast(Model):
     b: dict[str, Any] = Field(min_length=1, description="which runs they are compared with")
     measure: str = Field(
         "score",
-        description="score, score_as_seen, rescues_per_episode, train_seconds or a registered "
-        "measure of a run",
+        description="score, score_as_seen, rescues_per_episode, train_seconds, "
+        "train_cpu_seconds or a registered measure of a run",
     )
     length: Length | Literal["both"] = Field(
         "standard",

@@ -125,7 +125,14 @@ class RunFolder:
         """
         self.info = replace(self.info, weights_sha256=checkpoints.save(content))
 
-    def mark(self, state: State, env_steps: int, updates: int, seconds: float) -> None:
+    def mark(
+        self,
+        state: State,
+        env_steps: int,
+        updates: int,
+        seconds: float,
+        cpu_seconds: float | None = None,
+    ) -> None:
         """Write down how far the run has come; at its end, seal it with a manifest.
 
         Raises:
@@ -138,6 +145,7 @@ class RunFolder:
             env_steps=env_steps,
             updates=updates,
             seconds=round(seconds, 3),
+            cpu_seconds=self.info.cpu_seconds if cpu_seconds is None else round(cpu_seconds, 3),
             sealed=False,
         )
         if state == "running":

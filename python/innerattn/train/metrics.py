@@ -133,6 +133,7 @@ class Interval:
     def __init__(self) -> None:
         """Start at zero steps, now."""
         self._start = time.perf_counter()
+        self._cpu_start: float | None = time.process_time()
         self._seconds = 0.0
         self._env_steps = 0
         self._updates = 0
@@ -148,12 +149,23 @@ class Interval:
         """Time since the start of training [s]."""
         return time.perf_counter() - self._start
 
+    @property
+    def cpu_seconds(self) -> float | None:
+        """Processor time of this process, all its threads, since the start of training [s].
+
+        Processes of a compiler and other workers are not counted. None: training went on from a
+        state that did not say how much there was before.
+        """
+        return None if self._cpu_start is None else time.process_time() - self._cpu_start
+
     def resume_state(self) -> dict[str, Tensor]:
         """Everything since the last line; see `Resumable`."""
         losses = {
             f"losses.{place:03}.{name}": torch.tensor(values, dtype=torch.float64)
             for place, (name, values) in enumerate(self._losses.items())
         }
+        if self.cpu_seconds is not None:
+            losses["cpu_seconds"] = torch.tensor([self.cpu_seconds], dtype=torch.float64)
         return losses | {
             "before": torch.tensor([self._env_steps, self._updates]),
             "seconds": torch.tensor([self.seconds, self._seconds], dtype=torch.float64),
@@ -165,6 +177,10 @@ class Interval:
         self._env_steps, self._updates = before.tolist()
         seconds, self._seconds = take(state, "seconds", torch.float64, 2).tolist()
         self._start = time.perf_counter() - seconds
+        self._cpu_start = None
+        if "cpu_seconds" in state:  # states of 0.1.0 do not have it
+            (cpu_seconds,) = take(state, "cpu_seconds", torch.float64, 1).tolist()
+            self._cpu_start = time.process_time() - cpu_seconds
         losses = inside("losses", state)
         self._losses = {
             name.partition(".")[2]: take(losses, name, torch.float64, None).tolist()

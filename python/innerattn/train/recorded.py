@@ -176,4 +176,5 @@ class RecordedStages(Stages):
 
     def _mark(self, state: State) -> None:
         parts = self._parts
-        self._folder.mark(state, self._at.env_steps, parts.updates, parts.interval.seconds)
+        times = parts.interval.seconds, parts.interval.cpu_seconds
+        self._folder.mark(state, self._at.env_steps, parts.updates, *times)

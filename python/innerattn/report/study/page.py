@@ -27,7 +27,7 @@ from innerattn.studies.aggregates import THRESHOLDS, Aggregate
 from innerattn.studies.curves import EPISODES, LearningCurve
 from innerattn.studies.folder import Rules, StudyFolder
 from innerattn.studies.ledger import State
-from innerattn.studies.plan import TRAIN_SECONDS
+from innerattn.studies.plan import TIMES, TRAIN_CPU_SECONDS, TRAIN_SECONDS
 from innerattn.studies.results import RULES, Compared, Mean, Results, Values
 from innerattn.studies.shown import CONTRASTS, DATED_RULES, OVER_ALL, StudyTable
 from innerattn.studies.space import Length
@@ -247,8 +247,8 @@ def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:
         if has_own_episodes(measure):
             heads.append(_own_head(measure))
             continue
-        if measure == TRAIN_SECONDS:
-            heads.append("training [s]")
+        if measure in TIMES:
+            heads.append(_IN_WORDS[measure])
             continue
         steps = {one.episode_steps[length] for one in found}
         which = f"{steps.pop()} steps" if len(steps) == 1 else f"{length} episodes"
@@ -264,7 +264,11 @@ def _own_head(measure: str) -> str:
     return ", ".join(filter(None, (whole.replace("_", " "), part)))
 
 
-_IN_WORDS = {"rescues_per_episode": "rescues"}
+_IN_WORDS = {
+    "rescues_per_episode": "rescues",
+    TRAIN_SECONDS: "training [s]",
+    TRAIN_CPU_SECONDS: "training [CPU s]",
+}
 
 
 def value_cell(values: Values) -> str:
