@@ -50,8 +50,8 @@ def printed(capsys: Captured, *arguments: str) -> str:
         (
             "train --preset a.toml",
             "--preset a.toml: must be air-ground, double, mixed, mixed-1-food, mixed-16, "
-            "mixed-4-food, mixed-8, mixed-faults, mixed-radio, mixed-sight, mixed-wheels or "
-            "single; --scenario reads a file",
+            "mixed-4-food, mixed-8, mixed-faults, mixed-radio, mixed-sight, mixed-wheels, "
+            "rescue-16, rescue-64 or single; --scenario reads a file",
         ),
         ("train --seed abc", "--seed abc: must be a whole number"),
         ("train --seed=abc", "--seed abc: must be a whole number"),

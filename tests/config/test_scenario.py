@@ -4,6 +4,7 @@ import copy
 import json
 import math
 import pickle
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -42,9 +43,24 @@ def test_presets(name: str, victims: int) -> None:
 
 def test_preset_names_are_complete() -> None:
     teams = {"mixed-1-food": 3, "mixed-4-food": 6, "mixed-8": 8, "mixed-16": 16}
+    teams |= {"rescue-16": 16, "rescue-64": 64}
     others = {"mixed-faults", "mixed-radio", "mixed-sight", "mixed-wheels", "air-ground"}
     assert set(SCENARIOS) == {"single", "double", "mixed", *others, *teams}
     assert {name: Scenario.preset(name).num_robots for name in teams} == teams
+
+
+@pytest.mark.parametrize("robots", [16, 64])
+def test_the_work_of_a_rescue_preset_grows_with_its_team(robots: int) -> None:
+    small, large = Scenario.preset("mixed"), Scenario.preset(f"rescue-{robots}")
+    times = robots // small.num_robots
+    kinds = Counter(robot.kind for robot in small.robots)
+    assert Counter(robot.kind for robot in large.robots) == {k: times * n for k, n in kinds.items()}
+    assert large.num_victims == times * small.num_victims
+    assert large.arena_half_width_m**2 == times * small.arena_half_width_m**2
+    bodies = {(one.kind, one.abilities, one.max_speed_mps, one.mass_kg) for one in small.robots}
+    assert bodies == {
+        (one.kind, one.abilities, one.max_speed_mps, one.mass_kg) for one in large.robots
+    }
 
 
 def test_the_preset_with_faults_is_mixed_with_faults_that_come_in_most_episodes() -> None:
