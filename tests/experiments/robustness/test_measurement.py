@@ -10,11 +10,8 @@ from innerattn.cli.main import main
 from innerattn.errors import RunError
 from innerattn.experiments.plan import Case
 from innerattn.experiments.robustness import design, measurement
-from innerattn.experiments.robustness.measurement import (
-    FaultMeasurement,
-    missing_measurements,
-    read_measurements,
-)
+from innerattn.experiments.robustness.measurement import FaultMeasurement, missing_measurements
+from innerattn.experiments.robustness.results import over_groups, read_measurements
 from innerattn.experiments.run import FinishedRun, read_run
 from innerattn.policies import Policy
 
@@ -67,11 +64,13 @@ def test_a_document_is_that_of_the_command_and_is_read_without_playing(
 
     monkeypatch.setattr("innerattn.evaluate.robustness.load_trained", refuse)
     assert missing(runs, study) == []
-    (result,) = read_measurements(runs, study)
-    assert list(result.runs) == [one.case for one in runs]
-    assert list(result.scripts) == ["greedy", "hungarian", "oracle"]
-    assert list(result.bounds) == list(result.attention) == [runs[0].case]
-    assert result.critics == 2
+    (deployment,) = over_groups(read_measurements(runs, study), ()).deployments
+    methods = [one.method for one in runs]
+    names = [one.name for one in deployment.policies]
+    assert names == [*methods, "greedy", "hungarian", "oracle"]
+    assert list(deployment.attention) == methods[:1]
+    assert deployment.bounds is not None
+    assert (deployment.bounds.critics, deployment.bounds.runs) == (1, 2)
 
 
 def test_other_weights_are_another_measurement(study: Path, runs: list[FinishedRun]) -> None:

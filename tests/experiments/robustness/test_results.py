@@ -12,8 +12,7 @@ from small_study import planned_of
 from innerattn.config import Scenario
 from innerattn.experiments.plan import METHODS
 from innerattn.experiments.robustness.design import groups
-from innerattn.experiments.robustness.documents import GroupResult, group_result
-from innerattn.experiments.robustness.results import Robustness, over_groups
+from innerattn.experiments.robustness.results import Measured, Robustness, over_groups
 from innerattn.stats import Estimate
 
 pytestmark = pytest.mark.long
@@ -23,7 +22,7 @@ SCRIPTS = ("greedy", "hungarian", "oracle")
 Documents = dict[str, dict[str, Any]]
 
 
-def made(seeds: range) -> tuple[Documents, list[GroupResult]]:
+def made(seeds: range) -> tuple[Documents, list[Measured]]:
     planned = planned_of("robustness", METHODS, ("mixed",), len(seeds))
     documents, found = {}, []
     for number, group in enumerate(groups([one.case for one in planned])):
@@ -31,7 +30,7 @@ def made(seeds: range) -> tuple[Documents, list[GroupResult]]:
         methods = [case.method for case in group.cases]
         document = made_document(methods, Scenario.preset(name), group.kinds, number)
         documents[group.name] = json.loads(json.dumps(document))
-        found.append(group_result(group, documents[group.name]))
+        found.append(Measured(group, documents[group.name]))
     return documents, found
 
 
@@ -181,7 +180,7 @@ def test_without_rescues_there_is_no_retention() -> None:
     for cell in document["policies"][0]["cells"]:
         cell["retention"] = None
     (place,) = [i for i, one in enumerate(found) if one.group.name == "team-mixed"]
-    found[place] = group_result(found[place].group, document)
+    found[place] = Measured(found[place].group, document)
     teams = {(one.name, one.policy): one for one in over_groups(found, SEEN).teams}
     assert set(teams["mixed", "td-inner"].retention.values()) == {None}
     assert None not in teams["mixed", "hungarian"].retention.values()

@@ -8,8 +8,7 @@ from small_study import planned_of
 from innerattn.config import Scenario
 from innerattn.experiments.plan import METHODS
 from innerattn.experiments.robustness.design import Group, groups
-from innerattn.experiments.robustness.documents import group_result
-from innerattn.experiments.robustness.results import Robustness, over_groups
+from innerattn.experiments.robustness.results import Measured, Robustness, over_groups
 from innerattn.report.robustness import page
 from innerattn.report.robustness.page import robustness_page
 from innerattn.report.tables.text import plus_minus
@@ -25,7 +24,7 @@ def made(*parts: str) -> Robustness:
 
     planned = planned_of("robustness", METHODS, ("mixed", "double"), 2)
     asked = [one for one in groups([one.case for one in planned]) if one.part in parts]
-    found = [group_result(one, document(one, seed)) for seed, one in enumerate(asked)]
+    found = [Measured(one, document(one, seed)) for seed, one in enumerate(asked)]
     return over_groups(found, ("motor_gain",))
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-from innerattn.experiments.robustness.critics import BoundsOverRuns
-from innerattn.experiments.robustness.documents import ALL, BoundLevel
 from innerattn.experiments.robustness.results import (
+    ALL,
+    BoundLevel,
+    BoundsOverRuns,
     Deployment,
     FaultTraining,
     TeamResult,
