@@ -17,7 +17,7 @@ from innerattn.cli.main import main
 from innerattn.errors import RunError
 from innerattn.experiments.archive import FILE, FORMAT, read_archive, write_archive
 from innerattn.experiments.run import FinishedRun, read_run, refuse_without_steps
-from innerattn.report.crossed.write import write_crossed
+from innerattn.report.crossed.write import write
 from innerattn.studies.results import read_results, read_summaries
 
 
@@ -98,8 +98,8 @@ def test_archived_runs_give_the_same_report(
 ) -> None:
     out, runs = crossed
     write_archive(runs, tmp_path / FILE)
-    write_crossed(runs, out, "quick")
-    write_crossed(read_archive(tmp_path / FILE), tmp_path, "quick")
+    write(runs, out, "quick")
+    write(read_archive(tmp_path / FILE), tmp_path, "quick")
     for name in (f"crossed.{kind}" for kind in ("md", "json", "csv")):
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from innerattn.stats import Estimate
-from innerattn.stats.seeds import numbers, seed_curve, seed_estimate
+from innerattn.stats.estimate import as_json
+from innerattn.stats.seeds import seed_curve, seed_estimate
 from innerattn.stats.student import student_interval
 
 
@@ -27,7 +28,7 @@ def test_bands_against_plain_loops() -> None:
     values = np.random.default_rng(0).normal(size=(4, 5))
     values[0, 1], values[:2, 2], values[1:, 3], values[:, 4] = (np.nan,) * 4
     found = seed_curve(values)
-    assert found.kind == "student"
+    assert found.band == "student"
     assert found.runs.tolist() == [4, 3, 2, 1, 0]
     for t, count in enumerate(found.runs):
         own = [value for value in values[:, t] if not math.isnan(value)]
@@ -39,13 +40,13 @@ def test_bands_against_plain_loops() -> None:
             assert seen == pytest.approx((sum(own) / 2, min(own), max(own)))
         else:
             assert np.isnan(seen[1:]).all()
-    assert found.to_json()["mean"][4] is None
+    assert as_json(found)["mean"][4] is None
 
 
 @pytest.mark.parametrize(("runs", "kind"), [(1, "none"), (2, "range"), (3, "student")])
 def test_the_kind_of_band_follows_the_number_of_runs(runs: int, kind: str) -> None:
-    assert seed_curve(np.zeros((runs, 2))).kind == kind
+    assert seed_curve(np.zeros((runs, 2))).band == kind
 
 
 def test_numbers_for_json() -> None:
-    assert numbers(np.array([[1.0, np.nan]])) == [[1.0, None]]
+    assert as_json(np.array([[1.0, np.nan]])) == [[1.0, None]]

@@ -110,15 +110,13 @@ def test_matrices_hold_the_seeds_that_all_tasks_share() -> None:
 
 def test_raw_data_of_marl_eval(tmp_path: Path) -> None:
     made = [made_run(tmp_path / "made", "mixed", "td-inner", seed) for seed in (0, 1)]
-    (tmp_path / "runs").mkdir()
     found: list[Result] = []
     for run in made:
         place = {"scenario": "mixed", "method": "td-inner", "budget": "quick"}
         planned = PlannedRun(place, run.seed, run.config, run.config.digest())
-        (tmp_path / "runs" / planned.key).symlink_to(run.folder)
-        found.append(Result(planned, run.summary))
+        found.append(Result(planned, run.summary, run))
     names = algorithm_names(aggregate(found, "standard"))
-    document: Any = marl_eval_document(names, found, tmp_path / "runs")
+    document: Any = marl_eval_document(names, found)
     task = document["innerattn"]["mixed"]
     assert list(task) == ["td-inner"]
     assert list(task["td-inner"]) == ["seed_0", "seed_1"]
@@ -146,10 +144,9 @@ def test_scores_of_longer_training_episodes_are_between_scripts_in_such(tmp_path
     train = run.config.train.replace(episode_steps=50, engine="discs")
     config = run.config.model_copy(update={"train": train})
     planned = PlannedRun({"scenario": "mixed"}, 0, config, "")
-    (tmp_path / planned.key).symlink_to(run.folder)
-    found = [Result(planned, run.summary)]
+    found = [Result(planned, run.summary, replace(run, config=config))]
     names = algorithm_names(aggregate(found, "standard"))
-    document: Any = marl_eval_document(names, found, tmp_path)
+    document: Any = marl_eval_document(names, found)
     ((of_run,),) = (one.values() for one in document["innerattn"]["mixed"].values())
     low, high = (training_rescues(config, name, 500, None) for name in ("random", "hungarian"))
     assert high > 1.5 * run.summary["scripted"]["hungarian"]["mean"]

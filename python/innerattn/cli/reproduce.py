@@ -81,6 +81,7 @@ class Reproduce(LongCommand):
             KeyboardInterrupt: the user stopped it; runs are saved.
         """
         from innerattn.report.plots.drawing import check_format
+        from innerattn.report.study.write import write_study
         from innerattn.studies.results import read_results
 
         target = TARGETS[self.target]
@@ -103,7 +104,7 @@ class Reproduce(LongCommand):
         )
         runs = results.runs
         if target.report is None:
-            code, name = self._report(study, results), "report.md"
+            code, name = say_report(self, *write_study(study, results)), "report.md"
         else:
             report = target.report()
             code = self._special(target, report, study, results)
@@ -137,11 +138,6 @@ class Reproduce(LongCommand):
         out = pool / target.name
         return begin_study_in(as_file(table), Path(f"{target.name}.toml"), out, pool=pool)
 
-    def _report(self, study: StudyFolder, results: Results) -> int:
-        from innerattn.report.study.write import write_study
-
-        return say_report(self, *write_study(study, results))
-
     def _special(self, target: Target, report: Report, study: StudyFolder, results: Results) -> int:
         """Write a report of the target's own, and print what its runs scored."""
         from innerattn.report.study.page import left_out
@@ -170,9 +166,12 @@ class Reproduce(LongCommand):
         Returns:
             What is not done.
         """
-        if target.jobs is None:
+        from innerattn.experiments.robustness.measurement import missing_measurements
+
+        if not target.under_faults:
             return []
-        jobs = target.jobs([run.case for run in study.planned], results.runs, study.path)
+        cases = [run.case for run in study.planned]
+        jobs = missing_measurements(cases, results.runs, study.path)
         return [*jobs] if self.report_only else do_jobs(self, jobs)
 
     def _check_page(self, study: StudyFolder) -> None:

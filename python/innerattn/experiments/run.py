@@ -113,8 +113,7 @@ class FinishedRun(Shown):
 
     def scores(self) -> tuple[Scores, Scores]:
         """What its evaluation found at the standard and at the second length of episodes."""
-        standard, long = (_scores(part) for part in (self.summary, self.summary["long"]))
-        return standard, long
+        return scores_in(self.summary)
 
 
 def read_run(case: Case, folder: Path, *, steps: bool = True) -> FinishedRun:
@@ -183,6 +182,21 @@ def _of_lines(run: FinishedRun, of: Callable[[Mapping[str, Any]], Found]) -> lis
     if not found:
         raise RunError(f"{path}: holds no line")
     return found
+
+
+@dataclass(frozen=True)
+class OfMethod:
+    """What runs of one situation and method show.
+
+    Attributes:
+        situation: of the worlds.
+        method: of training, or a scripted policy.
+        seeds: of the runs; a scripted policy has those of the runs in whose worlds it was played.
+    """
+
+    situation: str
+    method: str
+    seeds: tuple[int, ...]
 
 
 def by_method(runs: Sequence[FinishedRun]) -> dict[tuple[str, str], list[FinishedRun]]:
@@ -321,7 +335,12 @@ def _read(files: RunFiles, name: str, most_bytes: int) -> bytes:
         raise NotMeasuredError(str(error)) from error
 
 
-def _scores(part: dict[str, Any]) -> Scores:
+def scores_in(summary: Mapping[str, Any]) -> tuple[Scores, Scores]:
+    """Scores of a summary's document at the standard and at the second length of episodes."""
+    return _scores(summary), _scores(summary["long"])
+
+
+def _scores(part: Mapping[str, Any]) -> Scores:
     return Scores(
         int(part["episode_steps"]),
         float(part["rescues_per_episode"]["mean"]),

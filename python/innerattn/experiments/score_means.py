@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from innerattn.experiments.run import FinishedRun, Scores
+from innerattn.experiments.run import FinishedRun, Scores, scores_in
 from innerattn.measures.summary import Summary
 from innerattn.stats import Estimate
 from innerattn.stats.seeds import seed_estimate
@@ -53,7 +53,7 @@ def seed_scores(summaries: Mapping[int, Summary | None]) -> SeedScores | None:
     found = [summary for summary in summaries.values() if summary is not None]
     if not found:
         return None
-    by_seed = {seed: _scores(one) if one else None for seed, one in summaries.items()}
+    by_seed = {seed: scores_in(one.to_json()) if one else None for seed, one in summaries.items()}
     means = _means([two for two in by_seed.values() if two is not None])
     return SeedScores(found[0].situation, by_seed, means)
 
@@ -63,21 +63,8 @@ def scores_over_runs(runs: Sequence[FinishedRun]) -> tuple[MeanScores, MeanScore
     return _means([run.scores() for run in runs])
 
 
-def _scores(summary: Summary) -> TwoLengths:
-    standard, long = (
-        Scores(
-            one.episode_steps,
-            one.rescues_per_episode.mean,
-            None if one.score is None else one.score.mean,
-        )
-        for one in (summary.standard, summary.long)
-    )
-    return standard, long
-
-
 def _means(runs: Sequence[TwoLengths]) -> tuple[MeanScores, MeanScores]:
-    standard, long = (_mean([two[length] for two in runs]) for length in (0, 1))
-    return standard, long
+    return _mean([standard for standard, _ in runs]), _mean([long for _, long in runs])
 
 
 def _mean(runs: Sequence[Scores]) -> MeanScores:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,7 +13,6 @@ from innerattn.config.files import write_whole
 from innerattn.experiments.run import FinishedRun, named_from
 from innerattn.experiments.smoke import smoke_note
 from innerattn.report.plots.drawing import write_figure
-from innerattn.report.smoke import mark_figure, noted_csv, noted_markdown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,32 +33,52 @@ def listed_runs(runs: Sequence[FinishedRun], out: Path) -> list[dict[str, Any]]:
     ]
 
 
+def left_out_list(left_out: Sequence[str]) -> list[str]:
+    """What a page says of what is missing, as paragraphs; none where nothing is."""
+    return ["**Left out of all results:**\n", *map("- {}".format, left_out), ""] if left_out else []
+
+
 class ReportFolder:
-    """Writes files into a folder, each whole or not at all."""
+    """Writes files into a folder, each whole or not at all.
+
+    Where runs are too short for any number to mean something, every file says so.
+    """
 
     def __init__(self, path: Path, budget: str) -> None:
         """Write into ``path``, which exists, what is made of runs of a built-in budget."""
         self.path = path
         self.budget = budget
+        self._note = smoke_note(budget)
 
     def json(self, name: str, document: Mapping[str, Any], *, note: bool = True) -> None:
         """Write a document of plain values; ``note``: it may have one more, of smoke runs."""
-        noted = {**({"note": smoke_note(self.budget)} if note else {}), **document}
+        noted = {**({"note": self._note} if note else {}), **document}
         write_whole(self.path / name, f"{json.dumps(noted, allow_nan=False)}\n".encode())
 
     def markdown(self, name: str, text: str, *, note: bool = True) -> None:
-        """Write a page, with a note of smoke runs unless it has one."""
-        noted = noted_markdown(text, self.budget) if note else text
-        write_whole(self.path / name, noted.encode())
+        """Write a page; a note of smoke runs stands at its top, unless it has one."""
+        if note and self._note:
+            text = f"> **{self._note[:1].upper()}{self._note[1:]}.**\n\n{text}"
+        write_whole(self.path / name, text.encode())
 
     def csv(self, name: str, text: str) -> None:
-        """Write a table of values."""
-        write_whole(self.path / name, noted_csv(text, self.budget).encode())
+        """Write a table of values; a note of smoke runs is a last column on every line."""
+        if self._note:
+            rows, noted = csv.reader(io.StringIO(text)), io.StringIO()
+            writer = csv.writer(noted, lineterminator="\n")
+            writer.writerows([*row, self._note if i else "note"] for i, row in enumerate(rows))
+            text = noted.getvalue()
+        write_whole(self.path / name, text.encode())
 
     def draw(self, name: str, figure: Figure | None) -> None:
-        """Write a figure as .pdf and .png, or remove that of other runs where there is none."""
-        if figure is not None:
-            mark_figure(figure, self.budget)
+        """Write a figure as .pdf and .png, or remove that of other runs where there is none.
+
+        What is made of smoke runs says so across the figure.
+        """
+        if figure is not None and self._note:
+            words = f"budget {self.budget}:\na smoke run,\nno result"
+            look: dict[str, Any] = {"ha": "center", "va": "center", "rotation": 30, "alpha": 0.2}
+            figure.text(0.5, 0.5, words, fontsize=28, zorder=10, **look)
         for suffix in (".pdf", ".png"):
             drawn = self.path / f"{name}{suffix}"
             if figure is None:

@@ -8,25 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from innerattn.experiments.plan import Case
 from innerattn.studies.shipped import shipped_table
 
 if TYPE_CHECKING:
-    from innerattn.experiments.processes import Job
     from innerattn.experiments.run import FinishedRun
 
 
-class WriteReport(Protocol):
-    """Writes a report, such as `innerattn.report.crossed.write.write_crossed`."""
-
-    def __call__(
-        self, runs: Sequence[FinishedRun], out: Path, budget: str, left_out: Sequence[str]
-    ) -> object:
-        """Write the files into ``out``; ``left_out`` is what the report says of missing runs."""
+WriteReport = Callable[["Sequence[FinishedRun]", Path, str, Sequence[str]], object]
+"""Writes a report of runs into a folder, of runs of a budget; the last is said of missing runs."""
 
 
 class Report(NamedTuple):
@@ -51,8 +45,7 @@ class Target:
         steps: whether it needs metrics and steps of runs.
         archived: whether archived runs do, which have neither; for "all" they do for the table.
         draws: whether its own report needs matplotlib.
-        jobs: what has to be done with finished runs before the report, and is not done yet, of the
-            planned cases, in the study's folder; None where there is never anything.
+        under_faults: whether finished runs have to meet faults before the report.
     """
 
     name: str
@@ -65,7 +58,7 @@ class Target:
     steps: bool = False
     archived: bool = True
     draws: bool = True
-    jobs: Callable[[Sequence[Case], Sequence[FinishedRun], Path], Sequence[Job]] | None = None
+    under_faults: bool = False
 
     @cached_property
     def table(self) -> dict[str, Any]:
@@ -121,40 +114,20 @@ def _paper(*parts: str) -> Callable[[], Report]:
     def load() -> Report:
         from innerattn.report.paper.write import FILES, REPORT, write_report
 
-        def write(
-            runs: Sequence[FinishedRun], out: Path, budget: str, left_out: Sequence[str]
-        ) -> None:
-            write_report(runs, out, budget, parts, left_out)
-
-        return Report((*REPORT, *(name for part in parts for name in FILES[part])), write)
+        files = (*REPORT, *(name for part in parts for name in FILES[part]))
+        return Report(files, partial(write_report, parts=parts))
 
     return load
 
 
-def _crossed() -> Report:
-    from innerattn.report.crossed.write import FILES, write_crossed
+def _own(module: str) -> Callable[[], Report]:
+    """The report of a module of `innerattn.report`, which has its files and writes it."""
 
-    return Report(FILES, write_crossed)
+    def load() -> Report:
+        found = import_module(f"innerattn.report.{module}")
+        return Report(found.FILES, found.write)
 
-
-def _swapped() -> Report:
-    from innerattn.report.crossed.swapped import FILES, write_swapped
-
-    return Report(FILES, write_swapped)
-
-
-def _robustness() -> Report:
-    from innerattn.report.robustness.write import FILES, write_robustness
-
-    return Report(FILES, write_robustness)
-
-
-def _robustness_jobs(
-    cases: Sequence[Case], runs: Sequence[FinishedRun], out: Path
-) -> Sequence[Job]:
-    from innerattn.experiments.robustness.measurement import missing_measurements
-
-    return missing_measurements(cases, runs, out)
+    return load
 
 
 TARGETS: dict[str, Target] = {
@@ -194,13 +167,13 @@ TARGETS: dict[str, Target] = {
         Target(
             name="crossed",
             shows="which settings make robots share their work evenly",
-            report=_crossed,
+            report=_own("crossed.write"),
             pool="crossed-",
         ),
         Target(
             name="swapped",
             shows="whether initial weights decide which robot does more",
-            report=_swapped,
+            report=_own("crossed.swapped"),
             few=("td-uniform",),
             pool="crossed-",
         ),
@@ -237,9 +210,9 @@ TARGETS: dict[str, Target] = {
         Target(
             name="robustness",
             shows="what faults cost a team, and where attention goes",
-            report=_robustness,
+            report=_own("robustness.page"),
             draws=False,
-            jobs=_robustness_jobs,
+            under_faults=True,
         ),
     )
 }

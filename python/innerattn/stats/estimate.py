@@ -62,8 +62,8 @@ class Estimate:
 def as_json(value: Any) -> Any:
     """A value as JSON has it.
 
-    Dataclasses become objects by field, estimates as `Estimate.to_json` writes them, arrays and
-    tuples lists.
+    Dataclasses become objects by field, estimates as `Estimate.to_json` writes them, tuples and
+    arrays lists; numbers of arrays that are not finite are null.
     """
     if isinstance(value, Estimate):
         return value.to_json()
@@ -73,4 +73,8 @@ def as_json(value: Any) -> Any:
         return {key: as_json(part) for key, part in value.items()}
     if isinstance(value, list | tuple):
         return [as_json(part) for part in value]
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+        nested = value.astype(object)
+        nested[~np.isfinite(value)] = None
+        return nested.tolist()
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

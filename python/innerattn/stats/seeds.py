@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,23 +32,18 @@ class SeedCurve:
     """A mean curve over runs and its band.
 
     Attributes:
-        kind: what low and high are, where all runs have a value.
+        band: what low and high are, where all runs have a value.
         mean: (...) float64 of the runs that have a value; NaN where none has.
         low: (...) float64 low end of the band; NaN where there is none.
         high: (...) float64 high end.
         runs: (...) int64 how many have a value.
     """
 
-    kind: BandKind
+    band: BandKind
     mean: Array
     low: Array
     high: Array
     runs: NDArray[np.int64]
-
-    def to_json(self) -> dict[str, Any]:
-        """As a JSON object; missing values are null."""
-        curves = {name: numbers(getattr(self, name)) for name in ("mean", "low", "high")}
-        return {"band": self.kind, **curves, "runs": self.runs.tolist()}
 
 
 def seed_estimate(values: Sequence[float | None]) -> Estimate | None:
@@ -84,10 +79,3 @@ def seed_curve(values: Array) -> SeedCurve:
     high = np.where(n > 2, mean + half, np.where(n == 2, most, np.nan))
     kinds: tuple[BandKind, ...] = ("none", "range", "student")
     return SeedCurve(kinds[min(len(values), 3) - 1], mean, low, high, n)
-
-
-def numbers(values: Array) -> Any:
-    """Nested lists of numbers for JSON, None for NaN."""
-    nested = values.astype(object)
-    nested[~np.isfinite(values)] = None
-    return nested.tolist()

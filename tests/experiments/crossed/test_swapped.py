@@ -13,7 +13,7 @@ from small_study import planned_of
 from innerattn.experiments.crossed import swapped
 from innerattn.experiments.crossed.swapped import read_swaps
 from innerattn.experiments.run import FinishedRun
-from innerattn.report.crossed.swapped import FILES, write_swapped
+from innerattn.report.crossed.swapped import FILES, write
 
 METHODS = ("td-uniform", "td-inner")
 
@@ -91,9 +91,9 @@ def test_the_page_has_every_pair(
 ) -> None:
     shares = {"team": [0.3, 0.6, 0.47, 0.7], "team-swapped": [0.71, 0.41, 0.52, 0.29]}
     runs = made(crossed_study[1][0], shares, tmp_path)
-    write_swapped(runs, tmp_path, "short", ["single td-uniform team seed 9: failed"])
+    write(runs, tmp_path, "short", ["single td-uniform team seed 9: failed"])
     before = {name: (tmp_path / name).read_bytes() for name in FILES}
-    write_swapped(runs, tmp_path, "short", ["single td-uniform team seed 9: failed"])
+    write(runs, tmp_path, "short", ["single td-uniform team seed 9: failed"])
     assert {name: (tmp_path / name).read_bytes() for name in FILES} == before
     text = before["swapped.md"].decode()
     assert "team seed 9: failed" in text

@@ -36,7 +36,7 @@ def made_row(method: str, task: str, shares: tuple[float, ...]) -> Row:
     together = evenness_of_runs(runs, 0) if len(runs) > 1 else None
     sharing = Sharing(1000, tuple(evenness(run) for run in runs), together)
     seeds = tuple(range(len(shares)))
-    return Row("mixed", method, task, ("food_0", "food_1"), seeds, sharing, sharing, None)
+    return Row("mixed", method, seeds, task, ("food_0", "food_1"), sharing, sharing, None)
 
 
 def made_competence(method: str, imbalance: list[float]) -> Competence:

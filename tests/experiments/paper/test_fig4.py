@@ -14,7 +14,7 @@ from innerattn.envs.colours import KIND_COLOURS
 from innerattn.errors import RunError
 from innerattn.experiments.paper.fig4 import PRINTED_NATS, EntropyCourse, fig4, fig4_json
 from innerattn.experiments.run import FinishedRun
-from innerattn.report.paper.fig4 import fig4_csv, fig4_lines
+from innerattn.report.paper.fig4 import fig4_csv
 from innerattn.report.plots.entropy import draw_entropy
 from innerattn.stats.student import student_interval
 
@@ -63,14 +63,12 @@ def test_only_attention_that_chooses_is_drawn(courses: list[EntropyCourse]) -> N
         ("td-uniform", (0, 1), False),
         ("ppo-inner", (0,), True),
     ]
-    lines = fig4_lines(courses)
-    assert [line.runs for line in lines] == ["3 runs, band: 95 %", "1 run"]
 
 
 def test_the_figure_has_a_panel_for_each_situation_and_method(
     courses: list[EntropyCourse],
 ) -> None:
-    lines = fig4_lines(courses)
+    lines = [course for course in courses if course.chooses]
     figure = draw_entropy(lines, PRINTED_NATS)
     drawn = [panel for panel in figure.axes if panel.axison]
     assert [panel.get_title() for panel in drawn] == [
@@ -84,15 +82,15 @@ def test_the_figure_has_a_panel_for_each_situation_and_method(
         for one in panel.lines:
             by_length.setdefault(len(one.get_xdata()), []).append(np.asarray(one.get_ydata()))
         courses_drawn = by_length[len(line.env_steps)]
-        assert np.array_equal(courses_drawn[-1], line.mean[0])
-        assert np.array_equal(courses_drawn[:-1], line.by_robot.T)
+        assert np.array_equal(courses_drawn[-1], line.mean().mean)
+        assert np.array_equal(courses_drawn[:-1], line.by_robot().mean.T)
         robots_drawn = [one for one in panel.lines if one.get_marker() == "None"][:4]
         looks = [(one.get_color(), one.get_linestyle()) for one in robots_drawn]
         assert looks == TEAM_LOOKS
         assert [one.get_color() for one in panel.lines if one.get_marker() == "o"] == [
             colour for colour, _ in TEAM_LOOKS
         ]
-        runs, robots, heads = line.heads.shape
+        runs, robots, heads = line.end_by_head().shape
         strips = [one for one in panel.lines if one.get_marker() == "o"]
         assert [len(one.get_ydata()) for one in strips] == [runs * heads] * robots
         last = line.env_steps[-1] / 1000.0
@@ -101,7 +99,7 @@ def test_the_figure_has_a_panel_for_each_situation_and_method(
         assert levels[-2:] == pytest.approx([math.log(3), PRINTED_NATS])
         assert max(panel.get_xticks()) <= 1.001 * last
         low, high = panel.get_ylim()
-        assert low < min(line.heads.min(), line.by_robot.min())
+        assert low < min(line.end_by_head().min(), line.by_robot().mean.min())
         assert high > math.log(3)
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.texts] == [

@@ -19,7 +19,7 @@ from innerattn.experiments.paper.scene import choose_scene, scene_json
 from innerattn.experiments.run import FinishedRun
 from innerattn.measures.sharing.handoff import HANDOFF, handoffs, need_following_attention
 from innerattn.measures.sharing.handoff_attention import handoff_attention
-from innerattn.report.paper.fig5 import evidence_lines, shift_sentence
+from innerattn.report.paper.fig5 import shift_sentence
 from innerattn.report.plots.aligned import draw_aligned
 from innerattn.report.plots.handoff import draw_handoff
 from innerattn.stats import Estimate
@@ -127,10 +127,11 @@ def test_a_run_without_handoffs_does_not_count(inner: list[FinishedRun]) -> None
     assert found.p_by_run[2] is found.control_p_by_run[2] is None
     assert found.ceiling == of_two.ceiling
     assert found.own_part == of_two.own_part
-    (line,), (expected,) = evidence_lines([found]), evidence_lines([of_two])
-    assert line.runs == expected.runs
-    assert line.runs.startswith("2 runs, band: least to largest")
-    assert (line.robot == expected.robot).all()
+    ((panel,), (expected,)) = (draw_aligned([one]).axes for one in (found, of_two))
+    assert panel.get_title() == expected.get_title()
+    assert panel.get_title().startswith("mixed, td-inner\n2 runs, band: least to largest, ")
+    for one, other in zip(panel.lines, expected.lines, strict=True):
+        assert np.array_equal(one.get_ydata(), other.get_ydata())
     assert {claim.runs for claim in handoff_claims([found])} == {2}
 
 
@@ -185,10 +186,9 @@ def test_the_scene_is_drawn_as_panels_a_b_and_c(inner: list[FinishedRun]) -> Non
 
 
 def test_all_handoffs_are_drawn_with_their_control(found: Evidence) -> None:
-    (line,) = lines = evidence_lines([found])
-    assert line.runs == f"3 runs, band: 95 %, {sum(found.handoffs)} handoffs"
-    figure = draw_aligned(lines)
-    (panel,) = figure.axes
+    (panel,) = draw_aligned([found]).axes
+    runs = f"3 runs, band: 95 %, {sum(found.handoffs)} handoffs"
+    assert panel.get_title() == f"mixed, td-inner\n{runs}"
     assert panel.get_xlabel() == "steps since the first rescue [0.1 s]"
     assert panel.get_ylabel() == "weight, mean over heads"
     drawn = [line.get_ydata() for line in panel.lines[:4]]

@@ -18,8 +18,8 @@ from innerattn.experiments.run import FinishedRun, by_method, read_run, refuse_u
 from innerattn.measures.dispatch_quality import dispatch_quality
 from innerattn.measures.waiting import waiting
 from innerattn.records.parquet import read_records
-from innerattn.report.paper.table2 import table2_markdown
-from innerattn.report.paper.table2_csv import table2_csv
+from innerattn.report.paper.table2 import table2_csv, table2_markdown
+from innerattn.stats.estimate import as_json
 from innerattn.stats.student import student_interval
 from innerattn.stats.text import format_number
 
@@ -132,7 +132,7 @@ def test_archived_runs_are_enough_for_sharing_and_scores(
     write_archive(runs[:3], tmp_path / "archive.parquet")
     archived = read_archive(tmp_path / "archive.parquet")
     of_copies = table2(list(by_method(archived).values()))
-    assert [row.to_json() for row in of_copies.rows] == [row.to_json() for row in table.rows[:2]]
+    assert as_json(of_copies.rows) == as_json(table.rows[:2])
     for whole, copy in zip(table.competence[0].each, of_copies.competence[0].each, strict=True):
         assert copy == whole
     assert of_copies.competence[1:] == table.competence[3:6]  # scripted policies

@@ -17,6 +17,7 @@ from innerattn.measures.sharing.evenness import (
     evenness_of_runs,
 )
 from innerattn.policies import scripted_policy
+from innerattn.stats.estimate import as_json
 
 
 def counts(
@@ -118,14 +119,14 @@ def test_no_rescues() -> None:
     found = evenness([[0, 0], [0, 0]])
     assert (found.rescues, found.episodes, found.verdict) == ((0, 0), 2, "undecided")
     assert found.share is found.chi_squared is found.interval_90 is found.equivalence_p is None
-    assert json.loads(json.dumps(found.to_json(), allow_nan=False))["share"] is None
+    assert json.loads(json.dumps(as_json(found), allow_nan=False))["share"] is None
 
 
 def test_episodes_without_rescues_change_nothing_else() -> None:
     table = counts(np.random.default_rng(1), 0.5)
     more = evenness(np.concatenate([table, np.zeros((40, 2), int)]))
     assert more.episodes == 120
-    one, other = more.to_json() | {"episodes": 80}, evenness(table).to_json()
+    one, other = as_json(more) | {"episodes": 80}, as_json(evenness(table))
     assert one == other
 
 
@@ -189,7 +190,7 @@ def test_runs_by_hand() -> None:
     assert found.pooled_share.mean == pytest.approx(5 / 8)
     assert found.chi_squared is not None
     assert found.chi_squared.statistic == pytest.approx(0.5)
-    assert json.loads(json.dumps(found.to_json(), allow_nan=False))["rescues"] == [5, 3]
+    assert json.loads(json.dumps(as_json(found), allow_nan=False))["rescues"] == [5, 3]
 
 
 def test_equivalence_over_runs_is_two_t_tests() -> None:

@@ -14,7 +14,7 @@ from innerattn.experiments.crossed.outcome import outcome_of
 from innerattn.experiments.crossed.study import Situation
 from innerattn.experiments.run import FinishedRun
 from innerattn.report.crossed.tables import claims_table
-from innerattn.report.crossed.write import FILES, write_crossed
+from innerattn.report.crossed.write import FILES, write
 from innerattn.report.table import markdown
 from innerattn.stats.text import format_estimate
 from innerattn.train.weights import digest_of
@@ -27,7 +27,7 @@ Short = tuple[Path, Situation]
 def short(crossed: Crossed, tmp_path_factory: pytest.TempPathFactory) -> Short:
     """The files of budget short, and what they say; not to be changed."""
     out, runs = crossed
-    (situation,) = write_crossed(runs, out, "short")
+    (situation,) = write(runs, out, "short")
     kept = tmp_path_factory.mktemp("short")
     for name in FILES:
         shutil.copy(out / name, kept)
@@ -37,14 +37,14 @@ def short(crossed: Crossed, tmp_path_factory: pytest.TempPathFactory) -> Short:
 @pytest.mark.long
 def test_files_are_the_same_twice_and_say_what_they_are_of(crossed: Crossed) -> None:
     out, runs = crossed
-    write_crossed(runs, out, "quick", ["mixed td-inner seed 9: failed"])
+    write(runs, out, "quick", ["mixed td-inner seed 9: failed"])
     before = {name: (out / name).read_bytes() for name in FILES}
-    write_crossed(runs[::-1], out, "quick", ["mixed td-inner seed 9: failed"])
+    write(runs[::-1], out, "quick", ["mixed td-inner seed 9: failed"])
     assert {name: (out / name).read_bytes() for name in FILES} == before
     text = before["crossed.md"].decode()
     assert text.index("smoke run") < text.index("mixed td-inner seed 9: failed")
     assert "smoke run" in json.loads(before["crossed.json"])["note"]
-    write_crossed(runs, out, "short")
+    write(runs, out, "short")
     for name in FILES:
         assert (out / name).read_bytes() != before[name], name
     text = (out / "crossed.md").read_text()
@@ -55,7 +55,7 @@ def test_files_are_the_same_twice_and_say_what_they_are_of(crossed: Crossed) -> 
 @pytest.mark.long
 def test_every_run_has_a_line(crossed: Crossed) -> None:
     out, runs = crossed
-    write_crossed(runs, out, "quick")
+    write(runs, out, "quick")
     document = json.loads((out / "crossed.json").read_text())
     (situation,) = document["situations"]
     assert len(situation["runs"]) == len(runs) == 18

@@ -169,27 +169,27 @@ def test_runs_within_the_study_are_named_from_there(
     run = runs[0]
     inside = tmp_path / "runs" / "one"
     shutil.copytree(run.folder, inside)
-    write_report([replace(run, folder=inside)], tmp_path, "short", ("table2",))
+    write_report([replace(run, folder=inside)], tmp_path, "short", parts=("table2",))
     assert [row["folder"] for row in _table(tmp_path / "runs.csv")] == ["runs/one"]
     assert str(tmp_path) not in (tmp_path / "runs.csv").read_text()
 
 
 def test_parts_can_be_asked_for_alone(runs: list[FinishedRun], tmp_path: Path) -> None:
-    findings = write_report(runs[3:5], tmp_path, "short", ("table2", "fig4"))
+    findings = write_report(runs[3:5], tmp_path, "short", parts=("table2", "fig4"))
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {*REPORT, *FILES["table2"], "fig4.json", "fig4.csv"}
     text = (tmp_path / "report.md").read_text()
     assert "smoke run" not in text
     assert "Fig. 5:" not in text
-    write_report(runs[3:5], tmp_path, "short", ("fig4",))  # attention that is even
+    write_report(runs[3:5], tmp_path, "short", parts=("fig4",))  # attention that is even
     nothing = "What was asked for decides no claim."
     assert all(nothing in (tmp_path / name).read_text() for name in ("report.md", "claims.md"))
     assert "No run has attention that chooses." in (tmp_path / "report.md").read_text()
-    write_report(runs[5:], tmp_path, "short", ("fig4",))
+    write_report(runs[5:], tmp_path, "short", parts=("fig4",))
     assert "| claim | paper | measured, single |" in (tmp_path / "report.md").read_text()
     assert findings.evidence is None
     with pytest.raises(ValueError, match=r"parts = \['fig6'\]: known are table2, fig4, fig5"):
-        write_report(runs, tmp_path, "short", ("fig6",))
+        write_report(runs, tmp_path, "short", parts=("fig6",))
 
 
 def test_a_figure_that_is_not_drawn_leaves_none_of_other_runs(
@@ -212,7 +212,7 @@ def test_it_is_said_where_all_seeds_were_measured_in_the_same_worlds(
         replace(run, config=run.config.model_copy(update={"evaluate": evaluate}))
         for run in runs[:2]  # of different seeds
     ]
-    write_report(moved, tmp_path / "report", "short", ("table2",))
+    write_report(moved, tmp_path / "report", "short", parts=("table2",))
     assert said in (tmp_path / "report" / "report.md").read_text()
     (other,) = [run for run in runs if (run.method, run.seed) == ("td-uniform", moved[1].seed)]
     with pytest.raises(RunError, match=r"of one seed, and evaluate\.seed is .*: must be the same"):

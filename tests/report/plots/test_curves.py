@@ -3,15 +3,18 @@
 import numpy as np
 import pytest
 
-from innerattn.report.plots.curves import CurveLine, draw_curves
+from innerattn.report.plots.curves import draw_curves
+from innerattn.stats.seeds import SeedCurve
+from innerattn.studies.curves import LearningCurve
 
 
-def line(situation: str, method: str, *, band: bool = True) -> CurveLine:
+def line(situation: str, method: str, *, band: bool = True) -> LearningCurve:
     steps = np.linspace(1_000, 4_000, 4)
     mean = np.arange(4.0)
     half = np.ones(4) if band else np.full(4, np.nan)
-    rescues = np.stack([mean, mean - half, mean + half])
-    return CurveLine(situation, method, steps, steps / 10.0, rescues, {"greedy": 2.5})
+    rescues = SeedCurve("student", mean, mean - half, mean + half, np.full(4, 3))
+    scripts = {"greedy": 2.5}
+    return LearningCurve(situation, method, steps, steps / 10.0, rescues, "episode", scripts)
 
 
 @pytest.mark.parametrize("band", [True, False])
@@ -20,10 +23,10 @@ def test_lines_bands_and_scripts(band: bool) -> None:
         line(situation, method, band=band)
         for situation, method in (("mixed", "a"), ("single", "a"), ("mixed", "b"))
     ]
-    figure = draw_curves(lines, "rescues")
+    figure = draw_curves(lines)
     mixed, single, mixed_by_time, _ = figure.axes
     assert [panel.get_title() for panel in figure.axes] == ["mixed", "single", "", ""]
-    assert mixed.get_ylabel() == "rescues"
+    assert mixed.get_ylabel() == "rescues per episode of training"
     drawn = {one.get_label(): one for one in mixed.get_lines() if one.get_label() in "ab"}
     assert sorted(drawn) == ["a", "b"]
     assert drawn["a"].get_xdata().tolist() == [1.0, 2.0, 3.0, 4.0]

@@ -2,15 +2,12 @@
 
 import numpy as np
 
-from innerattn.report.plots.seeds import SeedDots, SeedPanel, draw_seeds
+from innerattn.report.plots.seeds import SeedPanel, draw_seeds
 
 
 def test_every_run_is_a_dot_within_the_bar_of_its_seed() -> None:
-    arms = (
-        SeedDots("uniform", {0: 0.5, 3: 0.7}),
-        SeedDots("inner", {3: 0.4, 0: 0.6, 7: 0.55}),
-    )
-    others = tuple(SeedDots(arm.name, {1: 0.5}) for arm in arms)
+    arms = {"uniform": {0: 0.5, 3: 0.7}, "inner": {3: 0.4, 0: 0.6, 7: 0.55}}
+    others = {name: {1: 0.5} for name in arms}
     figure = draw_seeds([[SeedPanel("a", arms), SeedPanel("b", others)]], "share", 0.5)
     panel, other = figure.axes
     assert (panel.get_title(), other.get_title()) == ("a", "b")
@@ -23,7 +20,7 @@ def test_every_run_is_a_dot_within_the_bar_of_its_seed() -> None:
     }
     places = {0: 0, 3: 1, 7: 2}
     assert {(place, value) for _, place, value in drawn} == {
-        (places[seed], value) for arm in arms for seed, value in arm.by_seed.items()
+        (places[seed], value) for arm in arms.values() for seed, value in arm.items()
     }
     bars = {(bar.get_y(), bar.get_y() + bar.get_height()) for bar in panel.patches}
     assert np.allclose(sorted(bars), [(0.4, 0.7), (0.5, 0.6), (0.55, 0.55)])
@@ -35,6 +32,6 @@ def test_every_run_is_a_dot_within_the_bar_of_its_seed() -> None:
 
 
 def test_a_panel_without_runs_is_empty() -> None:
-    figure = draw_seeds([[SeedPanel("none", (SeedDots("uniform", {}),))]], "share", 0.5)
+    figure = draw_seeds([[SeedPanel("none", {"uniform": {}})]], "share", 0.5)
     (panel,) = figure.axes
     assert not panel.patches

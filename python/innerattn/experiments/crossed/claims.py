@@ -15,11 +15,13 @@ from innerattn.experiments.crossed.effects import (
     LEAST_SEEDS,
     MARGINS,
     Effect,
+    compared_arms,
+    weights,
 )
 from innerattn.experiments.crossed.outcome import IDLE, Outcomes, by_seed
 from innerattn.experiments.paper.claims import EVEN_ENTROPY, Holds
 from innerattn.stats import Estimate
-from innerattn.stats.comparison import Contrast, contrast
+from innerattn.stats.comparison import Contrast
 from innerattn.stats.seeds import seed_estimate
 from innerattn.stats.text import NONE, format_estimate
 
@@ -88,6 +90,8 @@ class Answer:
 
 def answers(situation: str, outcomes: Outcomes, effects: Sequence[Effect]) -> list[Answer]:
     """All expectations in one situation, from its runs and their `effects`."""
+    halves = weights(dict.fromkeys(CREDITS, 0.5), {_FREE: 1.0, None: -1.0})
+    _, free = compared_arms(outcomes, halves, "score")
     found = [
         (
             f"attention (λ = {_FREE:g}) makes sharing even under team credit",
@@ -97,7 +101,7 @@ def answers(situation: str, outcomes: Outcomes, effects: Sequence[Effect]) -> li
             "attention (mean over λ) makes sharing even under team credit",
             _makes_even(outcomes, PENALTIES),
         ),
-        (f"attention (λ = {_FREE:g}) rescues more", _above_0(_free_attention(outcomes, "score"))),
+        (f"attention (λ = {_FREE:g}) rescues more", _above_0(free)),
         ("attention (mean over λ) rescues more", _above_0(_effect(effects, ATTENTION, "score"))),
         ("team credit makes sharing uneven", _above_0(_effect(effects, CREDIT, "imbalance"))),
         ("team credit leaves a food robot idle with either attention", _idle_with_team(outcomes)),
@@ -144,14 +148,6 @@ def _ends(mean: Estimate | None) -> tuple[float, float]:
 def _effect(effects: Sequence[Effect], name: str, figure: str) -> Contrast | None:
     (found,) = [one.contrast for one in effects if (one.name, one.outcome) == (name, figure)]
     return found
-
-
-def _free_attention(outcomes: Outcomes, figure: str) -> Contrast | None:
-    """Inner without regularisation minus uniform, a mean over credits."""
-    arms = [Arm(credit, penalty) for credit in CREDITS for penalty in (_FREE, None)]
-    rows = by_seed(outcomes, arms, figure)
-    weights = [0.5, -0.5] * len(CREDITS)
-    return contrast(rows, weights, MARGINS[figure]) if len(rows) >= LEAST_SEEDS else None
 
 
 def _above_0(found: Contrast | None) -> tuple[str, Holds]:

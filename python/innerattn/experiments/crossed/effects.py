@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from innerattn.experiments.crossed.arms import CREDITS, CROSSED, PENALTIES, SHARED, Arm, Credit
+from innerattn.experiments.crossed.arms import CREDITS, PENALTIES, SHARED, Arm, Credit
 from innerattn.experiments.crossed.outcome import Outcomes, by_seed
 from innerattn.experiments.paper import pairs
 from innerattn.experiments.paper.claims import ENTROPY_MARGIN
@@ -30,6 +30,9 @@ CREDIT = "team − helpers credit, mean over attentions and λ"
 """Names of the two effects that claims are about; λ is the weight of the regularisation."""
 
 Weights = Mapping[Arm, float]
+
+_EITHER: dict[Credit, float] = {"helpers": 0.5, "team": 0.5}
+_TEAM_OR_HELPERS: dict[Credit, float] = {"helpers": -1.0, "team": 1.0}
 
 
 @dataclass(frozen=True)
@@ -60,36 +63,38 @@ class Effect:
 def contrasts() -> list[tuple[str, bool, Weights]]:
     """All effects: name, whether it is a main effect, weights of arms."""
     least, most = PENALTIES[0], PENALTIES[-1]
-    attention = {credit: _attention(credit) for credit in CREDITS}
-    helpers, team = (attention[credit] for credit in ("helpers", "team"))
+    attention: dict[float | None, float] = {one: 1.0 / len(PENALTIES) for one in PENALTIES}
+    attention[None] = -1.0
+    both: dict[float | None, float] = {None: 0.5}
+    both |= {one: 0.5 / len(PENALTIES) for one in PENALTIES}
     named: list[tuple[str, bool, Weights]] = [
-        (ATTENTION, True, _mean([helpers, team])),
-        ("inner − uniform under team credit, mean over λ", True, team),
-        (CREDIT, True, _credit(CROSSED)),
+        (ATTENTION, True, weights(_EITHER, attention)),
+        ("inner − uniform under team credit, mean over λ", True, weights({"team": 1.0}, attention)),
+        (CREDIT, True, weights(_TEAM_OR_HELPERS, both)),
         (
             f"λ = {most:g} − λ = {least:g}, mean over credits",
             True,
-            _mean([_penalty(credit, most) for credit in CREDITS]),
+            weights(_EITHER, {most: 1.0, least: -1.0}),
         ),
-        ("(inner − uniform) under team − under helpers credit", True, _minus(team, helpers)),
+        (
+            "(inner − uniform) under team − under helpers credit",
+            True,
+            weights(dict(reversed(_TEAM_OR_HELPERS.items())), attention),
+        ),
     ]
-    for credit in CREDITS:
-        named += [
-            (
-                f"inner λ = {penalty:g} − uniform, {credit}",
-                False,
-                {Arm(credit, penalty): 1.0, Arm(credit, None): -1.0},
-            )
-            for penalty in PENALTIES
-        ]
-        named += [
-            (f"λ = {penalty:g} − λ = {least:g}, {credit}", False, _penalty(credit, penalty))
-            for penalty in PENALTIES[1:]
-        ]
+    pairs: list[tuple[str, float, float | None]] = [
+        *((f"inner λ = {penalty:g} − uniform", penalty, None) for penalty in PENALTIES),
+        *((f"λ = {penalty:g} − λ = {least:g}", penalty, least) for penalty in PENALTIES[1:]),
+    ]
+    named += [
+        (f"{name}, {credit}", False, weights({credit: 1.0}, {one: 1.0, other: -1.0}))
+        for credit in CREDITS
+        for name, one, other in pairs
+    ]
     for penalty in (None, *PENALTIES):
-        arms = [Arm(credit, penalty) for credit in CREDITS]
         words = "uniform" if penalty is None else f"inner λ = {penalty:g}"
-        named.append((f"team − helpers credit, {words}", False, _credit(arms)))
+        name = f"team − helpers credit, {words}"
+        named.append((name, False, weights(_TEAM_OR_HELPERS, {penalty: 1.0})))
     own = Arm(SHARED.credit, SHARED.penalty)
     name = f"shared parameters − own parameters, {own.credit}, inner λ = {least:g}"
     return [*named, (name, False, {SHARED: 1.0, own: -1.0})]
@@ -103,13 +108,30 @@ def effects(situation: str, outcomes: Outcomes) -> list[Effect]:
         outcomes: of the runs of each arm; arms without runs may be missing.
     """
     every = []
-    for outcome, margin in MARGINS.items():
-        for name, main, weights in contrasts():
-            rows = by_seed(outcomes, list(weights), outcome)
-            enough = len(rows) >= LEAST_SEEDS
-            compared = contrast(rows, list(weights.values()), margin) if enough else None
-            every.append(Effect(situation, outcome, name, main, len(rows), compared))
+    for outcome in MARGINS:
+        for name, main, of_arms in contrasts():
+            seeds, compared = compared_arms(outcomes, of_arms, outcome)
+            every.append(Effect(situation, outcome, name, main, seeds, compared))
     return _adjusted(every, main=True) + _adjusted(every, main=False)
+
+
+def weights(credits: Mapping[Credit, float], attentions: Mapping[float | None, float]) -> Weights:
+    """Weights of crossed arms: the products of those of credits and of λ; None is uniform."""
+    return {
+        Arm(credit, penalty): of_credit * of_attention
+        for credit, of_credit in credits.items()
+        for penalty, of_attention in attentions.items()
+    }
+
+
+def compared_arms(
+    outcomes: Outcomes, of_arms: Weights, outcome: str
+) -> tuple[int, Contrast | None]:
+    """How many seeds have an outcome in all arms, and the contrast of the arms over these."""
+    rows = by_seed(outcomes, list(of_arms), outcome)
+    enough = len(rows) >= LEAST_SEEDS
+    found = contrast(rows, list(of_arms.values()), MARGINS[outcome]) if enough else None
+    return len(rows), found
 
 
 def _adjusted(every: Sequence[Effect], main: bool) -> list[Effect]:
@@ -117,35 +139,3 @@ def _adjusted(every: Sequence[Effect], main: bool) -> list[Effect]:
     family = [one for one in every if one.main == main]
     adjusted = iter(holm([one.contrast.p for one in family if one.contrast is not None]))
     return [replace(one, holm_p=next(adjusted)) if one.contrast else one for one in family]
-
-
-def _attention(credit: Credit) -> Weights:
-    """Learnt attention, averaged over weights of the regularisation, minus uniform attention."""
-    inner = {Arm(credit, penalty): 1.0 / len(PENALTIES) for penalty in PENALTIES}
-    return {**inner, Arm(credit, None): -1.0}
-
-
-def _penalty(credit: Credit, penalty: float) -> Weights:
-    """A weight of the regularisation minus the least one."""
-    return {Arm(credit, penalty): 1.0, Arm(credit, PENALTIES[0]): -1.0}
-
-
-def _credit(arms: Sequence[Arm]) -> Weights:
-    """Team minus helpers credit, averaged over attentions, then over weights."""
-    weights = {}
-    attentions = {arm.method for arm in arms}
-    for arm in arms:
-        alike = sum(a.method == arm.method and a.credit == arm.credit for a in arms)
-        sign = 1.0 if arm.credit == "team" else -1.0
-        weights[arm] = sign / (alike * len(attentions))
-    return weights
-
-
-def _mean(parts: Sequence[Weights]) -> Weights:
-    """The average of contrasts of different arms."""
-    return {arm: weight / len(parts) for part in parts for arm, weight in part.items()}
-
-
-def _minus(one: Weights, other: Weights) -> Weights:
-    """The difference of contrasts of different arms."""
-    return {**one, **{arm: -weight for arm, weight in other.items()}}

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.experiments.crossed.arms import Arm
-from innerattn.experiments.paper.workload import rescues_by_task, workload_imbalance
+from innerattn.experiments.paper.workload import rescues_by_task
 from innerattn.experiments.run import FinishedRun
+from innerattn.measures.registry import measure_of
 
 IDLE = 0.2
 """A food robot with a smaller share of the rescues than this counts as idle."""
@@ -49,9 +50,9 @@ def outcome_of(run: FinishedRun) -> Outcome:
         RunError: a task is not one that two robots share.
     """
     total = np.sum(list(rescues_by_task(run).values()), axis=0)
-    summary = run.summary
+    summary, imbalance = run.summary, measure_of("imbalance", *run.scored)
     return Outcome(
-        imbalance=workload_imbalance(run),
+        imbalance=imbalance if isinstance(imbalance, float) else None,
         least_share=float(total.min() / total.sum()) if total.sum() else None,
         rescues_per_episode=float(summary["rescues_per_episode"]["mean"]),
         score=None if summary["score"] is None else float(summary["score"]["mean"]),

@@ -16,26 +16,13 @@ from innerattn.stats.seeds import seed_estimate
 
 
 @dataclass(frozen=True)
-class CrossedRun:
-    """A run of the design: how it was trained, and what it shows."""
-
-    arm: Arm
-    run: FinishedRun
-    outcome: Outcome
-
-    @property
-    def seed(self) -> int:
-        """The seed of its training."""
-        return self.run.seed
-
-
-@dataclass(frozen=True)
 class Situation:
     """What the runs of one situation show.
 
     Attributes:
         name: of the situation.
         runs: by arm, then seed.
+        outcomes: of the runs by arm and seed; arms without runs are there, empty.
         means: over the runs of each arm, by the names of `OUTCOMES`; None where no run has one.
         effects: differences between arms.
         answers: what was expected, and whether it holds.
@@ -43,15 +30,12 @@ class Situation:
     """
 
     name: str
-    runs: tuple[CrossedRun, ...]
+    runs: tuple[FinishedRun, ...]
+    outcomes: dict[Arm, dict[int, Outcome]]
     means: dict[Arm, dict[str, Estimate | None]]
     effects: tuple[Effect, ...]
     answers: tuple[Answer, ...]
     seeds: tuple[SeedEffect, ...]
-
-    def outcomes(self) -> dict[Arm, dict[int, Outcome]]:
-        """What the runs show by arm and seed; arms without runs are there, empty."""
-        return _by_arm(self.runs)
 
 
 def read_situations(runs: Sequence[FinishedRun]) -> list[Situation]:
@@ -63,15 +47,15 @@ def read_situations(runs: Sequence[FinishedRun]) -> list[Situation]:
     Raises:
         RunError: records cannot be read, or a run's team has not two food robots.
     """
-    names = list(dict.fromkeys(run.case.worlds for run in runs))
+    names = dict.fromkeys(run.case.worlds for run in runs)
     return [_situation(name, [run for run in runs if run.case.worlds == name]) for name in names]
 
 
 def _situation(name: str, own: Sequence[FinishedRun]) -> Situation:
-    order = {arm: index for index, arm in enumerate(ARMS)}
-    found = [CrossedRun(arm_of(run.case), run, outcome_of(run)) for run in own]
-    found.sort(key=lambda one: (order[one.arm], one.seed))
-    outcomes = _by_arm(found)
+    ordered = sorted(own, key=lambda run: (ARMS.index(arm_of(run.case)), run.seed))
+    outcomes: dict[Arm, dict[int, Outcome]] = {arm: {} for arm in ARMS}
+    for run in ordered:
+        outcomes[arm_of(run.case)][run.seed] = outcome_of(run)
     means = {
         arm: {
             figure: seed_estimate([getattr(outcome, figure) for outcome in by_seed.values()])
@@ -81,8 +65,5 @@ def _situation(name: str, own: Sequence[FinishedRun]) -> Situation:
     }
     compared = tuple(effects(name, outcomes))
     said = tuple(answers(name, outcomes, compared))
-    return Situation(name, tuple(found), means, compared, said, tuple(seed_effects(outcomes)))
-
-
-def _by_arm(runs: Sequence[CrossedRun]) -> dict[Arm, dict[int, Outcome]]:
-    return {arm: {run.seed: run.outcome for run in runs if run.arm == arm} for arm in ARMS}
+    seeds = tuple(seed_effects(outcomes))
+    return Situation(name, tuple(ordered), outcomes, means, compared, said, seeds)

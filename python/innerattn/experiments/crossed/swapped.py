@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from innerattn.experiments.crossed.arms import SWAPPED
 from innerattn.experiments.crossed.outcome import outcome_of
 from innerattn.experiments.crossed.seed_effect import LEAST_SEEDS, intraclass_correlation
@@ -75,13 +73,11 @@ def read_swaps(runs: Sequence[FinishedRun]) -> list[Swap]:
 
 
 def _swap(situation: str, method: str, pairs: Sequence[Pair]) -> Swap:
-    correlation = None
+    correlation, answer = None, "undecided"
     if len(pairs) >= LEAST_SEEDS:
-        correlation = intraclass_correlation(np.array([(one.drawn, one.swapped) for one in pairs]))
-    answer = "undecided"
-    if correlation is not None and correlation.low is not None and correlation.high is not None:
-        if correlation.high < 0.0:
-            answer = "the weights"
-        elif correlation.low > 0.0:
-            answer = "something else"
+        correlation = intraclass_correlation([(one.drawn, one.swapped) for one in pairs])
+    if correlation is not None and correlation.high < 0.0:
+        answer = "the weights"
+    elif correlation is not None and correlation.low > 0.0:
+        answer = "something else"
     return Swap(situation, method, tuple(pairs), correlation, answer)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from innerattn.config import Scenario
 from innerattn.experiments.paper.workload import rescues_by_task
-from innerattn.experiments.run import FinishedRun
+from innerattn.experiments.run import FinishedRun, OfMethod
 from innerattn.measures.registry import MEASURES, measure_of
 from innerattn.policies import SCRIPTED
 from innerattn.stats import Estimate
@@ -35,22 +35,16 @@ def competence_units() -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class Competence:
+class Competence(OfMethod):
     """How well one method does in one situation.
 
     Attributes:
-        situation: of the worlds.
-        method: of training, or a scripted policy.
-        seeds: of the runs; a scripted policy has those of the runs in whose worlds it was played.
         counts: by run, what the values are over: score_episodes, episodes, and where these were
             recorded step by step choices, rescued, left.
         each: by run, the values that `competence_units` names; None where a run has none.
         mean: of each value over runs.
     """
 
-    situation: str
-    method: str
-    seeds: tuple[int, ...]
     counts: tuple[dict[str, int], ...]
     each: tuple[dict[str, float | None], ...]
     mean: dict[str, Estimate | None]

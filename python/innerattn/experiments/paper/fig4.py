@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.errors import RunError
-from innerattn.experiments.run import FinishedRun, by_method, read_metrics
+from innerattn.experiments.run import FinishedRun, OfMethod, by_method, read_metrics
 from innerattn.stats import Estimate
+from innerattn.stats.estimate import as_json
 from innerattn.stats.seeds import Array, SeedCurve, seed_curve, seed_estimate
 
 SCHEMA_VERSION = 1
@@ -29,13 +30,10 @@ _PART = 10  # begin and end are the first and the last tenth of the lines of met
 
 
 @dataclass(frozen=True)
-class EntropyCourse:
-    """The entropy of attention in runs of one situation and method.
+class EntropyCourse(OfMethod):
+    """The entropy of attention in runs of one situation and method, with N seeds.
 
     Attributes:
-        situation: of the worlds.
-        method: of training.
-        seeds: N of them.
         robots: R names.
         kinds: of the R robots.
         env_steps: (T,) int64 at which all runs were logged [env-steps].
@@ -45,9 +43,6 @@ class EntropyCourse:
         change: end minus begin.
     """
 
-    situation: str
-    method: str
-    seeds: tuple[int, ...]
     robots: tuple[str, ...]
     kinds: tuple[str, ...]
     env_steps: NDArray[np.int64]
@@ -81,18 +76,6 @@ class EntropyCourse:
         """
         return np.asarray(self.nats[:, -_part(len(self.env_steps)) :].mean(1))
 
-    def to_json(self) -> dict[str, Any]:
-        """As a JSON object."""
-        return {
-            **{name: getattr(self, name) for name in ("situation", "method", "seeds", "robots")},
-            "even_nats": self.even_nats,
-            "env_steps": self.env_steps.tolist(),
-            "nats_by_seed_time_robot_head": self.nats.tolist(),
-            "mean": self.mean().to_json(),
-            "by_robot": self.by_robot().to_json(),
-            **{name: getattr(self, name).to_json() for name in ("begin", "end", "change")},
-        }
-
 
 def fig4(runs: Sequence[FinishedRun]) -> list[EntropyCourse]:
     """Entropy courses of all methods with attention.
@@ -110,11 +93,18 @@ def fig4(runs: Sequence[FinishedRun]) -> list[EntropyCourse]:
 
 def fig4_json(courses: Sequence[EntropyCourse]) -> dict[str, Any]:
     """The document of ``fig4.json``."""
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "printed_nats": PRINTED_NATS,
-        "courses": [course.to_json() for course in courses],
-    }
+    names = ("situation", "method", "seeds", "robots", "even_nats", "env_steps")
+    told = [
+        {
+            **{name: getattr(course, name) for name in (*names, "begin", "end", "change")},
+            "nats_by_seed_time_robot_head": course.nats,
+            "mean": course.mean(),
+            "by_robot": course.by_robot(),
+        }
+        for course in courses
+    ]
+    document: dict[str, Any] = as_json({"printed_nats": PRINTED_NATS, "courses": told})
+    return {"schema_version": SCHEMA_VERSION, **document}
 
 
 def _course(group: Sequence[FinishedRun]) -> EntropyCourse | None:

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.experiments.run import FinishedRun
+from innerattn.experiments.run import FinishedRun, OfMethod
 from innerattn.measures.cooperation import shared_abilities
 from innerattn.measures.sharing.handoff import (
     HANDOFF,
@@ -36,6 +36,7 @@ from innerattn.measures.sharing.handoff_attention import (
 )
 from innerattn.records.record import Record
 from innerattn.stats import Estimate
+from innerattn.stats.estimate import as_json
 from innerattn.stats.seeds import Array, SeedCurve, seed_curve, seed_estimate
 
 SCHEMA_VERSION = 3
@@ -61,23 +62,12 @@ class RoleEvidence:
     change: Estimate | None
     change_by_run: tuple[float | None, ...]
 
-    def to_json(self) -> dict[str, Any]:
-        """As a JSON object."""
-        return {
-            "weight": self.weight.to_json(),
-            "change": self.change.to_json() if self.change else None,
-            "change_by_run": list(self.change_by_run),
-        }
-
 
 @dataclass(frozen=True)
-class Evidence:
-    """Attention around the handoffs of one situation and method.
+class Evidence(OfMethod):
+    """Attention around the handoffs of one situation and method; N runs.
 
     Attributes:
-        situation: of the worlds.
-        method: of training.
-        seeds: of the N runs.
         handoffs: (N,) how many in whose window the control rescues nobody.
         left_out: (N,) how many in whose window the control takes part in a rescue.
         episodes: (N,) how many episodes the handoffs come from, of those recorded step by step.
@@ -95,9 +85,6 @@ class Evidence:
         control_p_by_run: (N,) the same of the control.
     """
 
-    situation: str
-    method: str
-    seeds: tuple[int, ...]
     handoffs: tuple[int, ...]
     left_out: tuple[int, ...]
     episodes: tuple[int, ...]
@@ -117,33 +104,6 @@ class Evidence:
     def runs(self) -> int:
         """How many runs have handoffs."""
         return sum(number > 0 for number in self.handoffs)
-
-    def to_json(self) -> dict[str, Any]:
-        """As a JSON object."""
-        names = [
-            "situation",
-            "method",
-            "seeds",
-            "handoffs",
-            "left_out",
-            "episodes",
-            "step_s",
-            "even",
-        ]
-        return {
-            **{name: getattr(self, name) for name in names},
-            "offsets": self.offsets.tolist(),
-            "robot": {role: part.to_json() for role, part in self.robot.items()},
-            "control": {role: part.to_json() for role, part in self.control.items()},
-            "own_part": self.own_part.to_json() if self.own_part else None,
-            "own_part_by_run": list(self.own_part_by_run),
-            "ceiling": self.ceiling.to_json() if self.ceiling else None,
-            "own_part_beyond_half": (
-                self.own_part_beyond_half.to_json() if self.own_part_beyond_half else None
-            ),
-            "p_by_run": list(self.p_by_run),
-            "control_p_by_run": list(self.control_p_by_run),
-        }
 
 
 def all_handoffs(record: Record) -> NDArray[np.void]:
@@ -248,7 +208,7 @@ def _of_run(record: Record) -> _Run:
 
 def evidence_json(parts: Sequence[Evidence]) -> dict[str, Any]:
     """The document of ``fig5_evidence.json``."""
-    return {"schema_version": SCHEMA_VERSION, "evidence": [part.to_json() for part in parts]}
+    return {"schema_version": SCHEMA_VERSION, "evidence": as_json(parts)}
 
 
 def _chooses(record: Record) -> bool:

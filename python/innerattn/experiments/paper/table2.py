@@ -8,7 +8,7 @@ rows stand beside mixed runs here.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from innerattn.errors import RunError
 from innerattn.experiments.paper.competence import Competence, competence, scripted_competence
 from innerattn.experiments.paper.printed import CheckedRow, checked_table
-from innerattn.experiments.run import FinishedRun
+from innerattn.experiments.run import FinishedRun, OfMethod
 from innerattn.measures.cooperation import count_cooperation
 from innerattn.measures.sharing.evenness import (
     MARGIN,
@@ -63,45 +63,24 @@ class Sharing:
         names: tuple[Verdict, ...] = ("even", "uneven", "undecided")
         return {name: sum(run.verdict == name for run in self.each) for name in names}
 
-    def to_json(self) -> dict[str, Any]:
-        """As a JSON object."""
-        together = self.together.to_json() if self.together else None
-        if together:
-            del together["runs"]  # they stand in "each"
-        each = [run.to_json() for run in self.each]
-        return {"episodes": self.episodes, "each": each, "together": together}
-
 
 @dataclass(frozen=True)
-class Row:
+class Row(OfMethod):
     """One method's sharing of one task in one situation.
 
     Attributes:
-        situation: of the worlds.
-        method: of training.
         task: its name.
         robots: names of the first and the second robot.
-        seeds: of the runs.
         recorded: over the episodes recorded step by step, as many as in the paper by default.
         scored: over all episodes of the standard length.
         printed: the paper's row; None where it has none.
     """
 
-    situation: str
-    method: str
     task: str
     robots: tuple[str, str]
-    seeds: tuple[int, ...]
     recorded: Sharing
     scored: Sharing
     printed: CheckedRow | None
-
-    def to_json(self) -> dict[str, Any]:
-        """As a JSON object."""
-        own = {name: getattr(self, name) for name in ("situation", "method", "task")}
-        own |= {"robots": list(self.robots), "seeds": list(self.seeds)}
-        own |= {"recorded": self.recorded.to_json(), "scored": self.scored.to_json()}
-        return own | {"printed": asdict(self.printed) if self.printed else None}
 
 
 @dataclass(frozen=True)
@@ -113,11 +92,15 @@ class Table2:
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``table2.json``."""
+        rows = as_json(self.rows)
+        for sharing in (row[name] for row in rows for name in ("recorded", "scored")):
+            if sharing["together"] is not None:
+                del sharing["together"]["runs"]  # they stand in "each"
         return {
             "schema_version": SCHEMA_VERSION,
             "margin": list(MARGIN),
             "printed_situation": PRINTED_SITUATION,
-            "rows": [row.to_json() for row in self.rows],
+            "rows": rows,
             "competence": as_json(self.competence),
         }
 

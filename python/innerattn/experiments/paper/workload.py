@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from innerattn.errors import RunError
 from innerattn.experiments.run import FinishedRun
-from innerattn.measures.registry import measure_of
 from innerattn.measures.sharing.evenness import counts_by_episode
 
 
@@ -23,17 +22,3 @@ def rescues_by_task(run: FinishedRun) -> dict[str, NDArray[np.int64]]:
         if len(by_robot) != 2:
             raise RunError(f"{run.folder}: {task} is shared by {len(by_robot)} robots; must be two")
     return counts
-
-
-def workload_imbalance(run: FinishedRun) -> float | None:
-    """Distance of the first food robot's share from 0.5, a mean over tasks, 0 to 0.5.
-
-    Returns:
-        None where a task has no rescues.
-
-    Raises:
-        RunError: a task is not one that two robots share.
-    """
-    rescues_by_task(run)
-    value = measure_of("imbalance", *run.scored)
-    return value if isinstance(value, float) else None

@@ -52,19 +52,14 @@ def groups(cases: Collection[Case]) -> list[Group]:
             own = tuple(x for m in METHODS if (x := Case(situation, m, seed)) in cases)
             if own:
                 found.append(Group("deployment", f"{situation}-s{seed}", own))
-        faulty = (*_trained_with_faults(seed), Case("mixed", TRAINED, seed))
+        faulty = (
+            Case(WITH_FAULTS, TRAINED, seed),
+            Case(WITH_FAULTS, TRAINED, seed, MASKED),
+            Case("mixed", TRAINED, seed),
+        )
         if set(faulty) <= set(cases):
             found.append(Group("training", f"trained-with-faults-s{seed}", faulty))
-    for team in map(_team, TEAMS):
-        if team in cases:
-            name = f"team-{team.worlds}"
-            found.append(Group("teams", name, (team,), ("unavailable",), 200))
+    for name in TEAMS:
+        if (team := Case(name, TRAINED, 0, TEAM)) in cases:
+            found.append(Group("teams", f"team-{name}", (team,), ("unavailable",), 200))
     return found
-
-
-def _trained_with_faults(seed: int) -> tuple[Case, Case]:
-    return Case(WITH_FAULTS, TRAINED, seed), Case(WITH_FAULTS, TRAINED, seed, MASKED)
-
-
-def _team(name: str) -> Case:
-    return Case(name, TRAINED, 0, TEAM)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +18,6 @@ from innerattn.records.record import Record
 from innerattn.stats import Estimate
 from innerattn.stats.bootstrap import RESAMPLES, percentile_interval
 from innerattn.stats.clusters import share_of
-from innerattn.stats.estimate import as_json
 from innerattn.stats.student import equivalence_p, student_interval
 
 MARGIN = (0.4, 0.6)
@@ -64,10 +63,6 @@ class Evenness:
     equivalence_p: float | None
     verdict: Verdict
 
-    def to_json(self) -> Any:
-        """As a JSON object, intervals as mean, low and high."""
-        return as_json(self)
-
 
 @dataclass(frozen=True)
 class EvennessOfRuns:
@@ -101,10 +96,6 @@ class EvennessOfRuns:
     equivalence_p: float | None
     pooled_share: Estimate | None
     verdict: Verdict
-
-    def to_json(self) -> Any:
-        """As a JSON object, intervals as mean, low and high."""
-        return as_json(self)
 
 
 def counts_by_episode(record: Record) -> dict[str, NDArray[np.int64]]:

@@ -14,6 +14,7 @@ from innerattn.report.crossed.tables import (
     effects_table,
     seeds_table,
 )
+from innerattn.report.folder import left_out_list
 from innerattn.report.table import markdown
 from innerattn.stats.text import format_estimate, format_seeds
 
@@ -24,10 +25,9 @@ def crossed_page(situations: Sequence[Situation], budget: str, left_out: Sequenc
     """The page: the figure of seeds, claims, rules, and where the rest is."""
     seeds = sorted({run.seed for situation in situations for run in situation.runs})
     count = sum(len(situation.runs) for situation in situations)
-    missing = ["**Left out of all results:**\n", *(f"- {one}" for one in left_out), ""]
     parts = [
         TITLE,
-        *(missing if left_out else []),
+        *left_out_list(left_out),
         "![Share of the first food robot, by seed](crossed_seeds.png)\n",
         f"{count} runs, budget `{budget}`, seeds {format_seeds(seeds)}. A dot is a run whose "
         f"robots have parameters of their own; a bar spans the runs of a seed. "

@@ -7,22 +7,22 @@ from pathlib import Path
 
 from innerattn.experiments.crossed.swapped import Swap, read_swaps
 from innerattn.experiments.run import FinishedRun
-from innerattn.report.folder import ReportFolder, listed_runs
+from innerattn.report.folder import ReportFolder, left_out_list, listed_runs
 from innerattn.report.plots.drawing import check_format
-from innerattn.report.plots.seeds import SeedDots, SeedPanel, draw_seeds
+from innerattn.report.plots.seeds import SeedPanel, draw_seeds
 from innerattn.report.table import Table, columns, markdown, plain_table
 from innerattn.stats.estimate import as_json
 from innerattn.stats.text import format_estimate, format_number
 
 SCHEMA_VERSION = 1
 FILES = tuple(f"swapped.{kind}" for kind in ("json", "md", "pdf", "png"))
-"""What `write_swapped` writes."""
+"""What `write` writes."""
 ANSWER = "What decides which food robot does more"
 SHARES = "Shares by seed"
 """Headings of the page's sections."""
 
 
-def write_swapped(
+def write(
     runs: Sequence[FinishedRun], out: Path, budget: str, left_out: Sequence[str] = ()
 ) -> list[Swap]:
     """Write `FILES` into ``out``; the same runs give the same bytes.
@@ -59,10 +59,9 @@ def write_swapped(
 
 def swapped_page(found: Sequence[Swap], budget: str, left_out: Sequence[str]) -> str:
     """The page."""
-    parts = ["# Whose weights, whose share\n"]
-    if left_out:
-        parts += ["**Left out of all results:**\n", *(f"- {one}" for one in left_out), ""]
-    parts += [
+    parts = [
+        "# Whose weights, whose share\n",
+        *left_out_list(left_out),
         f"Two runs for each seed, budget `{budget}`, team credit: one with the initial weights as "
         "they are drawn, one in which the two food robots swap theirs. Shares are of all rescues, "
         "by the first food robot.\n",
@@ -105,8 +104,8 @@ def seed_panel(swap: Swap) -> SeedPanel:
     """The two shares of each seed."""
     return SeedPanel(
         f"{swap.situation}, {swap.method}",
-        (
-            SeedDots("weights as drawn", {pair.seed: pair.drawn for pair in swap.pairs}),
-            SeedDots("weights swapped", {pair.seed: pair.swapped for pair in swap.pairs}),
-        ),
+        {
+            "weights as drawn": {pair.seed: pair.drawn for pair in swap.pairs},
+            "weights swapped": {pair.seed: pair.swapped for pair in swap.pairs},
+        },
     )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from innerattn.experiments.crossed.claims import idle_shown
 from innerattn.experiments.crossed.effects import Effect
-from innerattn.experiments.crossed.outcome import Outcome
+from innerattn.experiments.crossed.outcome import OUTCOMES
 from innerattn.experiments.crossed.study import Situation
 from innerattn.report.table import Column, Row, Table, columns, csv_text, plain_table
 from innerattn.stats.text import NONE, format_estimate, format_number, format_p
@@ -23,8 +24,10 @@ _LABELS = {
     "entropy_share": "entropy / ln(N − 1)",
     "first_share": "share of the first robot",
 }
-_CSV_ARM = ("situation", "method", "credit", "penalty", "shared", "seed")
-_CSV_RUN = ("folder", "config_sha256", "weights_sha256")
+_CSV = (
+    *("situation", "method", "credit", "penalty", "shared", "seed"),
+    *(*OUTCOMES, "folder", "config_sha256", "weights_sha256"),
+)
 
 
 def claims_table(situations: Sequence[Situation]) -> Table:
@@ -55,13 +58,19 @@ def arms_table(situation: Situation) -> Table:
     figures = ("imbalance", "least_share", "rescues_per_episode", "score", "entropy_share")
     numbers = [_LABELS[name] for name in figures]
     heads = columns(["arm"], ["runs", *numbers, "seeds with an idle robot"])
-    outcomes = situation.outcomes()
     rows = []
     for arm, means in situation.means.items():
         cells = [
             format_estimate(means[name], 3 if name == "entropy_share" else 2) for name in figures
         ]
-        rows.append([str(arm), str(len(outcomes[arm])), *cells, idle_shown(outcomes, [arm])])
+        rows.append(
+            [
+                str(arm),
+                str(len(situation.outcomes[arm])),
+                *cells,
+                idle_shown(situation.outcomes, [arm]),
+            ]
+        )
     return plain_table(heads, rows)
 
 
@@ -93,24 +102,14 @@ def _effect_row(effect: Effect) -> Row:
     return Row(tuple(cells), effect.main)
 
 
-def runs_csv(situations: Sequence[Situation], named: dict[str, str]) -> str:
-    """One line for each run: its arm, what it shows, and what names it.
-
-    Args:
-        situations: with their runs.
-        named: how the report names each run folder, by its path.
-    """
-    names = tuple(Outcome.__dataclass_fields__)
-    rows = [
-        [
-            *(situation.name, run.arm.method, run.arm.credit, run.arm.penalty, run.arm.shared),
-            *(run.seed, *(getattr(run.outcome, name) for name in names)),
-            *(named[str(run.run.folder)], run.run.config_sha256, run.run.weights_sha256),
-        ]
+def runs_csv(situations: Sequence[Mapping[str, Any]]) -> str:
+    """One line for each run of the situations of a document, `crossed_document`."""
+    rows = (
+        [run.get(name, situation["situation"]) for name in _CSV]
         for situation in situations
-        for run in situation.runs
-    ]
-    return csv_text([*_CSV_ARM, *names, *_CSV_RUN], rows)
+        for run in situation["runs"]
+    )
+    return csv_text(_CSV, rows)
 
 
 def _fixed(value: float | None) -> str:

@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from innerattn.experiments.paper.fig4 import EntropyCourse
-from innerattn.report.plots.entropy import EntropyLines
 from innerattn.report.table import Table, columns, csv_text, plain_table
-from innerattn.stats.seeds import BAND_NAMES, SeedCurve
+from innerattn.stats.seeds import SeedCurve
 from innerattn.stats.text import NONE, format_estimate
 
 
@@ -50,31 +47,6 @@ def fig4_csv(courses: Sequence[EntropyCourse]) -> str:
                 ends = [float(found.mean[at]), float(found.low[at]), float(found.high[at])]
                 known = [None if math.isnan(end) else end for end in ends]
                 own = [course.situation, course.method, env_steps, robot, int(found.runs[at])]
-                lines.append([*own, *known, found.kind])
+                lines.append([*own, *known, found.band])
     heads = ["situation", "method", "env_steps", "robot", "runs", "mean_nats", "low", "high"]
     return csv_text([*heads, "band"], lines)
-
-
-def fig4_lines(courses: Sequence[EntropyCourse]) -> list[EntropyLines]:
-    """What is drawn: courses of attention that chooses."""
-    lines = []
-    for course in courses:
-        if not course.chooses:
-            continue
-        mean, count = course.mean(), len(course.seeds)
-        runs = "1 run" if count == 1 else f"{count} runs, band: {BAND_NAMES[mean.kind]}"
-        lines.append(
-            EntropyLines(
-                situation=course.situation,
-                method=course.method,
-                runs=runs,
-                env_steps=course.env_steps,
-                mean=np.stack([mean.mean, mean.low, mean.high]),
-                robots=course.robots,
-                kinds=course.kinds,
-                by_robot=course.by_robot().mean,
-                heads=course.end_by_head(),
-                even_nats=course.even_nats,
-            )
-        )
-    return lines

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from innerattn.experiments.paper.fig5 import ROLES, Evidence
-from innerattn.report.plots.aligned import AlignedLines
+from innerattn.experiments.paper.fig5 import Evidence
 from innerattn.report.table import Row, Table, columns, plain_table
-from innerattn.stats.seeds import BAND_NAMES
 from innerattn.stats.text import NONE, format_estimate, format_p, format_signed
 
 _NEXT = ("change on the next partner", "bystander's", "difference", "ceiling")
@@ -96,31 +92,6 @@ def shift_sentence(part: Evidence) -> str:
         f"{opening}, {bystander}: {shared} of the shift is the bystander's too, and {apart} "
         f"({format_estimate(own)}){doubt} singles out the partner."
     )
-
-
-def evidence_lines(found: Sequence[Evidence]) -> list[AlignedLines]:
-    """What is drawn."""
-    lines = []
-    for part in found:
-        kind = part.robot["to_be"].weight.kind
-        runs = "1 run" if part.runs == 1 else f"{part.runs} runs, band: {BAND_NAMES[kind]}"
-        robot, control = (
-            np.stack([np.stack([w.mean, w.low, w.high]) for w in (of[r].weight for r in ROLES)])
-            for of in (part.robot, part.control)
-        )
-        lines.append(
-            AlignedLines(
-                situation=part.situation,
-                method=part.method,
-                runs=f"{runs}, {sum(part.handoffs):,} handoffs",
-                offsets=part.offsets,
-                step_s=part.step_s,
-                even=part.even,
-                robot=robot,
-                control=control,
-            )
-        )
-    return lines
 
 
 def _signed(value: float | None) -> str:

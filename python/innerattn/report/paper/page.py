@@ -8,6 +8,7 @@ from innerattn.experiments.paper.claims import RULES
 from innerattn.experiments.paper.findings import Comparison, Findings
 from innerattn.experiments.paper.scene import SCENE_RULE
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION, Table2
+from innerattn.report.folder import left_out_list
 from innerattn.report.paper.claims import claims_summary, claims_table
 from innerattn.report.paper.competence import imbalance_score_table, pairs_summary
 from innerattn.report.paper.fig4 import entropy_table, logged
@@ -32,8 +33,7 @@ def report_page(findings: Findings, budget: str, left_out: Sequence[str]) -> str
         budget: name of the budget of training.
         left_out: runs that were planned and are not there, each with the reason.
     """
-    missing = ["**Left out of all results:**\n", *(f"- {one}" for one in left_out), ""]
-    parts = ["# Which of the paper's claims hold?\n", *(missing if left_out else [])]
+    parts = ["# Which of the paper's claims hold?\n", *left_out_list(left_out)]
     parts += [_opening(findings, budget), "## How claims are decided\n", RULES]
     if findings.table is not None and findings.comparison is not None:
         parts += [_sharing(findings.table), _compared(findings.comparison)]

@@ -11,11 +11,10 @@ from innerattn.experiments.paper.findings import PARTS, Findings, find
 from innerattn.experiments.paper.scene import scene_json
 from innerattn.experiments.run import FinishedRun, named_from
 from innerattn.report.folder import ReportFolder
-from innerattn.report.paper.fig4 import fig4_csv, fig4_lines
-from innerattn.report.paper.fig5 import evidence_lines, evidence_table
+from innerattn.report.paper.fig4 import fig4_csv
+from innerattn.report.paper.fig5 import evidence_table
 from innerattn.report.paper.page import claims_page, report_page
-from innerattn.report.paper.table2 import table2_markdown
-from innerattn.report.paper.table2_csv import table2_csv
+from innerattn.report.paper.table2 import table2_csv, table2_markdown
 from innerattn.report.plots.aligned import draw_aligned
 from innerattn.report.plots.drawing import check_format
 from innerattn.report.plots.entropy import draw_entropy
@@ -40,8 +39,8 @@ def write_report(
     runs: Sequence[FinishedRun],
     folder: Path,
     budget: str,
-    parts: Collection[str] = PARTS,
     left_out: Sequence[str] = (),
+    parts: Collection[str] = PARTS,
 ) -> Findings:
     """Write `REPORT` and the `FILES` of the parts into ``folder``, which is made if needed.
 
@@ -54,8 +53,8 @@ def write_report(
         folder: where to write.
         budget: name of the budget they were trained with; with "quick" every file says that this is
             a smoke run.
-        parts: which of `PARTS`.
         left_out: what is said of runs that were planned and are not among ``runs``.
+        parts: which of `PARTS`.
 
     Returns:
         What the report says.
@@ -83,8 +82,8 @@ def _write(folder: ReportFolder, findings: Findings, left_out: Sequence[str]) ->
     if findings.courses is not None:
         folder.json("fig4.json", fig4_json(findings.courses))
         folder.csv("fig4.csv", fig4_csv(findings.courses))
-        lines = fig4_lines(findings.courses)
-        folder.draw("fig4", draw_entropy(lines, PRINTED_NATS) if lines else None)
+        drawn = [course for course in findings.courses if course.chooses]
+        folder.draw("fig4", draw_entropy(drawn, PRINTED_NATS) if drawn else None)
     if findings.evidence is not None:
         _write_fig5(folder, findings)
     folder.csv("runs.csv", _runs_csv(findings.runs, folder.path))
@@ -97,7 +96,7 @@ def _write_fig5(folder: ReportFolder, findings: Findings) -> None:
     folder.json("fig5_evidence.json", evidence_json(found))
     table = f"# Attention at handoffs, every run\n\n{markdown(evidence_table(found))}"
     folder.markdown("fig5_evidence.md", table)
-    folder.draw("fig5_evidence", draw_aligned(evidence_lines(found)) if found else None)
+    folder.draw("fig5_evidence", draw_aligned(found) if found else None)
     if scene is not None:
         folder.json("fig5.json", scene_json(scene))
     else:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from innerattn.report.plots.drawing import BLACK, BLUE, PAGE_WIDTH_IN, VERMILION
+from innerattn.stats import Estimate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,13 +24,13 @@ class ArmDots:
         name: of the arm.
         inner: whether its attention is learnt.
         values: one of each run.
-        mean: mean over runs, low and high end of its interval; None for no bar.
+        mean: over runs; None for no bar.
     """
 
     name: str
     inner: bool
     values: tuple[float, ...]
-    mean: tuple[float, float, float] | None
+    mean: Estimate | None
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,10 @@ def _panel(panel: Axes, part: ArmPanel) -> None:
             arm.values, heights, marker, color=colour, markersize=2.6, alpha=0.7, linewidth=0.0
         )
         if arm.mean is not None:
-            mean, low, high = arm.mean
-            panel.plot([low, high], [y + 0.34] * 2, color=colour, linewidth=1.6)
-            panel.plot([mean], [y + 0.34], "|", color=colour, markersize=6, markeredgewidth=1.6)
+            ends = [arm.mean.low, arm.mean.high]
+            panel.plot(ends, [y + 0.34] * 2, color=colour, linewidth=1.6)
+            panel.plot(
+                [arm.mean.mean], [y + 0.34], "|", color=colour, markersize=6, markeredgewidth=1.6
+            )
     panel.grid(axis="y", linewidth=0.3)
     panel.tick_params(labelsize=7, length=2)

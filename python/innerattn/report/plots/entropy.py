@@ -7,123 +7,91 @@ edge a dot for each head at the end of training.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from innerattn.envs.colours import robot_looks
-from innerattn.report.plots.drawing import BLACK, COLUMN_WIDTH_IN, PAGE_WIDTH_IN, TWIN_DASHES
+from innerattn.experiments.paper.fig4 import EntropyCourse
+from innerattn.report.plots.drawing import (
+    BLACK,
+    TWIN_DASHES,
+    draw_level,
+    legend_below,
+    method_panels,
+    runs_and_band,
+)
+from innerattn.stats.seeds import Array
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
-
 _GREY = "#C8C8C8"
 _HEADS = 0.24  # width of the strip of heads, in lengths of the training
 
 
-@dataclass(frozen=True)
-class EntropyLines:
-    """What is drawn of one situation and method.
-
-    Attributes:
-        situation: of the worlds.
-        method: of training.
-        runs: how many there are, and what the band is.
-        env_steps: (T,) [env-steps].
-        mean: (3, T) mean over robots and heads, low and high end of the band; NaN for no band.
-        robots: R names.
-        kinds: of the R robots; twins of a kind have its colour and another dash.
-        by_robot: (T, R) mean over heads.
-        heads: (N, R, H) of each run's own heads, at the end.
-        even_nats: ln(R - 1).
-    """
-
-    situation: str
-    method: str
-    runs: str
-    env_steps: NDArray[np.int64]
-    mean: Array
-    robots: tuple[str, ...]
-    kinds: tuple[str, ...]
-    by_robot: Array
-    heads: Array
-    even_nats: float
-
-
-def draw_entropy(lines: Sequence[EntropyLines], printed_nats: float) -> Figure:
+def draw_entropy(courses: Sequence[EntropyCourse], printed_nats: float) -> Figure:
     """A row for each method and a column for each situation.
 
     Args:
-        lines: at least one.
+        courses: at least one.
         printed_nats: the paper's value, drawn for comparison.
     """
-    from matplotlib.figure import Figure
 
-    situations = list(dict.fromkeys(line.situation for line in lines))
-    methods = list(dict.fromkeys(line.method for line in lines))
-    width = PAGE_WIDTH_IN if len(situations) > 1 else COLUMN_WIDTH_IN
-    figure = Figure(figsize=(width, 0.5 + 2.3 * len(methods)), layout="constrained")
-    panels = figure.subplots(len(methods), len(situations), sharey=True, squeeze=False)
-    handles: dict[str, Artist] = {}
-    for row, method in enumerate(methods):
-        for column, situation in enumerate(situations):
-            panel = panels[row, column]
-            own = [x for x in lines if (x.method, x.situation) == (method, situation)]
-            if not own:
-                panel.set_axis_off()
-                continue
-            handles |= _course(panel, own[0])
-            _heads(panel, own[0])
-            _marks(panel, own[0].even_nats, printed_nats)
-            _teammates(panel, labelled=column == len(situations) - 1)
-            panel.set_title(f"{situation}, {method}\n{own[0].runs}", fontsize=7)
-            panel.set_xlabel("training [1,000 env-steps]", fontsize=7)
-        panels[row, 0].set_ylabel("entropy of attention [nats]", fontsize=8)
-    figure.legend(
-        handles.values(),
-        handles.keys(),
-        fontsize=7,
-        ncols=len(handles) if len(situations) > 1 else 2,
-        loc="outside lower center",
-        frameon=False,
-    )
-    drawn = [x for line in lines for x in (line.mean[0], line.by_robot, line.heads)]
+    def draw(panel: Axes, course: EntropyCourse) -> dict[str, Artist]:
+        handles = _course(panel, course)
+        _heads(panel, course)
+        draw_level(panel, course.even_nats, f"uniform {course.even_nats:.2f}", "-")
+        draw_level(panel, printed_nats, f"paper {printed_nats:.2f}", ":", below=True)
+        runs = runs_and_band(len(course.seeds), course.mean())
+        panel.set_title(f"{course.situation}, {course.method}\n{runs}", fontsize=7)
+        panel.set_xlabel("training [1,000 env-steps]", fontsize=7)
+        return handles
+
+    figure, panels, handles = method_panels(courses, 0.5, "entropy of attention [nats]", draw)
+    for row in panels:
+        for panel in row:
+            if panel.axison:
+                _teammates(panel, labelled=panel is row[-1])
+    wide = len({course.situation for course in courses}) > 1
+    legend_below(figure, handles, None if wide else 2)
+    drawn = [
+        values
+        for one in courses
+        for values in (one.mean().mean, one.by_robot().mean, one.end_by_head())
+    ]
     least = min(printed_nats, *(float(x.min()) for x in drawn if x.size))
-    panels[0, 0].set_ylim(max(0.0, least - 0.05), 1.06 * max(line.even_nats for line in lines))
+    most = 1.06 * max(course.even_nats for course in courses)
+    panels[0, 0].set_ylim(max(0.0, least - 0.05), most)
     return figure
 
 
-def _course(panel: Axes, line: EntropyLines) -> dict[str, Artist]:
+def _course(panel: Axes, course: EntropyCourse) -> dict[str, Artist]:
     """Draw the courses; what a legend shows."""
     handles: dict[str, Artist] = {}
-    steps = line.env_steps / 1000.0
-    mean, low, high = line.mean
-    if np.isfinite(low).any():
-        panel.fill_between(steps, low, high, color=_GREY, linewidth=0.0)
-    for r, (robot, look) in enumerate(zip(line.robots, robot_looks(line.kinds), strict=True)):
+    steps, mean = course.env_steps / 1000.0, course.mean()
+    if np.isfinite(mean.low).any():
+        panel.fill_between(steps, mean.low, mean.high, color=_GREY, linewidth=0.0)
+    looks, by_robot = robot_looks(course.kinds), course.by_robot().mean
+    for robot, look, nats in zip(course.robots, looks, by_robot.T, strict=True):
         dash = TWIN_DASHES[look.twin % len(TWIN_DASHES)]
-        (handles[robot],) = panel.plot(
-            steps, line.by_robot[:, r], dash, color=look.colour, linewidth=0.8
-        )
-    (handles["mean over robots"],) = panel.plot(steps, mean, color=BLACK, linewidth=1.3)
+        (handles[robot],) = panel.plot(steps, nats, dash, color=look.colour, linewidth=0.8)
+    (handles["mean over robots"],) = panel.plot(steps, mean.mean, color=BLACK, linewidth=1.3)
     return handles
 
 
-def _heads(panel: Axes, line: EntropyLines) -> None:
+def _heads(panel: Axes, course: EntropyCourse) -> None:
     """A strip beside the courses: the heads of each robot in a column of their own."""
     from matplotlib.ticker import MaxNLocator
 
-    last = float(line.env_steps[-1]) / 1000.0
+    last = float(course.env_steps[-1]) / 1000.0
     strip = _HEADS * last
-    places = last + strip * (np.arange(len(line.robots)) + 1.0) / (len(line.robots) + 0.5)
-    for r, (place, look) in enumerate(zip(places, robot_looks(line.kinds), strict=True)):
-        values = line.heads[:, r].ravel()
+    places = last + strip * (np.arange(len(course.robots)) + 1.0) / (len(course.robots) + 0.5)
+    for r, (place, look) in enumerate(zip(places, robot_looks(course.kinds), strict=True)):
+        values = course.end_by_head()[:, r].ravel()
         panel.plot(
             np.full(len(values), place),
             values,
@@ -144,25 +112,6 @@ def _heads(panel: Axes, line: EntropyLines) -> None:
     ticks = MaxNLocator(nbins=4, steps=[1, 2, 5, 10]).tick_values(0.0, last)
     panel.set_xticks([tick for tick in ticks if 0.0 <= tick <= 1.001 * last])
     panel.set_xlim(-0.03 * last, last + 1.08 * strip)
-
-
-def _marks(panel: Axes, even_nats: float, printed_nats: float) -> None:
-    """Lines for even attention and for the paper's value, named at the left."""
-    panel.tick_params(labelsize=7, length=2)
-    for nats, name, style, up in (
-        (even_nats, f"uniform {even_nats:.2f}", "-", 1),
-        (printed_nats, f"paper {printed_nats:.2f}", ":", -1),
-    ):
-        panel.axhline(nats, color=BLACK, linewidth=0.8, linestyle=style)
-        panel.annotate(
-            name,
-            (0.02, nats),
-            xycoords=("axes fraction", "data"),
-            xytext=(0, up),
-            textcoords="offset points",
-            fontsize=6,
-            va="bottom" if up > 0 else "top",
-        )
 
 
 def _teammates(panel: Axes, *, labelled: bool) -> None:

@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from innerattn.envs.colours import robot_looks
 from innerattn.experiments.paper.scene import HandoffScene
-from innerattn.report.plots.drawing import BLACK, PAGE_WIDTH_IN, TWIN_DASHES, VERMILION
+from innerattn.report.plots.drawing import (
+    BLACK,
+    PAGE_WIDTH_IN,
+    TWIN_DASHES,
+    VERMILION,
+    labelled,
+    legend_below,
+)
 from innerattn.report.plots.names import place_names
 
 if TYPE_CHECKING:
@@ -68,10 +75,7 @@ def draw_handoff(scene: HandoffScene) -> Figure:
     panels[0].set_ylabel("weight", fontsize=8)
     for first, letter in ((arenas[0], "A"), (panel_b, "B"), (panels[0], "C")):
         first.set_title(letter, loc="left", fontsize=11, fontweight="bold")
-    handles, names = panels[0].get_legend_handles_labels()
-    lower.legend(
-        handles, names, fontsize=7, ncols=len(names), loc="outside lower center", frameon=False
-    )
+    legend_below(lower, labelled(panels[0]))
     robot = scene.scenario.robots[scene.robot].name
     figure.suptitle(f"{robot} hands over: {scene.title}", fontsize=9)
     figure.draw_without_rendering()  # lays it out, so that it is known what covers what

@@ -6,7 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from innerattn.report.plots.drawing import BLACK, BLUE, COLUMN_WIDTH_IN, ORANGE
+from innerattn.report.plots.drawing import (
+    BLACK,
+    BLUE,
+    COLUMN_WIDTH_IN,
+    ORANGE,
+    labelled,
+    legend_below,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,8 +69,5 @@ def draw_search(dots: Sequence[TrialDot], recipe: float | None, label: str, most
     panel.set_xlabel("training of all trials [core-minutes]", fontsize=8)
     panel.set_ylabel(label, fontsize=8)
     panel.tick_params(labelsize=7, length=2)
-    handles, names = panel.get_legend_handles_labels()
-    figure.legend(
-        handles, names, fontsize=7, ncols=len(names), loc="outside lower center", frameon=False
-    )
+    legend_below(figure, labelled(panel))
     return figure

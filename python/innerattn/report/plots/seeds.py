@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from innerattn.report.plots.drawing import BLACK, BLUE, PAGE_WIDTH_IN, SKY, VERMILION
+from innerattn.report.plots.drawing import BLACK, BLUE, PAGE_WIDTH_IN, SKY, VERMILION, legend_below
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,29 +17,17 @@ _REACH = 0.18  # from the first arm of a seed to its place, in places
 
 
 @dataclass(frozen=True)
-class SeedDots:
-    """One arm in one panel.
-
-    Attributes:
-        name: of the arm, for the legend.
-        by_seed: a value for each seed that has a run.
-    """
-
-    name: str
-    by_seed: dict[int, float]
-
-
-@dataclass(frozen=True)
 class SeedPanel:
     """One panel.
 
     Attributes:
         title: what all its runs have in common.
-        arms: the same in all panels, up to four.
+        arms: by their names in the legend, the same in all panels, up to four: a value for each
+            seed that has a run.
     """
 
     title: str
-    arms: tuple[SeedDots, ...]
+    arms: Mapping[str, Mapping[int, float]]
 
 
 def draw_seeds(rows: Sequence[Sequence[SeedPanel]], label: str, even: float) -> Figure:
@@ -62,25 +50,18 @@ def draw_seeds(rows: Sequence[Sequence[SeedPanel]], label: str, even: float) -> 
         panels[row, 0].set_ylabel(label, fontsize=8)
     for panel in panels[-1]:
         panel.set_xlabel("seed", fontsize=8)
-    values = [x for row in rows for part in row for arm in part.arms for x in arm.by_seed.values()]
+    values = [x for row in rows for part in row for arm in part.arms.values() for x in arm.values()]
     reach = max((abs(value - even) for value in values), default=0.0) + 0.05
     panels[0, 0].set_ylim(even - reach, even + reach)
-    figure.legend(
-        handles.values(),
-        handles.keys(),
-        fontsize=7,
-        ncols=len(handles) or 1,
-        loc="outside lower center",
-        frameon=False,
-    )
+    legend_below(figure, handles)
     return figure
 
 
 def _panel(panel: Axes, part: SeedPanel, even: float) -> dict[str, Any]:
     """Draw one; what a legend shows."""
     by_seed: dict[int, list[float]] = {}
-    for arm in part.arms:
-        for seed, value in arm.by_seed.items():
+    for arm in part.arms.values():
+        for seed, value in arm.items():
             by_seed.setdefault(seed, []).append(value)
     places = {seed: place for place, seed in enumerate(sorted(by_seed))}
     panel.axhline(even, color=BLACK, linewidth=0.7, linestyle=":")
@@ -88,11 +69,12 @@ def _panel(panel: Axes, part: SeedPanel, even: float) -> dict[str, Any]:
         least, most = min(values), max(values)
         panel.bar(places[seed], most - least, 0.6, least, color="#E4E4E4", zorder=0)
     handles: dict[str, Any] = {}
-    for number, (arm, (colour, marker)) in enumerate(zip(part.arms, _STYLES, strict=False)):
+    for number, ((name, arm), look) in enumerate(zip(part.arms.items(), _STYLES, strict=False)):
+        colour, marker = look
         apart = _REACH * (2.0 * number / max(len(part.arms) - 1, 1) - 1.0)
-        x = [places[seed] + apart for seed in arm.by_seed]
-        (handles[arm.name],) = panel.plot(
-            x, list(arm.by_seed.values()), marker, color=colour, markersize=3.4, linewidth=0.0
+        x = [places[seed] + apart for seed in arm]
+        (handles[name],) = panel.plot(
+            x, list(arm.values()), marker, color=colour, markersize=3.4, linewidth=0.0
         )
     panel.set_title(part.title, fontsize=8)
     panel.set_xticks(list(places.values()), [str(seed) for seed in places])

@@ -1,11 +1,14 @@
-"""The page on what faults cost, as Markdown."""
+"""The page on what faults cost, from finished runs and the documents of their study."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from innerattn.experiments.robustness.design import TEAM_BUDGET
-from innerattn.experiments.robustness.results import Deployment, Robustness
+from innerattn.experiments.robustness.results import Deployment, Robustness, read_robustness
+from innerattn.experiments.run import FinishedRun
+from innerattn.report.folder import ReportFolder, left_out_list, listed_runs
 from innerattn.report.robustness.tables import (
     attention_table,
     bounds_table,
@@ -17,7 +20,13 @@ from innerattn.report.robustness.tables import (
     training_table,
 )
 from innerattn.report.table import markdown
+from innerattn.stats.estimate import as_json
 from innerattn.stats.text import format_seeds
+
+SCHEMA_VERSION = 1
+
+FILES = ("robustness.json", "robustness.md")
+"""What `write` writes."""
 
 RETENTION = "Retention by kind of fault"
 RECOVERY = "Early and late retention"
@@ -46,6 +55,32 @@ TERMS = """\
 """What the words of the tables mean, in Markdown."""
 
 
+def write(
+    runs: Sequence[FinishedRun], out: Path, budget: str, left_out: Sequence[str]
+) -> Robustness:
+    """Write `FILES` into ``out``; the same runs and documents give the same bytes.
+
+    Args:
+        runs: finished runs of the study, at least one; they are read only.
+        out: folder of the study, which holds the documents.
+        budget: name of the budget the runs were trained with.
+        left_out: what is said of runs and measurements that are missing.
+
+    Returns:
+        What the report says.
+
+    Raises:
+        RunError: a document is damaged.
+        OSError: a file cannot be written; each is written whole or not at all.
+    """
+    found = read_robustness(runs, out)
+    folder = ReportFolder(out, budget)
+    document = {"schema_version": SCHEMA_VERSION, "budget": budget, **as_json(found)}
+    folder.json("robustness.json", {**document, "runs": listed_runs(runs, out)})
+    folder.markdown("robustness.md", robustness_page(found, budget, left_out))
+    return found
+
+
 def robustness_page(found: Robustness, budget: str, left_out: Sequence[str]) -> str:
     """The page.
 
@@ -54,9 +89,7 @@ def robustness_page(found: Robustness, budget: str, left_out: Sequence[str]) -> 
         budget: name of the budget the runs were trained with.
         left_out: what is said of runs and measurements that were planned and are not in it.
     """
-    parts = ["# What faults cost\n"]
-    if left_out:
-        parts += ["**Left out of all results:**\n", *(f"- {one}" for one in left_out), ""]
+    parts = ["# What faults cost\n", *left_out_list(left_out)]
     if found.deployments:
         parts.append(
             f"Budget `{budget}`, training seeds {format_seeds(found.seeds)}; each fault is tried "

@@ -167,13 +167,13 @@ def _label(part: EntropyCourse | Evidence) -> str:
 
 
 def _bands(curves: Sequence[SeedCurve]) -> str:
-    kinds = dict.fromkeys(BAND_NAMES[curve.kind] for curve in curves if curve.kind != "none")
+    kinds = dict.fromkeys(BAND_NAMES[curve.band] for curve in curves if curve.band != "none")
     return f"Band: {' or '.join(kinds)} over runs." if kinds else "One run, so no band."
 
 
 def _banded(name: str, x: Sequence[float], curve: SeedCurve, *, colour: str, dash: int = 0) -> Line:
     """A line, with a band where the curve has one."""
-    ends = () if curve.kind == "none" else (_known(curve.low), _known(curve.high))
+    ends = () if curve.band == "none" else (_known(curve.low), _known(curve.high))
     return Line(name, x, _known(curve.mean), colour, dash, *ends)
 
 

@@ -97,6 +97,6 @@ def _curve(curve: LearningCurve) -> dict[str, Any]:
         "method": curve.method,
         "env_steps": curve.env_steps.tolist(),
         "seconds": curve.seconds.tolist(),
-        "rescues_per_episode": curve.rescues.to_json(),
+        "rescues_per_episode": as_json(curve.rescues),
         "scripts": curve.scripts,
     }

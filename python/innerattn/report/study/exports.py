@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
-from innerattn.errors import RunError
 from innerattn.evaluate.training_score import ScriptedRescues, scripted_rescues
+from innerattn.experiments.run import FinishedRun, read_rescues
 from innerattn.policies import best_script
-from innerattn.records.logged import (
-    METRICS,
-    MOST_METRICS_BYTES,
-    counts_as_evaluated,
-    logged_lines,
-    logged_rescues,
-)
-from innerattn.records.run_files import RunFiles
+from innerattn.records.logged import counts_as_evaluated
 from innerattn.studies.aggregates import TASK, Aggregate, algorithm_of
 from innerattn.studies.curves import EPISODES
 from innerattn.studies.results import Result
@@ -44,9 +36,7 @@ def rliable_document(found: Mapping[str, Aggregate]) -> dict[str, Any]:
     return {"schema_version": 1, "tasks": tasks, "seeds": seeds, "scores": scores}
 
 
-def marl_eval_document(
-    found: Mapping[str, Aggregate], results: Sequence[Result], runs: Path
-) -> dict[str, Any]:
+def marl_eval_document(found: Mapping[str, Aggregate], results: Sequence[Result]) -> dict[str, Any]:
     """Evaluations by task, algorithm and seed, in the form of marl-eval's raw data.
 
     Metrics are ``rescues`` per episode and ``score``. Its steps are lines of the training's log,
@@ -56,8 +46,7 @@ def marl_eval_document(
 
     Args:
         found: algorithms by name.
-        results: finished runs; those without a score are left out.
-        runs: folder of the runs.
+        results: finished runs; those without a score and archived ones are left out.
 
     Raises:
         RunError: the metrics of a run are missing, altered or damaged.
@@ -67,21 +56,18 @@ def marl_eval_document(
     played: dict[tuple[str, int], ScriptedRescues] = {}
     for one in results:
         name = names.get(tuple(algorithm_of(one).items()))
-        if name is not None:
+        run = one.finished
+        if name is not None and run is not None and not run.archived:
             task = tasks.setdefault(str(one.run.place[TASK]), {})
-            task.setdefault(name, {})[f"seed_{one.run.seed}"] = _of_run(
-                one, runs / one.run.key, played
-            )
+            task.setdefault(name, {})[f"seed_{one.run.seed}"] = _of_run(run, played)
     return {ENVIRONMENT: tasks}
 
 
-def _of_run(
-    one: Result, folder: Path, played: dict[tuple[str, int], ScriptedRescues]
-) -> dict[str, Any]:
+def _of_run(run: FinishedRun, played: dict[tuple[str, int], ScriptedRescues]) -> dict[str, Any]:
     """The numbers of one run; scripts that are ``played`` serve all runs of the same worlds."""
-    scripts = one.summary["scripted"]
+    scripts = run.summary["scripted"]
     low, high = (float(scripts[name]["mean"]) for name in ("random", best_script(scripts)))
-    config, evaluated = one.run.config, ScriptedRescues(low, high)
+    config, evaluated = run.config, ScriptedRescues(low, high)
     trained = evaluated
     if not counts_as_evaluated(config):
         worlds = config.training_scenario.model_dump_json(), config.train.seed
@@ -93,20 +79,12 @@ def _of_run(
         score = scripts.score(rescues)
         return {"rescues": [rescues]} | ({} if score is None else {"score": [score]})
 
-    try:
-        data = RunFiles(folder).read(METRICS, MOST_METRICS_BYTES)
-        logged = [
-            (int(line["env_steps"]), rescues)
-            for line in logged_lines(data)
-            if (rescues := logged_rescues(config, line)) is not None
-        ]
-    except (ValueError, KeyError, TypeError) as error:
-        raise RunError(f"{folder / METRICS}: not the metrics of a run") from error
+    logged = [(int(steps), rescues) for steps, rescues in read_rescues(run) if rescues is not None]
     every = max(1, -(-len(logged) // _MOST_STEPS))
     kept = logged[::-1][::every][::-1]  # the last line is among them
     steps = {
         f"step_{number}": {"step_count": env_steps, **metrics(rescues, trained)}
         for number, (env_steps, rescues) in enumerate(kept, 1)
     }
-    measured = float(one.summary["rescues_per_episode"]["mean"])
+    measured = float(run.summary["rescues_per_episode"]["mean"])
     return {**steps, "absolute_metrics": metrics(measured, evaluated)}

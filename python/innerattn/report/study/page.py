@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from innerattn.policies import best_script
+from innerattn.report.folder import left_out_list
 from innerattn.report.study.places import PlaceNames, named_values, set_there, varied_in
 from innerattn.report.study.search import (
     SearchFound,
@@ -82,8 +83,7 @@ def study_page(found: Found, figures: Mapping[str, str]) -> str:
             parts += [
                 f"{without} of these have not met the {what}; `innerattn study run` lets them.\n"
             ]
-    if results.left_out:
-        parts += ["**Left out of all results:**\n", *map("- {}".format, left_out(results)), ""]
+    parts += left_out_list(left_out(results))
     if found.search is not None:
         parts += search_page(found.search, figures.get("search"))
     if "scores" in figures:

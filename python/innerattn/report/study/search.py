@@ -16,7 +16,7 @@ from innerattn.studies.folder import StudyFolder
 from innerattn.studies.results import Compared, Result, compare
 from innerattn.studies.search.race import RULES, Standing
 from innerattn.studies.search.state import Now, SearchState
-from innerattn.studies.space import Search, Value
+from innerattn.studies.space import Search
 from innerattn.studies.study import Study, StudyContrast
 
 _ORDER = ("finished", "open", "dropped", "failed")
@@ -156,7 +156,7 @@ def search_table(found: SearchFound, *, cost: bool = True) -> Table:
         rows.append(
             [
                 one.trial.name,
-                *(NONE if key not in values else _cell(values[key]) for key in keys),
+                *(NONE if key not in values else str(values[key]) for key in keys),
                 str(len(one.scores)),
                 NONE if one.mean is None else plus_minus(one.mean),
                 *([f"{found.core_s[one.trial.number]:.0f}"] if cost else []),
@@ -178,12 +178,8 @@ def train_command(found: SearchFound) -> str:
     where = ["--scenario", scenario] if scenario.endswith(".toml") else ["--preset", scenario]
     words = ["innerattn", "train", *where, "--method", grid.methods[0], "--budget", grid.budgets[0]]
     for key, value in values.items():
-        words += [f"--{key.replace('_', '-')}", _cell(value)]
+        words += [f"--{key.replace('_', '-')}", str(value)]
     return shlex.join(words)
-
-
-def _cell(value: Value) -> str:
-    return str(value)
 
 
 def search_document(found: SearchFound) -> dict[str, Any]:

@@ -9,12 +9,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from innerattn.experiments.smoke import smoke_note
 from innerattn.report.folder import ReportFolder
 from innerattn.report.plots.arms import ArmDots, ArmPanel, draw_arms
-from innerattn.report.plots.curves import CurveLine, draw_curves
+from innerattn.report.plots.curves import draw_curves
 from innerattn.report.plots.search import TrialDot, draw_search
 from innerattn.report.study.document import study_document
 from innerattn.report.study.exports import marl_eval_document, rliable_document
@@ -79,9 +77,7 @@ def write_study(
 def _write_scores(folder: ReportFolder, found: Found) -> list[str]:
     """Write scores for other tools."""
     folder.json("scores.json", rliable_document(found.aggregates["standard"]))
-    finished = found.results.finished
-    exported = [one for one in finished if one.finished and not one.finished.archived]
-    document = marl_eval_document(found.aggregates["standard"], exported, found.study.runs)
+    document = marl_eval_document(found.aggregates["standard"], found.results.finished)
     folder.json("marl_eval.json", document, note=False)
     return ["scores.json", "marl_eval.json"]
 
@@ -149,20 +145,8 @@ def _draw(folder: ReportFolder, found: Found) -> dict[str, str]:
         figures["scores"] = "scores.png"
     for title, curves in found.curves.items():
         name = f"curves-{re.sub('[^a-z0-9]+', '-', title.lower()).strip('-')}"
-        lines = [
-            CurveLine(
-                one.situation,
-                one.method,
-                one.env_steps,
-                one.seconds,
-                np.stack([one.rescues.mean, one.rescues.low, one.rescues.high]),
-                one.scripts,
-            )
-            for one in curves
-        ]
-        unit = " or ".join(dict.fromkeys(one.unit for one in curves))
-        folder.draw(name, draw_curves(lines, f"rescues per {unit} of training") if lines else None)
-        if lines:
+        folder.draw(name, draw_curves(curves) if curves else None)
+        if curves:
             figures[title] = f"{name}.png"
     return figures
 
@@ -196,12 +180,8 @@ def score_panels(found: Sequence[Mean]) -> list[list[ArmPanel]]:
             for one, name in here:
                 values = one.values["score", length]
                 known = tuple(x for x in values.each.values() if x is not None)
-                mean = values.mean
-                bar = None
-                if mean is not None and mean.low is not None and mean.high is not None:
-                    bar = (mean.mean, mean.low, mean.high)
                 learnt = str(one.place["method"]).endswith("-inner")
-                dots.append(ArmDots(name, learnt, known, bar))
+                dots.append(ArmDots(name, learnt, known, values.mean))
             steps = here[0][0].episode_steps[length]
             row.append(ArmPanel(scenario, f"score, {steps} steps", tuple(dots), marks=(1.0,)))
         rows.append(row)

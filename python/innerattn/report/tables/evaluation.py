@@ -45,11 +45,17 @@ def print_summary(console: Console, summary: Summary, scenario: Scenario) -> Non
     console.print()
     print_table(console, _rescues(summary))
     if scenario.has_deadlines:
-        print_table(console, _in_time(summary))
+        title = "Share of victims rescued before their deadline"
+        note = "lost: victims per episode whose deadline passed"
+        print_table(console, _of_policies(summary, _lost_cells, ["lost"], title, note))
     if scenario.has_arrivals:
-        print_table(console, _turned_away(summary))
+        title = "Victims turned away per episode"
+        note = "turned away: they arrived when all slots of their task were taken"
+        print_table(console, _of_policies(summary, _turned_away_cells, [], title, note))
     if scenario.end_when_done:
-        print_table(console, _makespan(summary))
+        title = "Time until all victims were done [s]"
+        note = "done: share of the episodes in which they were; the time is the mean of these alone"
+        print_table(console, _of_policies(summary, _makespan_cells, ["done"], title, note))
     if any(summary.cooperation.values()):
         print_table(console, _cooperation(summary, scenario))
     if summary.attention_entropy:
@@ -134,51 +140,30 @@ def _rescues(summary: Summary) -> Table:
     )
 
 
-def _in_time(summary: Summary) -> Table:
-    """What share of the victims each policy rescued before their deadline, and how many it lost."""
+def _of_policies(
+    summary: Summary,
+    cells: Callable[[Performance, str], tuple[str, ...]],
+    second: Sequence[str],
+    title: str,
+    note: str,
+) -> Table:
+    """What the measures of scripts and of what is measured are, at both lengths of episodes.
+
+    Args:
+        summary: what was measured.
+        cells: of a policy at a length of episodes.
+        second: head of the second of the cells, where there are two.
+        title: what the first one is.
+        note: what the table does not say.
+    """
     lengths = (summary.standard, summary.long)
-    heads = [head for one in lengths for head in (f"{one.episode_steps} steps", "lost")]
-    return Table(
-        columns(["policy"], heads),
-        (section(_by_policy(summary, _lost_cells)),),
-        "Share of victims rescued before their deadline",
-        ("lost: victims per episode whose deadline passed",),
-    )
-
-
-def _turned_away(summary: Summary) -> Table:
-    """How many victims found no slot while each policy played."""
-    lengths = (summary.standard, summary.long)
-    return Table(
-        columns(["policy"], [f"{one.episode_steps} steps" for one in lengths]),
-        (section(_by_policy(summary, _turned_away_cells)),),
-        "Victims turned away per episode",
-        ("turned away: they arrived when all slots of their task were taken",),
-    )
-
-
-def _makespan(summary: Summary) -> Table:
-    """In what share of the episodes all victims were done while each policy played, and when."""
-    lengths = (summary.standard, summary.long)
-    heads = [head for one in lengths for head in (f"{one.episode_steps} steps", "done")]
-    return Table(
-        columns(["policy"], heads),
-        (section(_by_policy(summary, _makespan_cells)),),
-        "Time until all victims were done [s]",
-        ("done: share of the episodes in which they were; the time is the mean of these alone",),
-    )
-
-
-def _by_policy(summary: Summary, cells: Callable[[Performance, str], tuple[str, ...]]) -> list[Row]:
-    """Rows of the scripts and of what is measured, with cells of both lengths of episodes."""
     scripts = [name for name in summary.standard.scripted if name != summary.method]
-    return [
-        Row(
-            (name, *(x for one in (summary.standard, summary.long) for x in cells(one, name))),
-            strong=name == summary.method,
-        )
+    rows = [
+        Row((name, *(x for one in lengths for x in cells(one, name))), name == summary.method)
         for name in (*scripts, summary.method)
     ]
+    heads = [head for one in lengths for head in (f"{one.episode_steps} steps", *second)]
+    return plain_table(columns(["policy"], heads), rows, title, [note])
 
 
 def _turned_away_cells(measured: Performance, name: str) -> tuple[str]:
