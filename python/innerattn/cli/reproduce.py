@@ -87,7 +87,8 @@ class Reproduce(LongCommand):
         target = TARGETS[self.target]
         if self.publish is not None and self.target != "all" and target.file == TARGETS["all"].file:
             raise UsageError(f"--publish: pages show all of the paper, not {self.target}: use all")
-        if target.draws and target.report is not None:
+        report = None if target.report is None else target.report()
+        if report is not None and any(name.endswith(".png") for name in report.files):
             check_format(Path("figure.png"))
         study = self._begun(target)
         self._check_page(study)  # before hours of training, not after
@@ -103,10 +104,9 @@ class Reproduce(LongCommand):
             study, steps=target.steps or page, archived=target.archived and not page
         )
         runs = results.runs
-        if target.report is None:
+        if report is None:
             code, name = say_report(self, *write_study(study, results)), "report.md"
         else:
-            report = target.report()
             code = self._special(target, report, study, results)
             name = next(one for one in report.files if one.endswith(".md"))
         if self.publish is not None:

@@ -44,7 +44,6 @@ class Target:
         pool: begins the name of the folder of its runs, which ends in the budget.
         steps: whether it needs metrics and steps of runs.
         archived: whether archived runs do, which have neither; for "all" they do for the table.
-        draws: whether its own report needs matplotlib.
         under_faults: whether finished runs have to meet faults before the report.
     """
 
@@ -57,7 +56,6 @@ class Target:
     pool: str = ""
     steps: bool = False
     archived: bool = True
-    draws: bool = True
     under_faults: bool = False
 
     @cached_property
@@ -138,7 +136,6 @@ TARGETS: dict[str, Target] = {
             shows="the paper's Table II, how two robots share their work",
             report=_paper("table2"),
             file="paper",
-            draws=False,
         ),
         Target(
             name="fig4",
@@ -211,7 +208,6 @@ TARGETS: dict[str, Target] = {
             name="robustness",
             shows="what faults cost a team, and where attention goes",
             report=_own("robustness.page"),
-            draws=False,
             under_faults=True,
         ),
     )

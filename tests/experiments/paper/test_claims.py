@@ -17,6 +17,7 @@ from innerattn.experiments.paper.claims import (
 from innerattn.experiments.paper.competence import Competence, competence_units
 from innerattn.experiments.paper.fig4 import EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence, evidence
+from innerattn.experiments.paper.pairs import pairs
 from innerattn.experiments.paper.sharing_claims import judged, sharing_claims
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.experiments.run import FinishedRun
@@ -54,7 +55,7 @@ def claims_of(**shares: list[tuple[float, ...]]) -> dict[tuple[str, str], Holds]
         method = name.replace("_", "-")
         rows += [made_row(method, f"task_{index}", task) for index, task in enumerate(tasks, 1)]
         beside.append(made_competence(method, np.abs(np.array(tasks) - 0.5).mean(0).tolist()))
-    found = sharing_claims(Table2(tuple(rows), tuple(beside)))
+    found = sharing_claims(Table2(tuple(rows), tuple(beside), tuple(pairs(beside)), (), ()))
     return {(claim.claim, claim.method): claim.holds for claim in found}
 
 

@@ -51,10 +51,4 @@ def test_at_one_number_the_verdicts_stand() -> None:
     ]  # fmt: skip
     assert [row.rejected for row in rows] == [False, True] * 4
     assert [row.consistent for row in rows] == [True, False] * 4
-    assert [row.consistent for row in checked_table(200)] == [False, True] * 4
     assert [row.text_shares for row in rows] == [(0.52, 0.48), (0.9, 0.1)] + [None] * 6
-
-
-def test_no_rescues_are_refused() -> None:
-    with pytest.raises(ValueError, match="rescues = 0"):
-        checked_table(0)

@@ -12,7 +12,6 @@ import pytest
 
 from innerattn.errors import RunError
 from innerattn.experiments.archive import read_archive, write_archive
-from innerattn.experiments.paper.findings import compare
 from innerattn.experiments.paper.table2 import Table2, table2
 from innerattn.experiments.run import FinishedRun, by_method, read_run, refuse_unlike
 from innerattn.measures.dispatch_quality import dispatch_quality
@@ -121,7 +120,7 @@ def test_scripted_policies_stand_beside_the_runs_as_their_evaluations_found(
         rescues = {of: one["mean"] for of, one in measured.summary["scripted"].items()}
         score = (rescues[name] - rescues["random"]) / (rescues["hungarian"] - rescues["random"])
         assert figures["score"] == pytest.approx(score)
-    text = table2_markdown(table, compare(table))
+    text = table2_markdown(table)
     assert text.count(f"| **{name}** | mean [95 %] |") == 1
     assert text.count(f"| {name} | 0 |") == 1  # of the single run in single
 
@@ -151,7 +150,7 @@ def test_evaluations_without_measures_leave_them_out(groups: list[list[FinishedR
 
 
 def test_text_and_csv_hold_every_seed_and_real_counts(table: Table2) -> None:
-    text = table2_markdown(table, compare(table))
+    text = table2_markdown(table)
     lines = list(csv.DictReader(io.StringIO(table2_csv(table))))
     assert len(lines) == 2 * (2 * (3 + 1) + 2 * (2 + 1) + 2 * (1 + 1))
     (episodes,) = {row.recorded.episodes for row in table.rows}

@@ -8,7 +8,7 @@ from innerattn.report.plots.seeds import SeedPanel, draw_seeds
 def test_every_run_is_a_dot_within_the_bar_of_its_seed() -> None:
     arms = {"uniform": {0: 0.5, 3: 0.7}, "inner": {3: 0.4, 0: 0.6, 7: 0.55}}
     others = {name: {1: 0.5} for name in arms}
-    figure = draw_seeds([[SeedPanel("a", arms), SeedPanel("b", others)]], "share", 0.5)
+    figure = draw_seeds([[SeedPanel("a", arms), SeedPanel("b", others)]])
     panel, other = figure.axes
     assert (panel.get_title(), other.get_title()) == ("a", "b")
     assert [text.get_text() for text in panel.get_xticklabels()] == ["0", "3", "7"]
@@ -32,6 +32,6 @@ def test_every_run_is_a_dot_within_the_bar_of_its_seed() -> None:
 
 
 def test_a_panel_without_runs_is_empty() -> None:
-    figure = draw_seeds([[SeedPanel("none", {"uniform": {}})]], "share", 0.5)
+    figure = draw_seeds([[SeedPanel("none", {"uniform": {}})]])
     (panel,) = figure.axes
     assert not panel.patches

@@ -23,7 +23,7 @@ MARGINS = {
 """The outcomes that effects are estimated for, and the largest difference that counts as none."""
 
 LEAST_SEEDS = 3
-"""An effect needs so many seeds that have a run of each arm."""
+"""An effect, or a correlation, needs so many seeds that have a run of each arm."""
 
 ATTENTION = "inner − uniform, mean over credits and λ"
 CREDIT = "team − helpers credit, mean over attentions and λ"

@@ -14,11 +14,9 @@ from numpy.typing import ArrayLike
 from scipy.stats import f as fisher
 
 from innerattn.experiments.crossed.arms import CREDITS, CROSSED, Credit
+from innerattn.experiments.crossed.effects import LEAST_SEEDS
 from innerattn.experiments.crossed.outcome import Outcomes, by_seed
 from innerattn.stats import Estimate
-
-LEAST_SEEDS = 3
-"""A correlation needs so many seeds that have a run of each arm."""
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from innerattn.experiments.crossed.arms import SWAPPED
+from innerattn.experiments.crossed.effects import LEAST_SEEDS
 from innerattn.experiments.crossed.outcome import outcome_of
-from innerattn.experiments.crossed.seed_effect import LEAST_SEEDS, intraclass_correlation
+from innerattn.experiments.crossed.seed_effect import intraclass_correlation
 from innerattn.experiments.run import FinishedRun
 from innerattn.stats import Estimate
 

@@ -13,7 +13,9 @@ from typing import Literal
 
 from innerattn.experiments.paper.fig4 import PRINTED_NATS, EntropyCourse
 from innerattn.experiments.paper.fig5 import Evidence
+from innerattn.experiments.paper.pairs import LEAST_PAIRS
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION
+from innerattn.experiments.run import OfMethod
 from innerattn.measures.sharing.evenness import MARGIN
 from innerattn.stats import Estimate
 from innerattn.stats.text import NONE, format_estimate, format_number, format_signed
@@ -29,9 +31,6 @@ MOVES = "attention moves to the next partner"
 MOVES_MORE = "attention moves more than the bystander's"
 CLAIMS = (EVEN_WITH, UNEVEN_WITHOUT, MORE_EVEN, ENDS_BELOW, FALLS, MOVES, MOVES_MORE)
 """All claims in the order of tables."""
-
-LEAST_PAIRS = 3
-"""Two methods are compared over so many seeds that have a run of each, or not at all."""
 
 LEAST_MOVE = 0.05
 """The smallest change of a weight that counts as a move."""
@@ -112,7 +111,7 @@ def entropy_claims(courses: Sequence[EntropyCourse]) -> list[Claim]:
         begin, end, change, even = course.begin, course.end, course.change, course.even_nats
         least_fall = ENTROPY_MARGIN * even
         claims += [
-            _claim(
+            claim_about(
                 course,
                 ENDS_BELOW,
                 (f"about {PRINTED_NATS} of {math.log(3):.2f} nats", f"{PRINTED_NATS} nats"),
@@ -120,7 +119,7 @@ def entropy_claims(courses: Sequence[EntropyCourse]) -> list[Claim]:
                 f"{format_number(end.mean)} nats",
                 _decided(end, EVEN_ENTROPY * even),
             ),
-            _claim(
+            claim_about(
                 course,
                 FALLS,
                 (f"falls to about {PRINTED_NATS} nats", "falls"),
@@ -140,7 +139,7 @@ def handoff_claims(found: Sequence[Evidence]) -> list[Claim]:
         before, control = part.robot["before"].change, part.control["to_be"].change
         moves = handoff_moves(change)
         claims += [
-            _claim(
+            claim_about(
                 part,
                 MOVES,
                 ("rises on the next partner, falls on the last", "rises"),
@@ -148,8 +147,9 @@ def handoff_claims(found: Sequence[Evidence]) -> list[Claim]:
                 f"({sum(part.handoffs):,} handoffs)",
                 format_signed(change.mean) if change else NONE,
                 moves,
+                part.runs,
             ),
-            _claim(
+            claim_about(
                 part,
                 MOVES_MORE,
                 ("taken for granted", NONE),
@@ -157,6 +157,7 @@ def handoff_claims(found: Sequence[Evidence]) -> list[Claim]:
                 f"of at most {format_estimate(part.ceiling)}",
                 format_signed(own.mean) if own else NONE,
                 handoff_is_own(part) if moves == "yes" else "undecided",
+                part.runs,
             ),
         ]
     return claims
@@ -181,15 +182,26 @@ def handoff_is_own(found: Evidence) -> Holds:
     return "no" if beyond_half.high < 0.0 else "undecided"
 
 
-def _claim(
-    found: EntropyCourse | Evidence,
+def claim_about(
+    found: OfMethod,
     claim: str,
     printed: tuple[str, str],
     measured: str,
     brief: str,
     holds: Holds,
+    runs: int | None = None,
 ) -> Claim:
-    """A claim about a situation and method; the paper's words stand beside one situation only."""
+    """A claim about a situation and method; the paper's words stand beside one situation only.
+
+    Args:
+        found: what it is about; ``runs`` says over how many, if not over all of its seeds.
+        claim: one of `CLAIMS`.
+        printed: what the paper prints, and the same in a word or two.
+        measured: what the runs show.
+        brief: the same in one or two numbers.
+        holds: by `RULES`.
+        runs: see ``found``.
+    """
     known = found.situation == PRINTED_SITUATION
     return Claim(
         claim=claim,
@@ -199,7 +211,7 @@ def _claim(
         printed_brief=printed[1] if known else NONE,
         measured=measured,
         brief=brief,
-        runs=found.end.runs if isinstance(found, EntropyCourse) else found.runs,
+        runs=len(found.seeds) if runs is None else runs,
         holds=holds,
     )
 

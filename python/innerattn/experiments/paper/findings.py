@@ -8,11 +8,6 @@ from dataclasses import dataclass
 from innerattn.experiments.paper.claims import CLAIMS, Claim, entropy_claims, handoff_claims
 from innerattn.experiments.paper.fig4 import EntropyCourse, fig4
 from innerattn.experiments.paper.fig5 import Evidence, evidence
-from innerattn.experiments.paper.imbalance_score import (
-    ImbalanceScoreCorrelation,
-    imbalance_score_correlations,
-)
-from innerattn.experiments.paper.pairs import Pair, Together, pairs, together
 from innerattn.experiments.paper.scene import HandoffScene, choose_scene
 from innerattn.experiments.paper.sharing_claims import sharing_claims
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION, Table2, table2
@@ -28,21 +23,6 @@ PARTS = ("table2", "fig4", "fig5")
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """What stands beside Table II: is attention, or evenness, any good?
-
-    Attributes:
-        pairs: learnt and uniform attention, seed by seed.
-        together: the same over all situations.
-        imbalance_score: how imbalance goes with the score.
-    """
-
-    pairs: tuple[Pair, ...]
-    together: tuple[Together, ...]
-    imbalance_score: tuple[ImbalanceScoreCorrelation, ...]
-
-
-@dataclass(frozen=True)
 class Findings:
     """What runs show; a part that was not asked for is None.
 
@@ -51,7 +31,6 @@ class Findings:
         in_full: those that are not archived, which Fig. 4 and Fig. 5 are made of.
         claims: all claims that can be asked of the parts, in the order of `CLAIMS`.
         table: Table II.
-        comparison: what stands beside it; there where the table is.
         courses: Fig. 4.
         scene: the handoff that is shown as Fig. 5; None, too, where there is none to show.
         evidence: Fig. 5 over all handoffs.
@@ -61,7 +40,6 @@ class Findings:
     in_full: tuple[FinishedRun, ...]
     claims: tuple[Claim, ...]
     table: Table2 | None
-    comparison: Comparison | None
     courses: tuple[EntropyCourse, ...] | None
     scene: HandoffScene | None
     evidence: tuple[Evidence, ...] | None
@@ -109,18 +87,10 @@ def find(runs: Sequence[FinishedRun], parts: Collection[str] = PARTS) -> Finding
         in_full=in_full,
         claims=tuple(sorted(claims, key=lambda claim: CLAIMS.index(claim.claim))),
         table=table,
-        comparison=compare(table) if table else None,
         courses=courses,
         scene=_scene(groups_in_full) if "fig5" in parts else None,
         evidence=found,
     )
-
-
-def compare(table: Table2) -> Comparison:
-    """What stands beside Table II."""
-    beside = table.competence
-    correlations = imbalance_score_correlations(beside)
-    return Comparison(tuple(pairs(beside)), tuple(together(beside)), tuple(correlations))
 
 
 def _scene(groups: Sequence[Sequence[FinishedRun]]) -> HandoffScene | None:

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from innerattn.experiments.paper.claims import LEAST_PAIRS
 from innerattn.experiments.paper.competence import Competence
+from innerattn.experiments.paper.pairs import LEAST_PAIRS
 from innerattn.policies import SCRIPTED
 from innerattn.stats import Estimate
 from innerattn.stats.permutation import permutation_test

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from innerattn.experiments.paper.claims import LEAST_PAIRS
 from innerattn.experiments.paper.competence import Competence
 from innerattn.measures.sharing.evenness import MARGIN
 from innerattn.stats import Estimate
 from innerattn.stats.aggregate import improvement_interval, iqm_interval
 from innerattn.stats.comparison import Contrast, contrast
 from innerattn.stats.seeds import seed_estimate
+
+LEAST_PAIRS = 3
+"""Two methods are compared over so many seeds that have a run of each, or not at all."""
 
 MARGINS = {"score": 0.05, "imbalance": 0.5 - MARGIN[0]}
 """The values that are compared, and the largest difference that counts as none."""

@@ -47,7 +47,7 @@ TEXT = {
     ("td-inner", "task_1"): (0.52, 0.48),
     ("td-uniform", "task_1"): (0.90, 0.10),
 }
-"""Shares that section IV states beside the table, by method and task."""
+"""Shares that section IV states beside the table, by method and task: others than the table's."""
 
 
 @dataclass(frozen=True)
@@ -86,26 +86,19 @@ def implied_rescues(row: PrintedRow) -> tuple[float, float]:
     return fewest, most
 
 
-def checked_table(rescues: int = COMMON_RESCUES) -> tuple[CheckedRow, ...]:
-    """Table II worked out again at one common number of rescues.
-
-    Raises:
-        ValueError: there are no rescues.
-    """
-    if rescues < 1:
-        raise ValueError(f"rescues = {rescues}: must be 1 or more")
-    return tuple(_checked(row, rescues) for row in TABLE_II)
+def checked_table() -> tuple[CheckedRow, ...]:
+    """Table II worked out again at one common number of rescues."""
+    return tuple(map(_checked, TABLE_II))
 
 
-def _checked(row: PrintedRow, rescues: int) -> CheckedRow:
+def _checked(row: PrintedRow) -> CheckedRow:
     fewest, most = implied_rescues(row)
-    chi_squared = chi_squared_of(row.shares[0], rescues)
-    stated = TEXT.get((row.method, row.task), row.shares)
+    chi_squared = chi_squared_of(row.shares[0], COMMON_RESCUES)
     return CheckedRow(
         row=row,
         implied_rescues=(fewest, most),
         chi_squared=chi_squared,
         rejected=bool(chdtrc(1, chi_squared) < 0.05),
-        consistent=fewest <= rescues <= most,
-        text_shares=stated if stated != row.shares else None,
+        consistent=fewest <= COMMON_RESCUES <= most,
+        text_shares=TEXT.get((row.method, row.task)),
     )

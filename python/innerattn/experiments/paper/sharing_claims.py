@@ -10,9 +10,10 @@ from innerattn.experiments.paper.claims import (
     UNEVEN_WITHOUT,
     Claim,
     Holds,
+    claim_about,
 )
-from innerattn.experiments.paper.pairs import Pair, pairs
-from innerattn.experiments.paper.printed import TEXT, PrintedRow
+from innerattn.experiments.paper.pairs import Pair
+from innerattn.experiments.paper.printed import PrintedRow
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import Verdict
 from innerattn.stats import Estimate
@@ -26,7 +27,7 @@ def sharing_claims(table: Table2) -> list[Claim]:
         rows.setdefault((row.situation, row.method), []).append(row)
     compared = {
         (pair.situation, f"{pair.algorithm}-inner"): pair
-        for pair in pairs(table.competence)
+        for pair in table.pairs
         if pair.measure == "imbalance"
     }
     claims = []
@@ -36,20 +37,18 @@ def sharing_claims(table: Table2) -> list[Claim]:
         verdicts = [judged(row) for row in own]
         inner = method.endswith("-inner")
         wanted, other = ("even", "uneven") if inner else ("uneven", "even")
+        told = [row.printed.row.shares[0] for row in own if row.printed]
         claims.append(
-            Claim(
-                claim=EVEN_WITH if inner else UNEVEN_WITHOUT,
-                situation=situation,
-                method=method,
-                printed="; ".join(filter(None, map(_printed_share, own))) or NONE,
-                printed_brief=", ".join(
-                    format_number(row.printed.row.shares[0]) for row in own if row.printed
-                )
-                or NONE,
-                measured="; ".join(_measured_share(row) for row in own),
-                brief=", ".join(_share(row.scored) for row in own),
-                runs=len(own[0].seeds),
-                holds=_all_or_one(verdicts, wanted, other),
+            claim_about(
+                own[0],
+                EVEN_WITH if inner else UNEVEN_WITHOUT,
+                (
+                    "; ".join(filter(None, map(_printed_share, own))) or NONE,
+                    ", ".join(map(format_number, told)) or NONE,
+                ),
+                "; ".join(map(_measured_share, own)),
+                ", ".join(_share(row.scored) for row in own),
+                _all_or_one(verdicts, wanted, other),
             )
         )
         pair = compared.get((situation, method))
@@ -90,7 +89,7 @@ def _all_or_one(verdicts: Sequence[Verdict], wanted: str, other: str) -> Holds:
 def _printed_share(row: Row) -> str:
     if row.printed is None:
         return ""
-    stated = TEXT.get((row.method, row.task))
+    stated = row.printed.text_shares
     text = f" (in its text {stated[0]:.2f})" if stated else ""
     return f"{row.task} {row.printed.row.shares[0]:.2f}{text}"
 
@@ -124,17 +123,9 @@ def _contrast(pair: Pair, inner: Sequence[Row], uniform: Sequence[Row]) -> Claim
         if row.printed and other.printed
     ]
     gain = sum(with_ - without for _, with_, without in printed) / max(len(printed), 1)
-    return Claim(
-        claim=MORE_EVEN,
-        situation=pair.situation,
-        method=inner[0].method,
-        printed="; ".join(f"{task} {a:.2f}, uniform {b:.2f}" for task, a, b in printed) or NONE,
-        printed_brief=format_signed(gain) if printed else NONE,
-        measured=measured,
-        brief=brief,
-        runs=len(pair.seeds),
-        holds=holds,
-    )
+    told = "; ".join(f"{task} {a:.2f}, uniform {b:.2f}" for task, a, b in printed) or NONE
+    both = (told, format_signed(gain) if printed else NONE)
+    return claim_about(inner[0], MORE_EVEN, both, measured, brief, holds, len(pair.seeds))
 
 
 def _distance(printed: PrintedRow) -> float:

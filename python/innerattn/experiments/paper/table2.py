@@ -16,6 +16,11 @@ from numpy.typing import NDArray
 
 from innerattn.errors import RunError
 from innerattn.experiments.paper.competence import Competence, competence, scripted_competence
+from innerattn.experiments.paper.imbalance_score import (
+    ImbalanceScoreCorrelation,
+    imbalance_score_correlations,
+)
+from innerattn.experiments.paper.pairs import Pair, Together, pairs, together
 from innerattn.experiments.paper.printed import CheckedRow, checked_table
 from innerattn.experiments.run import FinishedRun, OfMethod
 from innerattn.measures.cooperation import count_cooperation
@@ -85,10 +90,21 @@ class Row(OfMethod):
 
 @dataclass(frozen=True)
 class Table2:
-    """All rows, and beside evenness the competence of the same runs and of scripted policies."""
+    """Table II, and what stands beside it: is attention, or evenness, any good?
+
+    Attributes:
+        rows: how runs share tasks.
+        competence: of the same runs, and of scripted policies.
+        pairs: learnt and uniform attention, seed by seed.
+        together: the same over all situations.
+        imbalance_score: how imbalance goes with the score.
+    """
 
     rows: tuple[Row, ...]
     competence: tuple[Competence, ...]
+    pairs: tuple[Pair, ...]
+    together: tuple[Together, ...]
+    imbalance_score: tuple[ImbalanceScoreCorrelation, ...]
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``table2.json``."""
@@ -145,7 +161,13 @@ def table2(groups: Sequence[Sequence[FinishedRun]]) -> Table2:
     for situation in dict.fromkeys(row.situation for row in rows):
         own = [group for group in groups if group[0].situation == situation]
         beside += scripted_competence(max(own, key=len))
-    return Table2(tuple(rows), tuple(beside))
+    return Table2(
+        rows=tuple(rows),
+        competence=tuple(beside),
+        pairs=tuple(pairs(beside)),
+        together=tuple(together(beside)),
+        imbalance_score=tuple(imbalance_score_correlations(beside)),
+    )
 
 
 def _counts(records: Sequence[Record]) -> dict[str, NDArray[np.int64]]:

@@ -51,8 +51,7 @@ def write(
         "runs": listed_runs(runs, out),
     }
     folder.json("swapped.json", document)
-    panels = [seed_panel(one) for one in found]
-    folder.draw("swapped", draw_seeds([panels], "share of the first food robot", 0.5))
+    folder.draw("swapped", draw_seeds([[seed_panel(one) for one in found]]))
     folder.markdown("swapped.md", swapped_page(found, budget, left_out))
     return found
 

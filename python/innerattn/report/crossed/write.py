@@ -68,8 +68,7 @@ def write(
     folder.markdown("crossed.md", crossed_page(situations, budget, left_out))
     folder.markdown("crossed_tables.md", crossed_tables(situations))
     folder.draw("crossed", draw_arms([arm_panels(situation) for situation in situations]))
-    shares = draw_seeds(seed_panels(situations), "share of the first food robot", 0.5)
-    folder.draw("crossed_seeds", shares)
+    folder.draw("crossed_seeds", draw_seeds(seed_panels(situations)))
     return situations
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from innerattn.experiments.paper.claims import RULES
-from innerattn.experiments.paper.findings import Comparison, Findings
+from innerattn.experiments.paper.findings import Findings
 from innerattn.experiments.paper.scene import SCENE_RULE
 from innerattn.experiments.paper.table2 import PRINTED_SITUATION, Table2
 from innerattn.report.folder import left_out_list
@@ -35,8 +35,8 @@ def report_page(findings: Findings, budget: str, left_out: Sequence[str]) -> str
     """
     parts = ["# Which of the paper's claims hold?\n", *left_out_list(left_out)]
     parts += [_opening(findings, budget), "## How claims are decided\n", RULES]
-    if findings.table is not None and findings.comparison is not None:
-        parts += [_sharing(findings.table), _compared(findings.comparison)]
+    if findings.table is not None:
+        parts += [_sharing(findings.table), _compared(findings.table)]
     if findings.courses is not None:
         parts.append(_fig4(findings))
     if findings.evidence is not None:
@@ -90,7 +90,7 @@ def _sharing(table: Table2) -> str:
     )
 
 
-def _compared(found: Comparison) -> str:
+def _compared(found: Table2) -> str:
     text = ""
     if found.pairs:
         text += (

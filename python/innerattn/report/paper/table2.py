@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from innerattn.experiments.paper.findings import Comparison
 from innerattn.experiments.paper.sharing_claims import share_shown, verdicts_shown
 from innerattn.experiments.paper.table2 import Row, Sharing, Table2
 from innerattn.measures.sharing.evenness import MARGIN, ChiSquared, Evenness, EvennessOfRuns
@@ -36,19 +35,19 @@ rescues_per_episode score
 """
 
 
-def table2_markdown(table: Table2, comparison: Comparison) -> str:
+def table2_markdown(table: Table2) -> str:
     """The long tables: both attentions, then sharing, every run and competence by situation."""
     parts = ["# Table II, and how well the same runs do\n", _TERMS, competence_terms()]
-    if comparison.pairs:
+    if table.pairs:
         parts += [
             "## Learnt attention beside uniform attention\n",
-            markdown(pairs_table(comparison.pairs)),
+            markdown(pairs_table(table.pairs)),
             "Each seed gives one difference; p is of the paired t-test. *Alike*: two one-sided "
             "tests at 5 % put the difference within the margin.\n",
         ]
-    if comparison.together:
+    if table.together:
         parts += [
-            markdown(together_table(comparison.together)),
+            markdown(together_table(table.together)),
             "Interquartile means of the score over situations, and the probability that a run "
             "with learnt attention scores higher (Agarwal et al. 2021). The bootstrap takes runs "
             "of one seed as independent, so intervals are too short where runs are few.\n",

@@ -75,9 +75,9 @@ def write_report(
 
 def _write(folder: ReportFolder, findings: Findings, left_out: Sequence[str]) -> None:
     """Write the report and the files of the parts that there are."""
-    if findings.table is not None and findings.comparison is not None:
+    if findings.table is not None:
         folder.json("table2.json", findings.table.to_json())
-        folder.markdown("table2.md", table2_markdown(findings.table, findings.comparison))
+        folder.markdown("table2.md", table2_markdown(findings.table))
         folder.csv("table2.csv", table2_csv(findings.table))
     if findings.courses is not None:
         folder.json("fig4.json", fig4_json(findings.courses))

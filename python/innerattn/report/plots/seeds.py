@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STYLES = ((VERMILION, "s"), (BLUE, "o"), (BLUE, "^"), (SKY, "v"))
+_EVEN = 0.5  # share
 _REACH = 0.18  # from the first arm of a seed to its place, in places
 
 
@@ -30,13 +31,10 @@ class SeedPanel:
     arms: Mapping[str, Mapping[int, float]]
 
 
-def draw_seeds(rows: Sequence[Sequence[SeedPanel]], label: str, even: float) -> Figure:
-    """A column of dots for each seed, with a bar from the least to the largest.
+def draw_seeds(rows: Sequence[Sequence[SeedPanel]]) -> Figure:
+    """A column of dots for each seed, with a bar from the least to the largest; at least one row.
 
-    Args:
-        rows: of panels, at least one.
-        label: what the values are.
-        even: value in the middle of each panel, with a line.
+    Values are shares of the first food robot; even ones are in the middle, with a line.
     """
     from matplotlib.figure import Figure
 
@@ -46,25 +44,25 @@ def draw_seeds(rows: Sequence[Sequence[SeedPanel]], label: str, even: float) -> 
     handles: dict[str, Any] = {}
     for row, drawn in enumerate(rows):
         for column, part in enumerate(drawn):
-            handles |= _panel(panels[row, column], part, even)
-        panels[row, 0].set_ylabel(label, fontsize=8)
+            handles |= _panel(panels[row, column], part)
+        panels[row, 0].set_ylabel("share of the first food robot", fontsize=8)
     for panel in panels[-1]:
         panel.set_xlabel("seed", fontsize=8)
     values = [x for row in rows for part in row for arm in part.arms.values() for x in arm.values()]
-    reach = max((abs(value - even) for value in values), default=0.0) + 0.05
-    panels[0, 0].set_ylim(even - reach, even + reach)
+    reach = max((abs(value - _EVEN) for value in values), default=0.0) + 0.05
+    panels[0, 0].set_ylim(_EVEN - reach, _EVEN + reach)
     legend_below(figure, handles)
     return figure
 
 
-def _panel(panel: Axes, part: SeedPanel, even: float) -> dict[str, Any]:
+def _panel(panel: Axes, part: SeedPanel) -> dict[str, Any]:
     """Draw one; what a legend shows."""
     by_seed: dict[int, list[float]] = {}
     for arm in part.arms.values():
         for seed, value in arm.items():
             by_seed.setdefault(seed, []).append(value)
     places = {seed: place for place, seed in enumerate(sorted(by_seed))}
-    panel.axhline(even, color=BLACK, linewidth=0.7, linestyle=":")
+    panel.axhline(_EVEN, color=BLACK, linewidth=0.7, linestyle=":")
     for seed, values in by_seed.items():
         least, most = min(values), max(values)
         panel.bar(places[seed], most - least, 0.6, least, color="#E4E4E4", zorder=0)

@@ -18,7 +18,7 @@ from innerattn.stats import Estimate
 if TYPE_CHECKING:
     from innerattn.config import Scenario
     from innerattn.evaluate import Performance, Summary
-    from innerattn.experiments.score_means import SeedScores, TwoLengths
+    from innerattn.experiments.score_means import MeanScores, SeedScores, TwoLengths
 
 _POLICIES = (
     "random: any action, each with the same chance",
@@ -90,20 +90,19 @@ def print_seeds(console: Console, scores: SeedScores | None) -> None:
 
 def result_line(summary: Summary) -> str:
     """What an evaluation found, in one line."""
-    found = summary.standard
-    return (
-        f"{plus_minus(found.rescues_per_episode)} rescues per episode of {found.episode_steps} "
-        f"steps, score {plus_minus(found.score)}"
-    )
+    return _scored(summary.standard)
 
 
 def seeds_line(scores: SeedScores) -> str:
     """The mean over seeds, in one line."""
-    found = scores.mean[0]
     used = sum(two is not None for two in scores.by_seed.values())
+    return f"{_scored(scores.mean[0])}, mean of {used} of {len(scores.by_seed)} seeds"
+
+
+def _scored(found: Performance | MeanScores) -> str:
     return (
         f"{plus_minus(found.rescues_per_episode)} rescues per episode of {found.episode_steps} "
-        f"steps, score {plus_minus(found.score)}, mean of {used} of {len(scores.by_seed)} seeds"
+        f"steps, score {plus_minus(found.score)}"
     )
 
 
