@@ -247,7 +247,7 @@ def test_robustness_is_measured_once_and_then_read(
     assert robustness() == 0
     out, err = capsys.readouterr()
     assert "1 run, 1 done, 0 failed, 0 to do\n" in out
-    assert err == ""
+    assert all("% |" in line for line in err.splitlines()), "progress alone, where it takes long"
     (measured,) = (where / "faults").iterdir()
     texts = [(where / name).read_bytes() for name in ("robustness.json", "robustness.md")]
     assert b"not measured" not in texts[1]
