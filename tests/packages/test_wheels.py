@@ -88,7 +88,7 @@ def test_the_page_and_the_workflow_name_targets_that_the_makefile_has(
 
 
 def a_wheel(folder: Path, tag: str, content: bytes, name: str = "_core.abi3.so") -> Path:
-    file = folder / f"innerattn-0.1.0-cp311-abi3-{tag}.whl"
+    file = folder / f"innerattn-0.2.0-cp311-abi3-{tag}.whl"
     with zipfile.ZipFile(file, "w") as archive:
         archive.writestr(f"innerattn/{name}", content)
     return file
