@@ -52,6 +52,8 @@ def test_a_run_and_a_script_are_written(run_dir: Path, tmp_path: Path) -> None:
     assert main(["page", "random", "-o", str(out), "--preset", "air-ground"]) == 0
     assert [one["name"] for one in given(out)["policies"]] == ["random"]
     assert len(given(out)["worlds"]["layers"]) == 2
+    assert main(["page", "greedy", str(run_dir), "-o", str(out)]) == 0
+    assert len(given(out)["worlds"]["robots"]) == 4, "a team for one size takes nobody in"
 
 
 def test_a_policy_for_any_team_is_written_for_the_team_of_a_file(tmp_path: Path) -> None:
@@ -61,8 +63,15 @@ def test_a_policy_for_any_team_is_written_for_the_team_of_a_file(tmp_path: Path)
     assert main(["page", "zoo:any", "--scenario", str(file), "-o", str(out)]) == 0
     found = given(out)
     assert [one["name"] for one in found["policies"]] == ["any", "random", "greedy", "hungarian"]
-    assert [one["name"] for one in found["worlds"]["robots"]] == [one.name for one in TEAM.robots]
+    robots = [one["name"] for one in found["worlds"]["robots"] if "is_spare" not in one]
+    assert robots == [one.name for one in TEAM.robots]
+    assert len(found["policies"][0]["team"]["known"]["bodies"]) == 11
+    words = ["--scenario", str(file), "--spare", "0", "-o", str(out)]
+    assert main(["page", "zoo:any", "hungarian", *words]) == 0
+    found = given(out)
     assert len(found["policies"][0]["team"]["known"]["bodies"]) == 5
+    assert not any("is_spare" in one for one in found["worlds"]["robots"])
+    assert json.loads(found["scenario"])["unavailable_robots"] == "stay"
 
 
 def test_two_policies_stand_side_by_side(
@@ -108,6 +117,13 @@ def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
         (1, ["oracle"], "oracle: a page has no such script"),
         (1, ["zoo:any", "--preset", "mixed-sight"], "policies for any team see everything"),
         (1, [str(tmp_path)], f"{tmp_path}/run.json: missing"),
+        (2, ["random", "--spare", "-1"], "--spare -1: must be 0 to 63"),
+        (
+            1,
+            ["random", "--spare", "21"],
+            "--spare 21: scenario.robots (their number) = 67: must be",
+        ),
+        (1, ["random", str(run_dir), "--spare", "1"], "--spare 1: must be 0 with "),
         (2, ["random", "--seed", "-1"], "--seed -1: must be 0 to 2**63 - 1"),
         (2, ["random", "-o", "page.gif"], "-o page.gif: must end in .html"),
         (1, ["random", "-o", str(tmp_path / "none" / "page.html")], "none: no such folder"),

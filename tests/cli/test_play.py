@@ -69,6 +69,8 @@ def test_wrong_use(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
             (1, [str(tmp_path)], f"{tmp_path}/run.json: missing"),
             (2, ["greedy", "--port", "70000"], "--port 70000: must be 0 to 65,535"),
             (2, ["greedy", "--seed", "-1"], "--seed -1: must be 0 to 2**64 - 1"),
+            (2, ["greedy", "--spare", "64"], "--spare 64: must be 0 to 63"),
+            (1, ["zoo:mixed", "--spare", "2"], "acts in teams of 4 robots alone"),
             (1, ["greedy", "--port", port], f"--port {port}: is taken"),
             (1, ["greedy", "--scenario", "none.toml"], "none.toml"),
             (1, [str(run_dir), "--scenario", str(other)], "was trained for other observations"),

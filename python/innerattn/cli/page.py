@@ -10,11 +10,13 @@ import tyro
 
 from innerattn.cli.options import Command, UsageError, check_seed, check_target
 from innerattn.cli.runs import named_policy, shown_names
+from innerattn.cli.spares import check_spare, spared
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.config.files import write_whole
 from innerattn.policies import SCRIPTS
 
 if TYPE_CHECKING:
+    from innerattn.config import RunConfig
     from innerattn.report.page.team import PageTeam
 
 
@@ -33,6 +35,9 @@ class Page(Command):
     """TOML file with the scenario to play in; None: that of the first run, or mixed."""
     seed: int | None = None
     """Seed of the world; None: as the first run says, or 12345."""
+    spare: int | None = None
+    """Robots of each kind that wait to be added, with a policy for any team or scripts; None: 2, or
+    as many as there is room for."""
 
     def run(self) -> int:
         """Write the file.
@@ -45,22 +50,23 @@ class Page(Command):
             OSError: the file cannot be written.
         """
         self._check()
+        from innerattn.records.run_folder import read_config
         from innerattn.report.page.page import worlds_page
         from innerattn.report.page.scripts import page_scripts
         from innerattn.report.page.team import read_team
 
-        names, worlds = shown_names(self.policies, SCRIPTS), self._worlds()
+        names = shown_names(self.policies, SCRIPTS)
+        runs = [one for one in self.policies if one not in SCRIPTS]
+        config = read_config(runs[0]) if runs else None
+        own, settings = self._worlds(config), config.evaluate if config else EvaluateConfig()
+        worlds = spared(own, runs, self.spare)
         policies: dict[str, PageTeam | None] = {}
-        settings: EvaluateConfig | None = None
         for name, policy in zip(names, self.policies, strict=True):
-            policies[name] = team = None if policy in SCRIPTS else read_team(policy, worlds)
-            if team is not None:
-                worlds, settings = worlds or team.config.scenario, settings or team.config.evaluate
-        worlds, settings = worlds or Scenario.preset("mixed"), settings or EvaluateConfig()
+            policies[name] = None if policy in SCRIPTS else read_team(policy, worlds)
         seed = settings.seed if self.seed is None else self.seed
         scripts = {one: None for one in page_scripts(worlds) if one not in policies}
         title, beside = " beside ".join(names), names[1] if len(names) > 1 else ""
-        page = worlds_page(title, worlds, policies | scripts, seed, beside)
+        page = worlds_page(title, worlds, policies | scripts, seed, beside, own.num_robots)
         write_whole(self.output, page.encode(errors="backslashreplace"))
         print(f"{self.output}: {title}, {self.output.stat().st_size / 1e6:.1f} MB")
         return 0
@@ -73,10 +79,13 @@ class Page(Command):
         if self.output.suffix != ".html":
             raise UsageError(f"-o {self.output}: must end in .html")
         check_seed(self.seed)
+        check_spare(self.spare)
         check_target(self.output)
         self.policies = [named_policy(one, SCRIPTS) for one in self.policies]
 
-    def _worlds(self) -> Scenario | None:
+    def _worlds(self, config: RunConfig | None) -> Scenario:
         if self.scenario is not None:
             return Scenario.from_toml(self.scenario)
-        return None if self.preset is None else Scenario.preset(self.preset)
+        if self.preset is not None:
+            return Scenario.preset(self.preset)
+        return Scenario.preset("mixed") if config is None else config.scenario

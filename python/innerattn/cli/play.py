@@ -11,6 +11,7 @@ import tyro
 
 from innerattn.cli.options import Command, UsageError, check_seed
 from innerattn.cli.runs import named_policy, shown_names
+from innerattn.cli.spares import check_spare, spared
 from innerattn.config import EvaluateConfig, Scenario
 from innerattn.policies import SCRIPTS
 
@@ -31,6 +32,9 @@ class Play(Command):
     """TOML file with the scenario to play in; None: that of the first run, or mixed."""
     seed: int | None = None
     """Seed of the world; None: as the first run says, or 12345."""
+    spare: int | None = None
+    """Robots of each kind that wait to be added, with a policy for any team or scripts; None: 2, or
+    as many as there is room for."""
     port: int = 0
     """Port of 127.0.0.1; 0: any that is free."""
 
@@ -66,6 +70,7 @@ class Play(Command):
         if not 0 <= self.port < 65536:
             raise UsageError(f"--port {self.port}: must be 0 to 65,535")
         check_seed(self.seed, bits=64)
+        check_spare(self.spare)
         self.policies = [named_policy(one, SCRIPTS) for one in self.policies]
 
     @property
@@ -77,21 +82,27 @@ class Play(Command):
         from innerattn.evaluate.interactive import InteractiveWorld, endless
         from innerattn.evaluate.trained import load_trained
         from innerattn.policies import scripted_policy
+        from innerattn.policies.scripted.crew import CrewPolicy
         from innerattn.records.run_folder import read_config
 
         runs = [one for one in self.policies if one not in SCRIPTS]
         config = read_config(runs[0]) if runs else None
-        scenario = endless(self._scenario(config))
+        own = self._scenario(config)
+        scenario = endless(spared(own, runs, self.spare))
         settings = EvaluateConfig() if config is None else config.evaluate
         seed = settings.seed if self.seed is None else self.seed
         named = dict(zip(self._names, self.policies, strict=True))
         policies: dict[str, Policy] = {}
         for name, policy in {**named, **{one: one for one in SCRIPTS}}.items():
             if policy in SCRIPTS:
-                policies[name] = scripted_policy(policy, scenario, seed)
+                make = partial(scripted_policy, policy, seed=seed)
+                has_spares = scenario.num_robots > own.num_robots
+                policies[name] = (
+                    CrewPolicy(make, scenario, own.num_robots) if has_spares else make(scenario)
+                )
             else:  # somebody may blind a robot
                 policies[name] = load_trained(policy, scenario, each_sees=True)[1]
-        return InteractiveWorld(scenario, policies, seed)
+        return InteractiveWorld(scenario, policies, seed, own.num_robots)
 
     def _scenario(self, config: RunConfig | None) -> Scenario:
         if self.scenario is not None:

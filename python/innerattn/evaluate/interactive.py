@@ -44,13 +44,21 @@ class InteractiveWorld:
     as attention belongs to what the robots do next.
     """
 
-    def __init__(self, scenario: Scenario, policies: Mapping[str, Policy], seed: int = 0) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        policies: Mapping[str, Policy],
+        seed: int = 0,
+        num_own: int | None = None,
+    ) -> None:
         """Begin episode 0.
 
         Args:
             scenario: the world.
             policies: by the name to show; the first one acts.
             seed: of the world and of what policies draw, 0 to 2**63 - 1.
+            num_own: how many robots are the team, the first ones; the others are spare ones of
+                `innerattn.evaluate.spares`. None: all are the team.
 
         Raises:
             ValueError: there is no policy, or the seed is out of range.
@@ -58,6 +66,7 @@ class InteractiveWorld:
         if not policies:
             raise ValueError("policies is empty: must hold at least one")
         self.scenario = scenario
+        self.num_own = scenario.num_robots if num_own is None else num_own
         self.policies = dict(policies)
         self._seed = stream_seed(seed, "evaluation")
         self._env = BatchEnv(scenario, 1, self._seed, num_threads=1)
@@ -193,6 +202,31 @@ class InteractiveWorld:
             if kind not in HEALTHY:
                 raise ValueError(f"fault {kind!r}: must be one of {', '.join(HEALTHY)}")
             faults[kind][0, self._robot(robot)] = value
+        self._env.set_faults(faults)
+        self._changed()
+
+    def add_robot(self, kind: str) -> None:
+        """Let a spare robot of a kind into the arena, at a random free place and with no fault.
+
+        It is there until somebody makes it unavailable, or the episode ends.
+
+        Raises:
+            ValueError: there is no such kind, or all spare robots of the kind are in the arena.
+        """
+        spares = range(self.num_own, self.scenario.num_robots)
+        of_kind = [robot for robot in spares if self.scenario.robots[robot].kind == kind]
+        if not of_kind:
+            kinds = ", ".join(dict.fromkeys(self.scenario.robots[one].kind for one in spares))
+            known = f"must be one of {kinds}" if kinds else "no robot can be added to this world"
+            raise ValueError(f"kind = {kind!r}: {known}")
+        faults = self._env.fault_state()
+        robot = next((one for one in of_kind if faults["unavailable"][0, one] >= 1.0), None)
+        if robot is None:
+            raise ValueError(
+                f"all {len(of_kind)} spare {kind} robots are in the arena: take one out first"
+            )
+        for fault, healthy in HEALTHY.items():
+            faults[fault][0, robot] = healthy
         self._env.set_faults(faults)
         self._changed()
 

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from spare_robots import spared_world
 
 from innerattn.config import Scenario
 from innerattn.errors import RunError, WorldError
@@ -113,6 +114,9 @@ REFUSED = [
     ({"do": "add_victim", "task": 7, "x": 0, "y": 0}, "must be in 0..=1"),
     ({"do": "faults", "robot": 0, "values": {"motor_gain": 7}}, "motor_gain, env 0, robot 0"),
     ({"do": "faults", "robot": 0, "values": {"__class__": 1}}, "fault '__class__'"),
+    ({"do": "add_robot"}, "message: add_robot.kind: Field required"),
+    ({"do": "add_robot", "kind": 0}, "message: add_robot.kind: Input should be a valid string"),
+    ({"do": "add_robot", "kind": "food"}, "kind = 'food': no robot can be added to this world"),
     ({"do": "policy", "name": "../../run"}, "policy = '../../run': must be one of"),
 ]
 
@@ -135,9 +139,9 @@ json_values = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner),
     max_leaves=6,
 )
-fields = st.sampled_from(["robot", "x", "y", "vx", "vy", "slot", "task", "name", "values"])
+fields = st.sampled_from(["kind", "robot", "x", "y", "vx", "vy", "slot", "task", "name", "values"])
 kinds = st.sampled_from(
-    ["step", "move_robot", "push_robot", "faults", "add_victim", "steer", "policy"]
+    ["step", "move_robot", "push_robot", "faults", "add_robot", "add_victim", "steer", "policy"]
 )
 
 
@@ -154,6 +158,28 @@ def test_any_message_is_answered(kind: str, values: dict[str, Any], noise: bytes
 
 
 SHARED = Sessions(world)
+
+
+def test_robots_are_added_until_none_is_left(clock: Clock) -> None:
+    sessions = Sessions(lambda: spared_world(Scenario.preset("mixed"), 1, "greedy"), clock=clock)
+    path = opened(sessions)
+    add = {"do": "add_robot", "kind": "medical"}
+    status, state = sent(sessions, path, add)
+    assert (status, [one.get("unavailable", 0) for one in state["faults"]]) == (
+        200,
+        [0, 0, 0, 0, 1, 1, 0],
+    )
+    for message, text in (
+        (add, "all 1 spare medical robots are in the arena: take one out first"),
+        (add | {"kind": "tea"}, "kind = 'tea': must be one of food, navigation, medical"),
+    ):
+        before = sent(sessions, path, {"do": "look"})
+        status, answer = sent(sessions, path, message)
+        assert (status, answer["error"]) == (400, text)
+        assert sent(sessions, path, {"do": "look"}) == before
+    out = {"do": "faults", "robot": 6, "values": {"unavailable": 1.0}}
+    assert sent(sessions, path, out)[1]["faults"][6] == {"unavailable": 1.0}
+    assert sent(sessions, path, add)[1]["faults"][6] == {}
 
 
 def test_two_pages_do_not_disturb_each_other(sessions: Sessions) -> None:

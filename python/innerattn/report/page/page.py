@@ -39,6 +39,7 @@ def worlds_page(
     policies: Mapping[str, PageTeam | None],
     seed: int,
     beside: str = "",
+    num_own: int | None = None,
 ) -> str:
     """A page in which a person plays with a team; it loads nothing from elsewhere.
 
@@ -49,13 +50,15 @@ def worlds_page(
         seed: of the worlds, 0 to 2**63 - 1.
         beside: which of the policies acts in a second arena beside the first, in the same world;
             empty: there is none.
+        num_own: how many robots of ``scenario`` are the team, the first ones; the others are spare
+            ones of `innerattn.evaluate.spares`. None: all are the team.
 
     Raises:
         ConfigError: a page cannot compute such a script in these worlds.
     """
     code = (_FOLDER / WORLDS).read_bytes()
     packed = base64.b64encode(gzip.compress(code, 9, mtime=0)).decode()
-    given = page_document(scenario, policies, seed) | {"rust": packed}
+    given = page_document(scenario, policies, seed, num_own) | {"rust": packed}
     return filled_page(
         title,
         [(_FOLDER / "web" / name).read_text("utf-8") for name in _SCRIPTS],
@@ -66,7 +69,10 @@ def worlds_page(
 
 
 def page_document(
-    scenario: Scenario, policies: Mapping[str, PageTeam | None], seed: int
+    scenario: Scenario,
+    policies: Mapping[str, PageTeam | None],
+    seed: int,
+    num_own: int | None = None,
 ) -> dict[str, Any]:
     """What the page's world begins with, but for its code; arguments as of `worlds_page`."""
     worlds = endless(scenario)
@@ -75,7 +81,7 @@ def page_document(
     return {
         "scenario": worlds.model_dump_json(),
         "seed": str(stream_seed(seed, "evaluation")),
-        "worlds": playable_worlds(worlds),
+        "worlds": playable_worlds(worlds, num_own),
         "slots": [list(worlds.slots_of(task)) for task in range(len(worlds.tasks))],
         "rays": rays,
         "policies": [_policy(name, team, worlds) for name, team in policies.items()],

@@ -108,6 +108,17 @@ class SetFaults(_Message):
         world.set_faults(self.robot, self.values)
 
 
+class AddRobot(_Message):
+    """A spare robot of a kind comes into the arena."""
+
+    do: Literal["add_robot"]
+    kind: str = Field(max_length=100)
+
+    def apply(self, world: InteractiveWorld) -> None:
+        """Let it in."""
+        world.add_robot(self.kind)
+
+
 class MoveVictim(_Message):
     """A victim is put somewhere [m]."""
 
@@ -152,6 +163,7 @@ Message = (
     | MoveRobot
     | PushRobot
     | SetFaults
+    | AddRobot
     | MoveVictim
     | AddVictim
     | End

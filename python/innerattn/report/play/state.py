@@ -22,15 +22,23 @@ def opening_document(session: str, world: InteractiveWorld) -> dict[str, Any]:
     """What a page gets first: its session, the world, the policies, and the state."""
     return state_document(world.moment()) | {
         "session": session,
-        "worlds": playable_worlds(world.scenario),
+        "worlds": playable_worlds(world.scenario, world.num_own),
         "policies": list(world.policies),
     }
 
 
-def playable_worlds(scenario: Scenario) -> dict[str, Any]:
-    """What does not change while a page plays: the worlds, and what hands may do."""
+def playable_worlds(scenario: Scenario, num_own: int | None = None) -> dict[str, Any]:
+    """What does not change while a page plays: the worlds, and what hands may do.
+
+    Args:
+        scenario: the worlds.
+        num_own: as of `InteractiveWorld`; robots behind these are marked as spare.
+    """
     reach = np.float32(scenario.arena_half_width_m) - np.float32(scenario.wall_clearance_m)
-    return worlds_document(scenario) | {
+    worlds = worlds_document(scenario)
+    for robot in worlds["robots"][scenario.num_robots if num_own is None else num_own :]:
+        robot["is_spare"] = True
+    return worlds | {
         "most_push_mps": MOST_PUSH_MPS,
         "victim_reach_m": float(str(reach)),
         "num_victims": scenario.num_victims,

@@ -87,10 +87,11 @@ class Charts {
 
   distanceChart() {
     const { run, episode } = this;
-    const lines = run.worlds.robots.map((one) => ({
+    const all = run.worlds.robots.map((one) => ({
       ...this.lineOf(one.index, one.name, (step) => run.distance(episode, step, one.index)),
-      thick: one.index === this.robot,
+      thick: one.index === this.robot, isSpare: one.is_spare,
     }));
+    const lines = all.filter(({ isSpare, values }) => !isSpare || values.some((value) => !Number.isNaN(value)));
     return this.chart("Distance", "to the nearest victim that the robot can help, in m; dashed: rescue radius", lines, {
       low: 0, high: Math.max(0.5, ...known(lines)), text: (value) => value.toFixed(1), level: run.worlds.rescue_radius_m,
     });

@@ -54,6 +54,7 @@ function eventMark(type, x, y) {
     const corners = points(taskCorners(2, x, y + 1, 4.5));
     return svg("polygon", { points: corners, stroke: "var(--blocked)", ...common });
   }
+  if (type === "joining") return svg("path", { d: `M${x - 4} ${y}h8M${x} ${y - 4}v8`, stroke: "var(--accent)", ...common });
   if (type === "handoff") {
     const d = `M${x - 5} ${y - 3}h8l-3 -3m3 3l-3 3M${x + 5} ${y + 4}h-8`;
     return svg("path", { d, stroke: "var(--accent)", ...common });

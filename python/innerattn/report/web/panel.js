@@ -8,14 +8,16 @@ class RobotList {
       const button = element("button", { type: "button" },
         robotSymbol(worlds, robot), element("strong", { title: robot.name }, robot.name), count, note);
       button.addEventListener("click", () => choose(robot.index));
-      list.append(element("li", {}, button));
-      return { button, count, note };
+      const row = element("li", {}, button);
+      list.append(row);
+      return { row, button, count, note };
     });
   }
 
   show(run, episode, step, look) {
     this.worlds.robots.forEach((robot, index) => {
-      const { button, count, note } = this.rows[index];
+      const { row, button, count, note } = this.rows[index];
+      row.hidden = Boolean(robot.is_spare) && run.isAway(episode, step, index);
       button.setAttribute("aria-pressed", String(index === look.robot));
       count.textContent = counted(run.rescuesUntil(episode, step, index), "rescue");
       const faults = run.faultsAt(episode, step, index).map((one) => faultText(this.worlds, one));

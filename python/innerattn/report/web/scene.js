@@ -67,6 +67,8 @@ class Scene {
     const { context, run, worlds } = this, victims = run.victims[episode];
     Object.assign(this, { episode, step, look, paint, labels: [] });
     this.spots = worlds.robots.map((one) => this.spot(episode, step, one.index));
+    const shown = worlds.robots.filter(({ index, is_spare: isSpare }) => !isSpare || !Number.isNaN(this.spots[index][0]));
+    this.isSmall = shown.length <= FEW_ROBOTS;
     this.room = new Room(this.side, worlds.robots.map(({ index, radius_m: radius }) => (
       [...this.spots[index], radius * this.scale + (index === look.robot ? 6 : 2)]
     )));
@@ -86,7 +88,7 @@ class Scene {
     victims.forEach((victim) => this.faintly(hidden.includes(victim.id), () => this.drawNeeds(victim)));
     worlds.robots.forEach((robot) => this.faintly(away.includes(robot.index), () => this.drawRobot(robot)));
     // The list beside the arena has every weight.
-    if (worlds.robots.length <= FEW_ROBOTS) this.labels.forEach(([text, places]) => this.writeAt(text, places, true));
+    if (this.isSmall) this.labels.forEach(([text, places]) => this.writeAt(text, places, true));
     worlds.robots.forEach((robot) => this.drawName(robot));
   }
 
@@ -384,7 +386,7 @@ class Scene {
 
   drawName(robot) {
     const chosen = robot.index === this.look.robot;
-    if (this.worlds.robots.length > FEW_ROBOTS && !chosen) return;
+    if (!this.isSmall && !chosen) return;
     const [x, y] = this.spots[robot.index], away = robot.radius_m * this.scale + 9;
     const width = this.measure(robot.name, chosen), edge = width / 2 + 4;
     const lower = away + 0.7 * this.letters, beside = away + width / 2;

@@ -59,6 +59,12 @@ function handoffEvent(worlds, { robot, before, after, second }) {
   };
 }
 
+/** A spare robot comes into the arena, or leaves it. */
+function comingEvent(worlds, step, robot, comes) {
+  const text = `${worlds.robots[robot].name} ${comes ? "joins" : "leaves"}`;
+  return { step, type: comes ? "joining" : "leaving", robots: [robot], text };
+}
+
 function faultEvent(worlds, fault) {
   const { start, robot } = fault;
   return {

@@ -53,6 +53,7 @@ const DOES = {
   move_robot: (engine, { robot, x, y }) => engine.moveRobot(robot, x, y),
   push_robot: (engine, { robot, vx, vy }) => engine.pushRobot(robot, vx, vy),
   faults: (engine, { robot, values }) => engine.setFaults(robot, values),
+  add_robot: (engine, { kind }) => engine.addRobot(kind),
   move_victim: (engine, { slot, x, y }) => engine.moveVictim(slot, x, y),
   add_victim: (engine, { task, x, y }) => engine.addVictim(task, x, y),
 };
@@ -74,7 +75,7 @@ class Engine {
 
   policyOf({ name, team, weights, motion }) {
     if (motion) return new (name === "greedy" ? Greedy : Hungarian)(name, motion, this.continuous);
-    if (!team) return new Chance(name, this.size, this.continuous);
+    if (!team) return new Chance(name, this.continuous);
     return new (team.known ? AnyTeam : Team)(name, team, new Float32Array(bytesOf(weights).buffer));
   }
 
@@ -146,6 +147,34 @@ class Engine {
     this.changed();
   }
 
+  /** Lets a spare robot of a kind into the arena, with no fault. */
+  addRobot(kind) {
+    const spares = this.worlds.robots.flatMap((one, robot) => (one.is_spare ? [{ ...one, robot }] : []));
+    const ofKind = spares.filter((one) => one.kind === kind), away = this.away();
+    if (!ofKind.length) {
+      const kinds = [...new Set(spares.map((one) => one.kind))].join(", ");
+      throw new Refusal(`kind = '${kind}': ${kinds ? `must be one of ${kinds}` : "no robot can be added to this world"}`);
+    }
+    const free = ofKind.find(({ robot }) => away[robot]);
+    if (!free) throw new Refusal(`all ${ofKind.length} spare ${kind} robots are in the arena: take one out first`);
+    this.setFaults(free.robot, Object.fromEntries(this.worlds.fault_kinds.map(({ name, healthy }) => [name, healthy])));
+  }
+
+  /** Which robots are unavailable. */
+  away() {
+    const { fault_kinds: kinds } = this.worlds, kind = kinds.findIndex(({ name }) => name === "unavailable");
+    return rowsOf(this.world.take("faults"), kinds.length).map((levels) => levels[kind] >= 1);
+  }
+
+  /** The robots that scripts reckon with; see innerattn.policies.scripted.crew. */
+  crew() {
+    const { robots, tasks } = this.worlds, all = robots.map((_, robot) => robot);
+    if (!robots.some((one) => one.is_spare)) return all;
+    const away = this.away(), there = all.filter((robot) => !away[robot]);
+    const isAble = tasks.every(({ needs }) => canFill(needs, there.map((robot) => robots[robot].abilities)));
+    return isAble ? there : all.filter((robot) => !away[robot] || !robots[robot].is_spare);
+  }
+
   moveVictim(slot, x, y) {
     const victims = this.victims();
     if (!victims[slot]?.present) throw new Refusal(`slot = ${slot}: holds no victim`);
@@ -211,7 +240,7 @@ class Engine {
   /** What scripts see. */
   scene() {
     const [positions, velocities] = [this.world.take("positions"), this.world.take("velocities")];
-    return { positions, velocities, victims: this.victims() };
+    return { positions, velocities, victims: this.victims(), crew: this.crew() };
   }
 
   steeredAction() {

@@ -6,10 +6,16 @@ const OWN_SHARE = 0.3;
 const NEVER_S = 1e4;
 const PUSHES = [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]];
 
+/** The actions of all robots: some for a crew, and none for the others. */
+function ofAll(positions, crew, actions, nothing) {
+  const chosen = new Map(crew.map((robot, at) => [robot, actions[at]]));
+  return Array.from({ length: positions.length / 2 }, (_, robot) => chosen.get(robot) ?? nothing);
+}
+
 /** Every robot draws every action, all with the same chance. */
 class Chance {
-  constructor(name, robots, continuous) {
-    Object.assign(this, { name, robots, continuous });
+  constructor(name, continuous) {
+    Object.assign(this, { name, continuous });
     this.reset(0);
   }
 
@@ -17,11 +23,10 @@ class Chance {
     this.draws = new Draws(seed);
   }
 
-  act() {
-    const share = () => 2 * this.draws.next() - 1;
-    return Array.from({ length: this.robots }, () => (
-      this.continuous ? [share(), share()] : Math.floor(5 * this.draws.next())
-    ));
+  act(obs, scene) {
+    const { positions, crew } = scene(), share = () => 2 * this.draws.next() - 1;
+    const drawn = crew.map(() => (this.continuous ? [share(), share()] : Math.floor(5 * this.draws.next())));
+    return ofAll(positions, crew, drawn, this.continuous ? [0, 0] : 0);
   }
 
   attention() {
@@ -38,15 +43,16 @@ class Dispatcher {
 
   reset() {}
 
-  /** The actions of all robots; `scene` gives positions, velocities and victims by slot. */
+  /** The actions of all robots; `scene` gives positions, velocities, victims by slot, and who counts: the crew. */
   act(obs, scene) {
-    const seen = scene(), chosen = this.choose(seen);
-    return this.robots.map((robot, index) => {
-      const victim = seen.victims[chosen[index]], [x, y] = victim ? [victim.x, victim.y] : [0, 0];
-      const at = 2 * index, way = [x - seen.positions[at], y - seen.positions[at + 1]];
-      const speed = [seen.velocities[at], seen.velocities[at + 1]];
+    const seen = scene(), { positions, velocities, victims, crew } = seen, chosen = this.choose(seen);
+    const actions = crew.map((index, at) => {
+      const robot = this.robots[index], victim = victims[chosen[at]], [x, y] = victim ? [victim.x, victim.y] : [0, 0];
+      const way = [x - positions[2 * index], y - positions[2 * index + 1]];
+      const speed = [velocities[2 * index], velocities[2 * index + 1]];
       return this.continuous ? this.pushed(robot, way, speed) : this.moved(robot, way, speed);
     });
+    return ofAll(positions, crew, actions, this.continuous ? [0, 0] : 0);
   }
 
   /** The action after which the robot, coasting for a period more, is nearest to its target. */
@@ -82,9 +88,9 @@ class Dispatcher {
 
 /** Every robot goes to the nearest victim that it can help, whatever the others do. */
 class Greedy extends Dispatcher {
-  choose({ positions, victims }) {
-    return this.robots.map((robot, index) => {
-      const away = victims.map((victim) => {
+  choose({ positions, victims, crew }) {
+    return crew.map((index) => {
+      const robot = this.robots[index], away = victims.map((victim) => {
         if (!this.needs[0].some((_, need) => this.gives(robot, victim, need))) return Infinity;
         const [x, y] = [victim.x - positions[2 * index], victim.y - positions[2 * index + 1]];
         return x * x + y * y;
@@ -97,15 +103,16 @@ class Greedy extends Dispatcher {
 
 /** Robots are assigned to needs at the least total cost in arrival times. */
 class Hungarian extends Dispatcher {
-  choose({ positions, velocities, victims }) {
-    const needs = this.needs[0].length, times = this.robots.map((robot, index) => {
-      const two = (values) => values.subarray(2 * index, 2 * index + 2);
+  choose({ positions, velocities, victims, crew }) {
+    const robots = crew.map((index) => this.robots[index]);
+    const needs = this.needs[0].length, times = crew.map((index, at) => {
+      const robot = robots[at], two = (values) => values.subarray(2 * index, 2 * index + 2);
       return victims.map((victim) => this.arrival(robot, two(positions), two(velocities), victim));
     });
-    const costs = this.robots.map(() => Array(victims.length * needs).fill(FORBIDDEN));
+    const costs = robots.map(() => Array(victims.length * needs).fill(FORBIDDEN));
     victims.forEach((victim, slot) => {
       const givers = Array.from({ length: needs }, (_, need) => (
-        this.robots.flatMap((robot, index) => (this.gives(robot, victim, need) ? [index] : []))
+        robots.flatMap((robot, at) => (this.gives(robot, victim, need) ? [at] : []))
       ));
       const soonest = givers.map((some) => (some.length ? Math.min(...some.map((one) => times[one][slot])) : 0));
       const last = Math.max(...soonest);
@@ -147,6 +154,12 @@ function wholeTeams(costs, wanted, needs) {
   }
   const rest = assigned(left);
   return chosen.map((slot, robot) => (slot >= 0 ? slot : rest[robot]));
+}
+
+/** Whether robots with such abilities can fill all needs at once, each one of them. */
+function canFill(needs, abilities) {
+  const costs = abilities.map((able) => needs.map((need) => (able.includes(need) ? 0 : FORBIDDEN)));
+  return costs.length > 0 && assigned(costs).filter((need) => need >= 0).length === needs.length;
 }
 
 /** The cheapest column of each row, as `cheapest`; -1 where it is forbidden. */

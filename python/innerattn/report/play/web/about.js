@@ -3,13 +3,14 @@
 const MOST_TASKS = 3;
 
 function aboutText(worlds, attends, areTwo) {
-  const { robots, tasks } = worlds;
+  const { tasks } = worlds, robots = worlds.robots.filter((one) => !one.is_spare);
   const needs = tasks.map(({ name, needs: all, amounts }) => `${listed(withAmounts(all, amounts))} (${name})`);
   const which = tasks.length > MOST_TASKS ? "" : `: ${needs.join(" or ")}`;
   const says = [
     `${counted(robots.length, "robot")} ${robots.length > 1 ? "rescue" : "rescues"} victims. A victim is rescued ` +
       `when robots that offer what it needs are beside it at the same time${which}.`,
-    "Each robot acts by itself. Drag one, break one, and watch what the others do.",
+    "Each robot acts by itself. Drag one, break one, and watch what the others do." +
+      (robots.length < worlds.robots.length ? " Add one, and it joins the work." : ""),
   ];
   if (areTwo) {
     says.push("Both arenas begin alike and keep the same time; only who drives the robots differs. " +

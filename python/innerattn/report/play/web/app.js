@@ -95,6 +95,7 @@ class App {
     fillSelect($("speed"), SPEEDS.map((speed) => [String(speed), `${speed}×`]), "");
     fillSelect($("task"), this.worlds.tasks.map(({ name }, task) => [String(task), name]), "0");
     fillLegend($("legend"), this.worlds);
+    this.spares = new SparePanel(this.worlds, (kind) => this.addRobot(kind));
     fillSenses($("senses"), this.run, this.look, (look) => this.setLook(look));
   }
 
@@ -188,6 +189,15 @@ class App {
 
   restart() {
     this.sendAll({ do: "restart" });
+  }
+
+  /** Lets a spare robot of a kind into the arenas that hands reach, and chooses it. */
+  async addRobot(kind) {
+    const { arena } = this, [robot] = arena.waiting(kind);
+    if (!robot) return this.tell(noSpareText(this.worlds, kind));
+    const reached = this.reached().filter((one) => one.waiting(kind).length);
+    await Promise.all(reached.map((one) => one.send({ do: "add_robot", kind })));
+    if (!arena.run.isOutside(arena.run.now, robot.index)) this.choose(robot.index);
   }
 
   push(way) {
@@ -288,7 +298,8 @@ class App {
 
   /** Draws a moment of each arena; keeps how long the script took [ms], of the last thousand frames. */
   draw(moments, now) {
-    const begin = performance.now();
+    const begin = performance.now(), { run } = this;
+    if (run.isOutside(run.now, this.look.robot)) this.choose(run.team[0].index);
     this.arenas.forEach((arena, index) => arena.draw(moments[index], this.look, this.paint));
     if (this.fresh) {
       this.fresh = false;
@@ -316,6 +327,7 @@ class App {
     this.robots.show(run, 0, now.step, look);
     this.panel.show(run, look.robot, this.arena.steered, this.arena.mark);
     this.victims.show(now.victims);
+    this.spares.show((kind) => this.arena.waiting(kind).length);
     this.arenas.forEach((arena, index) => {
       arena.showCaption(arena === this.arena);
       if (!this.sides) return;
@@ -350,7 +362,7 @@ function pressed(app, event) {
     " ": target.closest("button, summary, input") ? null : () => app.setRunning(!app.running),
     ".": () => app.step(),
     n: () => app.restart(),
-    r: () => app.choose((look.robot + 1) % app.worlds.robots.length),
+    r: () => app.choose(next(app.run.team, app.worlds.robots[look.robot]).index),
     s: () => app.toggleSteering(),
     p: () => app.arena.choosePolicy(next(app.arena.policies, app.arena.policy)),
     x: () => app.show(next(app.arenas, app.arena)),

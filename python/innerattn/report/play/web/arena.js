@@ -9,7 +9,7 @@ class Arena {
     Object.assign(this, { app, link, worlds, policies: opened.policies, run: new LiveRun(document.title, worlds) });
     // Only this page changes them: what was asked for last is so, though the answer is on its way.
     Object.assign(this, { steered: opened.steered, policy: opened.policy });
-    Object.assign(this, { arrived: 0, happened: [], moving: null, balance: new Balance(worlds) });
+    Object.assign(this, { arrived: 0, happened: [], moving: null });
     this.mark = count > 1 ? MARKS[index] : "";
     this.makePane(index);
     this.scene = new Scene(this.canvas, this.run);
@@ -63,10 +63,12 @@ class Arena {
     const { app, run, worlds } = this;
     if (!run.continues(state)) {
       app.events.clear();
-      this.balance.clear();
+      this.shareAmong(worlds.robots.filter((one) => !one.is_spare));
       this.losses = 0;
     }
-    const events = run.take(state);
+    const events = run.take(state), fresh = run.team.filter((one) => !this.sharing.includes(one));
+    if (fresh.length) this.shareAmong([...this.sharing, ...fresh]);
+    if (this.steered !== null && run.isOutside(run.now, this.steered)) this.steer(null);
     app.events.add(events, worlds.dt_s, this);
     if (isStep) {
       this.balance.add(state.rescues);
@@ -75,6 +77,17 @@ class Arena {
     }
     this.happened = events.length ? events : this.happened.filter((one) => state.step - one.step < 10);
     app.fresh = app.stale = app.chartsAreOld = true;
+  }
+
+  /** Counts from now on how evenly some robots share rescues. */
+  shareAmong(robots) {
+    Object.assign(this, { sharing: robots, balance: new Balance(this.worlds, robots) });
+  }
+
+  /** Spare robots of a kind that are outside. */
+  waiting(kind) {
+    const { worlds, run } = this;
+    return worlds.robots.filter((one) => one.kind === kind && run.isOutside(run.now, one.index));
   }
 
   /** Moves a robot as fast as its world takes it; the last place counts. */

@@ -1,7 +1,8 @@
 // How evenly robots share the rescues of a world that goes on: see innerattn.measures.sharing.imbalance.
 
 class Balance {
-  constructor({ robots, tasks }) {
+  /** Of some robots alone. */
+  constructor({ tasks }, robots) {
     const offering = (ability) => robots.filter(({ abilities }) => abilities.includes(ability)).length;
     const isShared = (ability) => offering(ability) > 1; // there is a choice of whom to send
     this.tasks = tasks.map(({ needs, amounts }) => {

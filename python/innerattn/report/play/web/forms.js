@@ -110,6 +110,34 @@ function placesText(taken, most) {
   return `${most === 1 ? "The only place is" : `All ${most} places are`} taken: move a victim, or wait for a rescue.`;
 }
 
+/** Buttons that add a robot, one for each kind that has spare ones. */
+class SparePanel {
+  /** `add` takes a kind. */
+  constructor({ robots, kinds }, add) {
+    const able = kinds.filter((kind) => robots.some((one) => one.is_spare && one.kind === kind));
+    $("joining").hidden = !able.length;
+    this.rows = able.map((kind) => {
+      const left = element("small"), button = element("button", { type: "button" }, `${kind} `, left);
+      button.addEventListener("click", () => add(kind));
+      $("kinds").append(button);
+      return { kind, left };
+    });
+  }
+
+  /** `waiting` gives how many of a kind are outside. */
+  show(waiting) {
+    for (const { kind, left } of this.rows) {
+      const text = `${waiting(kind)} left`;
+      if (left.textContent !== text) left.textContent = text;
+    }
+  }
+}
+
+function noSpareText({ robots }, kind) {
+  const most = robots.filter((one) => one.is_spare && one.kind === kind).length;
+  return `All ${most} ${kind} robots that can be added are in the arena: take one out first.`;
+}
+
 /** The newest events, the latest first. */
 class EventLog {
   constructor(list, empty, choose) {

@@ -72,7 +72,8 @@ class LiveRun {
   findCuts(before, state) {
     state.positions.forEach(([x, y], robot) => {
       const [ax, ay] = before.positions[robot], far = Math.hypot(x - ax, y - ay);
-      if (far > (before.step === state.step ? 0 : FAR_M)) this.cuts[robot] = state.step;
+      const comes = this.isOutside(before, robot) && !this.isOutside(state, robot);
+      if (comes || far > (before.step === state.step ? 0 : FAR_M)) this.cuts[robot] = state.step;
     });
   }
 
@@ -98,6 +99,10 @@ class LiveRun {
       const [old, now] = [before.faults[index], state.faults[index]];
       for (const kind of new Set([...Object.keys(old), ...Object.keys(now)])) {
         if (old[kind] === now[kind]) continue;
+        if (worlds.robots[index].is_spare && kind === "unavailable") {
+          events.push(comingEvent(worlds, state.step, index, !(kind in now)));
+          continue;
+        }
         const fault = { robot: index, start: state.step, kind: this.kindNumbers[kind] };
         if (kind in now) events.push(faultEvent(worlds, { ...fault, value: now[kind] }));
         else {
@@ -185,7 +190,18 @@ class LiveRun {
     return this.now.faults[robot].unavailable >= 1;
   }
 
+  /** Whether a robot is a spare one that was not in the arena at a moment. */
+  isOutside({ faults }, robot) {
+    return Boolean(this.worlds.robots[robot].is_spare) && faults[robot].unavailable >= 1;
+  }
+
+  /** The robots to show now: all but spare ones outside. */
+  get team() {
+    return this.worlds.robots.filter(({ index }) => !this.isOutside(this.now, index));
+  }
+
   distance(episode, step, robot) {
+    if (this.isOutside(this.moment(step), robot)) return NaN;
     return distanceToVictim(this, episode, step, robot);
   }
 
@@ -214,7 +230,7 @@ class LiveRun {
       faults.forEach((wrong, robot) => {
         for (const kind in this.kindNumbers) {
           const key = `${robot} ${kind}`, spell = open.get(key), value = wrong[kind];
-          if (spell?.value === value) continue;
+          if (spell?.value === value || (kind === "unavailable" && this.worlds.robots[robot].is_spare)) continue;
           if (spell) spell.end = step;
           open.delete(key);
           if (value === undefined) continue;
@@ -228,7 +244,8 @@ class LiveRun {
 
   /** The last steps as a run of its own, for charts. */
   recent(steps) {
-    const from = Math.max(this.first, this.last + 1 - steps), { worlds, size, heads, attention } = this;
+    const from = Math.max(this.first, this.last + 1 - steps), { worlds, heads, attention } = this;
+    const { length: size } = this.team;
     const shift = (step) => step - from;
     const rescues = this.rescues[0].filter((one) => one.step >= from);
     const handoffs = this.handoffs[0].filter((one) => one.second >= from);
