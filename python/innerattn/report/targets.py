@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -118,14 +117,22 @@ def _paper(*parts: str) -> Callable[[], Report]:
     return load
 
 
-def _own(module: str) -> Callable[[], Report]:
-    """The report of a module of `innerattn.report`, which has its files and writes it."""
+def _crossed() -> Report:
+    from innerattn.report.crossed.write import FILES, write
 
-    def load() -> Report:
-        found = import_module(f"innerattn.report.{module}")
-        return Report(found.FILES, found.write)
+    return Report(FILES, write)
 
-    return load
+
+def _swapped() -> Report:
+    from innerattn.report.crossed.swapped import FILES, write
+
+    return Report(FILES, write)
+
+
+def _robustness() -> Report:
+    from innerattn.report.robustness.page import FILES, write
+
+    return Report(FILES, write)
 
 
 TARGETS: dict[str, Target] = {
@@ -164,13 +171,13 @@ TARGETS: dict[str, Target] = {
         Target(
             name="crossed",
             shows="which settings make robots share their work evenly",
-            report=_own("crossed.write"),
+            report=_crossed,
             pool="crossed-",
         ),
         Target(
             name="swapped",
             shows="whether initial weights decide which robot does more",
-            report=_own("crossed.swapped"),
+            report=_swapped,
             few=("td-uniform",),
             pool="crossed-",
         ),
@@ -207,7 +214,7 @@ TARGETS: dict[str, Target] = {
         Target(
             name="robustness",
             shows="what faults cost a team, and where attention goes",
-            report=_own("robustness.page"),
+            report=_robustness,
             under_faults=True,
         ),
     )
