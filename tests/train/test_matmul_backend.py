@@ -3,6 +3,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 import torch
@@ -86,6 +87,33 @@ def test_a_setting_that_does_nothing_is_not_named_onednn(monkeypatch: pytest.Mon
     with chosen_matmul_backend("auto") as used:
         assert used.startswith("default, error ")
         assert used.endswith(" (onednn not in use)")
+
+
+@pytest.mark.parametrize(
+    ("flags", "precision", "device", "warns"),
+    [
+        ("fma avx2", "bfloat16", "cpu", True),
+        ("fma avx512_bf16", "bfloat16", "cpu", False),
+        ("amx_bf16", "bfloat16", "cpu", False),
+        ("asimd bf16", "bfloat16", "cpu", False),
+        ("fma avx2", "bfloat16", "cuda", False),
+        ("fma avx2", "float32", "cpu", False),
+    ],
+)
+def test_bfloat16_where_it_is_slow_is_warned_of(
+    flags: str,
+    precision: str,
+    device: str,
+    warns: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    info = tmp_path / "cpuinfo"
+    info.write_text(f"flags : {flags}\n")
+    monkeypatch.setattr(matmul_backend, "_CPUINFO", info)
+    matmul_backend.warn_of_slow_bfloat16(precision, device)
+    assert ("network.precision = 'bfloat16'" in caplog.text) == warns
 
 
 @pytest.mark.long

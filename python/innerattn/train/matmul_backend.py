@@ -7,6 +7,7 @@ so that a run gives the same numbers every time.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,8 @@ from typing import Any, Literal
 import torch
 from torch import Tensor
 
+_log = logging.getLogger(__name__)
+_CPUINFO = Path("/proc/cpuinfo")
 _LARGEST_ERROR = 1e-5
 """Relative to the largest entry; float32 gives some 1e-6, bfloat16 some 1e-2."""
 _PROBES = ((4, 256, 128, 128), (4, 128, 512, 128), (1, 1_024, 64, 5))
@@ -62,13 +65,28 @@ def onednn() -> Iterator[None]:
         matmul.fp32_precision = before
 
 
+def warn_of_slow_bfloat16(precision: str, device: str) -> None:
+    """Say that products in bfloat16 slow a training down, where the processor has none.
+
+    Args:
+        precision: `network.precision`.
+        device: `train.device`.
+    """
+    if precision != "bfloat16" or device != "cpu" or not _CPUINFO.exists():
+        return
+    if not {"avx512_bf16", "amx_bf16", "bf16"} & set(_CPUINFO.read_text().split()):
+        _log.warning(
+            "innerattn: warning: network.precision = 'bfloat16': this processor has no "
+            "instructions for it, and multiplies float32 faster"
+        )
+
+
 def _onednn_is_faster() -> bool:
-    info = Path("/proc/cpuinfo")
     return (
         hasattr(torch.backends.mkldnn, "matmul")
         and torch.backends.cpu.get_cpu_capability() == "AVX512"
-        and info.exists()
-        and "AuthenticAMD" in info.read_text()
+        and _CPUINFO.exists()
+        and "AuthenticAMD" in _CPUINFO.read_text()
     )
 
 

@@ -16,7 +16,7 @@ from innerattn.train.build import keep_heap_small, torch_threads
 from innerattn.train.checkpoint_info import Stage
 from innerattn.train.compilation import compiles
 from innerattn.train.interruption import Interruptions, remembered_interruptions
-from innerattn.train.matmul_backend import chosen_matmul_backend
+from innerattn.train.matmul_backend import chosen_matmul_backend, warn_of_slow_bfloat16
 from innerattn.train.parts import Parts
 from innerattn.train.teams.training import TeamTraining
 from innerattn.train.training import Training
@@ -55,6 +55,8 @@ def prepared(
         ConfigError: the configuration cannot be run here.
     """
     keep_heap_small()
+    if workers.rank() == 0:
+        warn_of_slow_bfloat16(config.network.precision, config.train.device)
     with (
         torch_threads(threads),
         chosen_matmul_backend(config.train.matmul_backend) as matmul_backend,
