@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from innerattn.config.algorithm import Algorithm, AlgorithmConfig
 from innerattn.config.files import PRESETS
-from innerattn.config.model import MOST_ROWS
+from innerattn.config.model import ADDED_LATER, MOST_ROWS
 
 
 class TeamConfig(AlgorithmConfig):
@@ -52,6 +52,12 @@ class TeamConfig(AlgorithmConfig):
     )
     entropy_weight: float = Field(
         0.015, ge=0.0, description="weight of the policy's entropy; train.schedule may change it"
+    )
+    pull: Annotated[float, ADDED_LATER] = Field(
+        0.0,
+        ge=0.0,
+        description="weight of the cross-entropy to the script's actions while the policy learns "
+        "from rewards after a warm start; it falls linearly to 0 at the end of training",
     )
 
     @property

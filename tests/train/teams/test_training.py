@@ -81,10 +81,18 @@ def test_a_run_acts_in_worlds_of_any_team(tmp_path: Path, method: str) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("env_steps", "stage"), [(160, "imitating"), (480, "imitating"), (320, "training")]
+    ("env_steps", "stage", "pull"),
+    [
+        (160, "imitating", 0.0),
+        (480, "imitating", 0.0),
+        (320, "training", 0.0),
+        (320, "training", 0.5),
+    ],
 )
-def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path: Path, env_steps: int, stage: str) -> None:
-    chosen = config(train__warm_start="hungarian", train__stagger_starts=True)
+def test_a_stopped_run_goes_on_to_the_same_bits(
+    tmp_path: Path, env_steps: int, stage: str, pull: float
+) -> None:
+    chosen = config(train__warm_start="hungarian", train__stagger_starts=True, team__pull=pull)
     whole = train(chosen, tmp_path / "whole")
     with pytest.raises(KeyboardInterrupt):
         train(chosen, tmp_path / "run", progress=stops_after(env_steps, stage))
@@ -98,6 +106,18 @@ def test_imitation_alone(tmp_path: Path) -> None:
     run = train(config(train__warm_start="greedy", train__env_steps=0), tmp_path / "run")
     assert lines(run)[-1]["env_steps"] == 480
     assert all("agreement" in line["losses"] for line in lines(run))
+
+
+def test_a_pull_keeps_to_the_script_while_rewards_are_learnt_from(tmp_path: Path) -> None:
+    ends = {}
+    for pull in (0.0, 50.0):
+        chosen = config(train__warm_start="greedy", imitation__env_steps=160, team__pull=pull)
+        losses = [line["losses"] for line in lines(train(chosen, tmp_path / str(pull)))]
+        assert all("kl" in found for found in losses[1:])
+        assert all(("agreement" in found) == bool(pull) for found in losses[1:])
+        ends[pull] = newest(tmp_path / str(pull)), losses[-1]
+    assert ends[0.0][0] != ends[50.0][0]
+    assert ends[50.0][1]["agreement"] > 0.5  # of five actions
 
 
 def test_without_a_family_it_is_the_team_of_the_scenario(tmp_path: Path) -> None:
@@ -157,6 +177,7 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
     [
         ({"team.teams": 5}, "train.num_envs = 32: must be a multiple of team.teams = 5"),
         ({"team.new_teams": 7}, r"team.new_teams = 7: must be in 0\.\.=4"),
+        ({"team.pull": 0.5}, "team.pull = 0.5: needs a script to follow, train.warm_start"),
         ({"train.potential": "greedy"}, "train.potential: method 'team-inner' cannot follow it"),
         ({"train.on_divergence": "skip"}, "train.on_divergence: method 'team-inner' cannot"),
         ({"scenario.actions": "continuous"}, "learns 'discrete' actions only"),

@@ -88,7 +88,7 @@ class TeamTraining(Training):
 
     def collect(self, share: float) -> Mapping[str, float]:
         """See `Training.collect`; one rollout."""
-        self._collect(self._progress_weight(share), imitates=False)
+        self._collect(self._progress_weight(share), imitates=self._pull(share) > 0.0)
         return {}
 
     def learn(self, share: float) -> Mapping[str, float]:
@@ -96,7 +96,7 @@ class TeamTraining(Training):
         ramp = self.config.train.schedule.entropy_weight
         entropy = self._team.entropy_weight if ramp is None else ramp.at(share)
         rate = _falling(self._team.learning_rate, self._team.final_learning_rate_share, share)
-        return self._update(Weights(rate, imitation=0.0, policy=1.0, entropy=entropy))
+        return self._update(Weights(rate, self._pull(share), policy=1.0, entropy=entropy))
 
     def take_tally(self) -> Tally:
         """See `Training.take_tally`."""
@@ -147,6 +147,10 @@ class TeamTraining(Training):
     def _progress_weight(self, share: float) -> float:
         ramp = self.config.train.schedule.dense_weight
         return 1.0 if ramp is None else ramp.at(share)
+
+    def _pull(self, share: float) -> float:
+        """Weight of the script's actions while learning from rewards."""
+        return self._team.pull * (1.0 - share)
 
     def _collect(self, progress_weight: float, *, imitates: bool) -> None:
         rollout, seen = TeamRollout(), self._after
@@ -200,6 +204,10 @@ def _refuse_what_is_not_followed(config: RunConfig, team: TeamConfig) -> None:
     for key, is_fine in refused.items():
         if not is_fine:
             raise ConfigError(f"{key}: method {train.method!r} cannot follow it; leave it out")
+    if team.pull and train.warm_start == "none":
+        raise ConfigError(
+            f"team.pull = {team.pull:g}: needs a script to follow, train.warm_start; or must be 0"
+        )
     for fault in config.training_scenario.faults:
         if fault.kind in SENSES:
             raise ConfigError(
