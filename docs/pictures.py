@@ -6,12 +6,16 @@ arrows. Without arguments the script `hungarian` drives the team, and all pictur
 
 from __future__ import annotations
 
+import json
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from innerattn.cli.main import main
 from innerattn.config import Robot, RunConfig, Scenario, Task
@@ -19,10 +23,12 @@ from innerattn.envs import BatchEnv
 from innerattn.envs.render import paint_figure
 from innerattn.experiments.archive import read_archive
 from innerattn.experiments.run import FinishedRun
+from innerattn.stats.estimate import Estimate
 from innerattn.stats.seeds import seed_estimate
 
 IMAGES = Path(__file__).parent / "images"
 RECORDS = Path(__file__).parent / "records"
+ALIKE = 0.03  # margin of the studies of attention
 RIGHT, LEFT = 1, 2  # actions
 SCRIPT = ("hungarian", "--seed", "99")
 INK, GREY, BLUE, ORANGE = "#1f2933", "#7b8794", "#2b6cb0", "#c05621"
@@ -190,7 +196,7 @@ def crowd() -> Figure:
     for run in read_archive(RECORDS / "crowd.parquet"):
         config, method = run.config, run.config.train.method
         robots = len(config.scenario.robots)
-        if config.scenario.observed_teammates == 0 and _site_steps(config) > 350_000:
+        if _in_full_crowd(config):
             of_size = scores.setdefault(method, {}).setdefault(robots, {})
             of_size[config.train.seed] = run.summary["score"]["mean"]
     figure, axes = figure_of(7.2, 3.2)
@@ -211,6 +217,84 @@ def crowd() -> Figure:
     return figure
 
 
+def attention_map() -> Figure:
+    """What learnt attention gains over equal weights, by robots, in runs that are published."""
+    critic = (("train", "method"), ("network", "attention")), "ppo-inner", "ppo-uniform"
+    actor = (("network", "pooling"),), "attention", "mean"
+    rows = {
+        "critic": _gains("fast", *critic, _in_mixed),
+        "critic, sites far apart": _gains("crowd", *critic, _in_full_crowd),
+        "actor and critic": _gains("actor", *actor, _in_mixed),
+    }
+    sizes = sorted({robots for gains in rows.values() for robots in gains})
+    figure, axes = figure_of(7.2, 2.3)
+    for row, gains in enumerate(rows.values()):
+        for column, robots in enumerate(sizes):
+            gain = gains.get(robots)
+            colour = "#f0f0f0" if gain is None else colormaps["RdBu"](0.5 + gain.mean / 0.2)
+            axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, fc=colour, ec="white", lw=2))
+            if gain is not None:
+                decided = gain.low > 0 or gain.high < 0 or max(-gain.low, gain.high) < ALIKE
+                text = f"{gain.mean:+.2f}".replace("-0.00", "+0.00")
+                text += " \u25cf" if decided else ""
+                axes.text(column, row, text, ha="center", va="center", fontsize=9, color=INK)
+    axes.set(xlim=(-0.5, len(sizes) - 0.5), ylim=(len(rows) - 0.5, -0.5), xlabel="robots")
+    axes.set_xticks(range(len(sizes)), [str(robots) for robots in sizes])
+    axes.set_yticks(range(len(rows)), list(rows))
+    axes.tick_params(length=0)
+    axes.spines[:].set_visible(False)
+    return figure
+
+
+def _gains(
+    archive: str,
+    keys: Sequence[tuple[str, str]],
+    one: str,
+    other: str,
+    takes: Callable[[RunConfig], bool],
+) -> dict[int, Estimate]:
+    """Score of runs less that of runs that differ in some keys alone, by robots.
+
+    Args:
+        archive: name of the published runs.
+        keys: sections and keys that differ; the first has the values ``one`` and ``other``.
+        one: value of the runs that are looked at.
+        other: value of those beside which they stand.
+        takes: which runs count.
+    """
+    scores: dict[tuple[int, str], dict[str, dict[int, float]]] = {}
+    for run in read_archive(RECORDS / f"{archive}.parquet"):
+        config, values = run.config, run.config.in_use()
+        if not takes(config):
+            continue
+        section, key = keys[0]
+        value = values[section][key]
+        for section, key in (*keys, ("train", "seed"), ("evaluate", "seed")):
+            del values[section][key]
+        rest = len(config.scenario.robots), json.dumps(values, sort_keys=True)
+        of_value = scores.setdefault(rest, {}).setdefault(value, {})
+        of_value[config.train.seed] = run.summary["score"]["mean"]
+    gains = {}
+    for (robots, _), found in scores.items():
+        if one in found and other in found:
+            seeds = sorted(found[one].keys() & found[other].keys())
+            gain = seed_estimate([found[one][seed] - found[other][seed] for seed in seeds])
+            assert robots not in gains, f"{archive}: two recipes for {robots} robots"
+            assert gain is not None, f"{archive}: no seed of both for {robots} robots"
+            gains[robots] = gain
+    return gains
+
+
+def _in_mixed(config: RunConfig) -> bool:
+    """Whether a run is one of the preset mixed, or of its larger teams."""
+    return config.scenario.situation == "mixed"
+
+
+def _in_full_crowd(config: RunConfig) -> bool:
+    """Whether a run of the crowd has the full length, and observations of all teammates at hand."""
+    return config.scenario.observed_teammates == 0 and _site_steps(config) > 350_000
+
+
 def _site_steps(config: RunConfig) -> int:
     return config.train.env_steps * len(config.scenario.tasks)
 
@@ -221,4 +305,5 @@ if __name__ == "__main__":
         for draw in (world, contacts, critic, score, sight):
             draw().savefig(IMAGES / f"concept_{draw.__name__}.png")
         crowd().savefig(IMAGES / "attention_crowd.png")
+        attention_map().savefig(IMAGES / "attention_map.png")
     sys.exit(code)
