@@ -25,7 +25,12 @@ def worlds_document(scenario: Scenario) -> dict[str, Any]:
         "occlusion": scenario.occlusion,
         "limits_communication": scenario.limits_communication,
         "tasks": [
-            {"name": task.name, "needs": list(task.needs), "amounts": task.sums}
+            {
+                "name": task.name,
+                "needs": list(task.needs),
+                "amounts": task.sums,
+                "after": list(task.after),
+            }
             for task in scenario.tasks
         ],
         "robots": [
