@@ -169,12 +169,14 @@ def test_the_command_of_a_card_trains_a_team_of_the_package(
 
     monkeypatch.setattr("innerattn.train.train", remember)
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")  # commands are for the project's root
     program, *words = read_card(name)["command"].split()
     assert program == "innerattn"
     assert main(words) == 130
     config, _ = load_policy(f"zoo:{name}")
     assert asked[0].scenario == config.scenario
     assert asked[0].train == config.train
+    assert asked[0].digest() == config.digest()
 
 
 @pytest.mark.slow

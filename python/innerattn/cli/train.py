@@ -162,21 +162,32 @@ class _Train(_Sources):
                     f"{others[0]}"
                 )
             return self._resume(self.console(), existing_run(self.resume))
-        train = self.defaults.train
-        chosen: dict[str, object] = {
-            "train.method": train.method,
-            "train.warm_start": train.warm_start,
-        }
-        overrides = chosen | changed(self, self.defaults)
         console = self.console()
         if self.seeds is None:
-            return self._train_one(console, _with_workers(self.load(overrides)))
-        seeds = parse_seeds(self.seeds)
+            return self._train_one(console, self.single_run())
+        overrides, seeds = self._overrides(), parse_seeds(self.seeds)
         threads = self.load(overrides).train.threads or 1
         configs = [
             self.load(overrides | {"train.seed": seed, "train.threads": threads}) for seed in seeds
         ]
         return self._train_several(console, configs)
+
+    def single_run(self) -> RunConfig:
+        """The configuration of the run that these options make; its workers may be "auto".
+
+        Raises:
+            ConfigError: a file cannot be read, or is wrong.
+            UsageError: a single value is wrong.
+        """
+        return _with_workers(self.load(self._overrides()))
+
+    def _overrides(self) -> dict[str, object]:
+        train = self.defaults.train
+        chosen: dict[str, object] = {
+            "train.method": train.method,
+            "train.warm_start": train.warm_start,
+        }
+        return chosen | changed(self, self.defaults)
 
     def _train_one(self, console: Console, config: RunConfig) -> int:
         with requests_handled_by(leave):

@@ -40,7 +40,8 @@ from innerattn.studies.study import (
 LEAST_SEEDS = 3
 """Fewer seeds decide nothing."""
 
-_SEEN = "greedy-seen"
+SEEN = "greedy-seen"
+"""The script that knows what robots have seen; measured where their sight is limited."""
 
 Verdict = Literal["greater", "smaller", "alike", "undecided"]
 
@@ -80,7 +81,7 @@ class Result:
             info = None if self.finished is None else self.finished.info
             found = getattr(info, TIMES[measure], None)
         elif measure == SCORE_AS_SEEN:
-            found = _score_as_seen(part)
+            found = score_as_seen(part)
         elif measure in MEASURES_OF_ALL:
             found = part[measure]
         else:
@@ -89,11 +90,11 @@ class Result:
         return None if value is None or not math.isfinite(value) else float(value)
 
 
-def _score_as_seen(part: Mapping[str, Any]) -> float | None:
+def score_as_seen(part: Mapping[str, Any]) -> float | None:
     """The score, whose 1 is the script that knows what robots have seen, where sight is limited."""
-    if _SEEN not in part["scripted"]:
+    if SEEN not in part["scripted"]:
         return None if part["score"] is None else float(part["score"]["mean"])
-    least, most = (part["scripted"][name]["mean"] for name in ("random", _SEEN))
+    least, most = (part["scripted"][name]["mean"] for name in ("random", SEEN))
     rescues = part["rescues_per_episode"]["mean"]
     return float((rescues - least) / (most - least)) if most > least else None
 

@@ -56,10 +56,12 @@ def read_card(name: str, zoo: Path = FOLDER) -> dict[str, Any]:
 
     Returns:
         ``name``, ``command``, ``seed``, ``versions``, ``weights_sha256`` and ``training_sha256``
-        (of the tensors here, and of all that the training ended with), ``env_steps``,
-        ``worlds_seed`` (of the worlds it was measured in), and ``lengths``: for each length of
-        episodes ``episode_steps``, ``episodes``, and ``rescues_per_episode`` and ``score`` with
-        ``mean``, ``low`` and ``high`` (95 % interval).
+        (of the tensors here, and of all that the training ended with), ``env_steps``, ``script``
+        (which has a score of 1), ``worlds_seed`` (of the worlds it was measured in), and
+        ``lengths``: for each length of episodes ``episode_steps``, ``episodes``, and
+        ``rescues_per_episode`` and ``score`` with ``mean``, ``low`` and ``high`` (95 % interval).
+        Where sight is limited, also ``score_as_seen``, the mean score with the script
+        `greedy-seen` at 1.
 
     Raises:
         OSError: there is no such team.
