@@ -24,6 +24,7 @@ from innerattn.zoo import zoo_names
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
+WORKED = [file.stem for file in sorted((ROOT / "examples" / "scenarios").glob("*.toml"))]
 sys.path.insert(0, str(DOCS))
 
 project = "innerattn"
@@ -94,6 +95,12 @@ def link_teams(_: Sphinx, name: str, source: list[str]) -> None:
         for team in zoo_names():
             to = f'<a href="../play/{team}.html">play in this browser</a>'
             source[0] = source[0].replace(f"| `zoo:{team}` |", f"| `zoo:{team}`, {to} |", 1)
+    elif name == "docs/scenario":
+        teams = [team for team in WORKED if team in zoo_names()]
+        links = ", ".join(f'<a href="../play/{team}.html">{team}</a>' for team in teams)
+        sentence = "`innerattn play zoo:NAME` plays each"
+        here = f"Play with them in this browser: {links}. {sentence}"
+        source[0] = source[0].replace(sentence, here, 1)
 
 
 def write_teams(app: Sphinx, failure: Exception | None) -> None:

@@ -44,21 +44,18 @@ def packed(tmp_path: Path) -> Path:
 
 
 WORKED = {file.stem for file in (ROOT / "examples" / "scenarios").glob("*.toml")}
-WITHOUT_A_TEAM = {
-    "air-ground",
-    "mixed-radio",
-    "mixed-sight",
-    "mixed-wheels",
-    "rescue-16",
-    "rescue-64",
+NOT_YET = {
+    *("air-ground", "mixed-radio", "mixed-sight", "mixed-wheels"),
+    *("assembly", "convoy", "drones", "fire", "lookout", "office", "search", "warehouse"),
 }
-"""The obstacles of the first have fixed places, so the recipes of the budgets, with symmetry, do
-not take it; those of the next three are on their pages, and take a few minutes; nobody has trained
-a team for the last two."""
+"""Worlds whose teams are still to be packed: their commands are known."""
+WITHOUT_A_TEAM = {"rescue-16", "rescue-64"} | NOT_YET
+"""Nobody has trained a team for the first two."""
 
 
-def test_there_is_a_team_of_each_preset() -> None:
-    assert set(zoo_names()) == {*SCENARIOS, "any"} - WITHOUT_A_TEAM
+def test_there_is_a_team_of_each_preset_and_each_worked_scenario() -> None:
+    assert len(WORKED) == 10
+    assert set(zoo_names()) == {*SCENARIOS, *WORKED, "any"} - WITHOUT_A_TEAM
 
 
 def test_the_zoo_is_small() -> None:

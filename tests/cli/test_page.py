@@ -56,6 +56,15 @@ def test_a_run_and_a_script_are_written(run_dir: Path, tmp_path: Path) -> None:
     assert len(given(out)["worlds"]["robots"]) == 4, "a team for one size takes nobody in"
 
 
+@pytest.mark.parametrize("name", ["flood", "rovers"])
+def test_a_team_comes_first_where_a_page_has_no_script_but_random(
+    tmp_path: Path, name: str
+) -> None:
+    out = tmp_path / "page.html"
+    assert main(["page", f"zoo:{name}", "-o", str(out)]) == 0
+    assert [one["name"] for one in given(out)["policies"]] == [name, "random"]
+
+
 def test_a_policy_for_any_team_is_written_for_the_team_of_a_file(tmp_path: Path) -> None:
     out, file = tmp_path / "team.html", tmp_path / "team.toml"
     page = (Path(__file__).parents[2] / "docs" / "teams.md").read_text("utf-8")

@@ -137,6 +137,11 @@ def test_the_teams_of_the_package_can_be_played_with(site: Path, browser: Browse
     links = re.findall(r'href="\.\./play/([\w-]+)\.html"', text)
     assert links == list(zoo_names())
     assert 'href="play/mixed.html"' in (site / "README.html").read_text("utf-8")
+    worked = re.findall(
+        r'href="\.\./play/([\w-]+)\.html"', (site / "docs" / "scenario.html").read_text("utf-8")
+    )
+    scenarios = {file.stem for file in (ROOT / "examples" / "scenarios").glob("*.toml")}
+    assert worked == sorted(scenarios & set(zoo_names()))
     for name in links:
         with visit(browser, site / "play" / f"{name}.html") as seen:
             until(seen.page, "Boolean(window.play)")
