@@ -180,17 +180,17 @@ impl Shapes {
         positions: &[Vec2],
         velocities: &[Vec2],
         obstacles: &[Vec2],
-        absent: u64,
+        absent: impl Absent,
     ) -> f32 {
         let mut first = f32::INFINITY;
         for (index, (at, velocity)) in positions.iter().zip(velocities).enumerate() {
-            if is_in(absent, index) {
+            if absent.has(index) {
                 continue;
             }
             let radius = self.radii[index];
             first = first.min(touch.walls(at.x, velocity.x, self.arena - radius));
             first = first.min(touch.walls(at.y, velocity.y, self.arena - radius));
-            for other in (0..index).filter(|other| !is_in(absent, *other)) {
+            for other in (0..index).filter(|other| !absent.has(*other)) {
                 let reach = radius + self.radii[other];
                 first = first.min(touch.discs(positions[other] - at, velocities[other] - velocity, reach));
             }
@@ -221,9 +221,9 @@ impl Shapes {
         positions: &mut [Vec2],
         velocities: &mut [Vec2],
         obstacles: &[Vec2],
-        absent: u64,
+        absent: impl Absent,
     ) {
-        let mut held = absent;
+        let mut held = absent.bits();
         loop {
             let sunk = self.sunk(most, positions, obstacles, absent) & !held;
             if sunk == 0 {
@@ -239,12 +239,12 @@ impl Shapes {
 
     /// The robots that overlap another robot or an obstacle by more than `most` of the smaller of the two,
     /// as bits.
-    fn sunk(&self, most: f32, positions: &[Vec2], obstacles: &[Vec2], absent: u64) -> u64 {
+    fn sunk(&self, most: f32, positions: &[Vec2], obstacles: &[Vec2], absent: impl Absent) -> u64 {
         let mut sunk = 0_u64;
-        for (index, at) in positions.iter().enumerate().filter(|(index, _)| !is_in(absent, *index)) {
+        for (index, at) in positions.iter().enumerate().filter(|(index, _)| !absent.has(*index)) {
             let radius = self.radii[index];
             for (other, place) in positions[..index].iter().enumerate() {
-                if is_in(absent, other) {
+                if absent.has(other) {
                     continue;
                 }
                 let reach = radius + self.radii[other] - most * radius.min(self.radii[other]);
@@ -277,9 +277,31 @@ fn is_in_block(blocks: &Blocks, at: Vec2, radius: f32, most: f32) -> bool {
     blocks.near(at, radius).any(|(solid, centre)| solid.is_sunk_in(at - centre, radius, most))
 }
 
-/// Whether a robot is one of those given as bits.
-fn is_in(robots: u64, robot: usize) -> bool {
-    robots >> robot & 1 == 1
+/// Which robots are absent.
+trait Absent: Copy {
+    /// As bits.
+    fn bits(self) -> u64;
+
+    /// Whether a robot is one of them.
+    fn has(self, robot: usize) -> bool {
+        self.bits() >> robot & 1 == 1
+    }
+}
+
+impl Absent for u64 {
+    fn bits(self) -> u64 {
+        self
+    }
+}
+
+/// No robot is absent.
+#[derive(Clone, Copy)]
+struct Nobody;
+
+impl Absent for Nobody {
+    fn bits(self) -> u64 {
+        0
+    }
 }
 
 /// Moves all straight on for `time`, s.

@@ -5,7 +5,7 @@
 //! once, by the least impulses that do it: the inelastic law of Moreau, solved by Gauss-Seidel sweeps.
 //! What rapier tends to as its substeps grow short is computed here without any.
 
-use super::{Engine, Shapes, Workspace, fly, is_in};
+use super::{Absent, Engine, Nobody, Shapes, Workspace, fly};
 use crate::geometry::{Solid, Touch, Vec2};
 use crate::robot::Body;
 use crate::scenario::Scenario;
@@ -64,11 +64,11 @@ impl Discs {
     }
 
     /// All that touch now, whether they approach or not: what is pushed may be pushed into a third.
-    fn find(&self, positions: &[Vec2], obstacles: &[Vec2], absent: u64, contacts: &mut Vec<Contact>) {
+    fn find(&self, positions: &[Vec2], obstacles: &[Vec2], absent: impl Absent, contacts: &mut Vec<Contact>) {
         let near = TOUCHING * self.shapes.arena.max(1.0);
         contacts.clear();
         let mut add = |robot, other, normal| contacts.push(Contact { robot, other, normal, impulse: 0.0 });
-        for (index, at) in positions.iter().enumerate().filter(|(index, _)| !is_in(absent, *index)) {
+        for (index, at) in positions.iter().enumerate().filter(|(index, _)| !absent.has(*index)) {
             let radius = self.shapes.radii[index];
             for axis in 0..2 {
                 if at[axis].abs() + radius >= self.shapes.arena - near {
@@ -78,7 +78,7 @@ impl Discs {
                 }
             }
             for (other, place) in positions[..index].iter().enumerate() {
-                if is_in(absent, other) {
+                if absent.has(other) {
                     continue;
                 }
                 let apart = place - at;
@@ -124,8 +124,8 @@ impl Discs {
     }
 
     /// Pushes apart what overlaps, the lighter farther; walls and obstacles give way to nobody.
-    fn separate(&self, positions: &mut [Vec2], obstacles: &[Vec2], absent: u64) {
-        let present = |index: &usize| !is_in(absent, *index);
+    fn separate(&self, positions: &mut [Vec2], obstacles: &[Vec2], absent: impl Absent) {
+        let present = |index: &usize| !absent.has(*index);
         for _ in 0..SEPARATING_SWEEPS {
             let mut overlapped = false;
             for index in (0..positions.len()).filter(present) {
@@ -145,7 +145,7 @@ impl Discs {
                 }
             }
             for (index, (at, radius)) in positions.iter_mut().zip(&self.shapes.radii).enumerate() {
-                if is_in(absent, index) {
+                if absent.has(index) {
                     continue;
                 }
                 self.shapes.each_solid(*at, *radius, obstacles, |solid, centre| {
@@ -163,16 +163,15 @@ impl Discs {
             }
         }
     }
-}
 
-impl Engine for Discs {
-    fn advance(
+    /// As [`Engine::advance`].
+    fn period(
         &self,
         workspace: &mut Workspace,
         positions: &mut [Vec2],
         velocities: &mut [Vec2],
         obstacles: &[Vec2],
-        absent: u64,
+        absent: impl Absent,
     ) -> u64 {
         let Scratch { contacts, before } = &mut workspace.discs;
         before.clear();
@@ -205,6 +204,24 @@ impl Engine for Discs {
         self.separate(positions, obstacles, absent);
         self.shapes.hold(MOST_OVERLAP, before, positions, velocities, obstacles, absent);
         touched
+    }
+}
+
+impl Engine for Discs {
+    fn advance(
+        &self,
+        workspace: &mut Workspace,
+        positions: &mut [Vec2],
+        velocities: &mut [Vec2],
+        obstacles: &[Vec2],
+        absent: u64,
+    ) -> u64 {
+        // Nearly always all are there. A type that says so takes the question out of every loop.
+        if absent == 0 {
+            self.period(workspace, positions, velocities, obstacles, Nobody)
+        } else {
+            self.period(workspace, positions, velocities, obstacles, absent)
+        }
     }
 
     fn envs_worth_a_thread(&self) -> usize {

@@ -1,6 +1,6 @@
 //! No contacts: robots fly straight on through each other. Walls alone stop them.
 
-use super::{Engine, Workspace, fly, is_in};
+use super::{Absent, Engine, Workspace, fly};
 use crate::geometry::Vec2;
 use crate::robot::Body;
 use crate::scenario::Scenario;
@@ -28,7 +28,7 @@ impl Engine for Points {
         absent: u64,
     ) -> u64 {
         fly(positions, velocities, self.dt);
-        for (index, limit) in self.limits.iter().enumerate().filter(|(index, _)| !is_in(absent, *index)) {
+        for (index, limit) in self.limits.iter().enumerate().filter(|(index, _)| !absent.has(*index)) {
             for axis in 0..2 {
                 if positions[index][axis].abs() > *limit {
                     positions[index][axis] = limit.copysign(positions[index][axis]);

@@ -10,7 +10,7 @@ use rapier2d::prelude::{
     RigidBodyBuilder, RigidBodyHandle, RigidBodySet, SharedShape, SoftBodySet, Vector,
 };
 
-use super::{Engine, Shapes, Workspace, fly, is_in};
+use super::{Absent, Engine, Shapes, Workspace, fly};
 use crate::blocks::Blocks;
 use crate::geometry::{Solid, Touch, Vec2};
 use crate::robot::Body;
@@ -160,7 +160,7 @@ impl Rapier {
     /// Puts all but those `absent` into their places: these stay where the prepared world has them, apart.
     fn place(&self, world: &mut EngineWorld, positions: &[Vec2], velocities: &[Vec2], absent: u64) {
         let moving = self.robots.iter().zip(positions.iter().zip(velocities)).enumerate();
-        for (_, (handle, (at, velocity))) in moving.filter(|(index, _)| !is_in(absent, *index)) {
+        for (_, (handle, (at, velocity))) in moving.filter(|(index, _)| !absent.has(*index)) {
             let body = &mut world.bodies[*handle];
             body.set_translation(Vector::new(at.x, at.y), false);
             body.set_linvel(Vector::new(velocity.x, velocity.y), false);

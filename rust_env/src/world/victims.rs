@@ -10,6 +10,9 @@ impl World {
     /// Lets the victims appear that the situation wants now, or that arrive, away from all robots but those
     /// `absent`. Returns how many of these found all slots of their task taken.
     pub(super) fn fill_slots(&mut self, rules: &Rules, absent: u64) -> usize {
+        if rules.arrivals.is_none() && !rules.spawn.wants_victims(&self.victims) {
+            return 0;
+        }
         let Self { seed, stream, episode, step, positions, obstacles, victims, .. } = self;
         let arrivals = rules.arrivals.iter();
         let mut due = arrivals.flat_map(|one| one.due(*step, *seed, *stream, *episode)).peekable();
