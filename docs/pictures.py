@@ -291,7 +291,7 @@ def _in_mixed(config: RunConfig) -> bool:
 
 
 def _in_full_crowd(config: RunConfig) -> bool:
-    """Whether a run of the crowd has the full length, and observations of all teammates at hand."""
+    """Whether a run of the crowd has the full length, and observations without teammates."""
     return config.scenario.observed_teammates == 0 and _site_steps(config) > 350_000
 
 

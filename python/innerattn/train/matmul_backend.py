@@ -66,7 +66,7 @@ def onednn() -> Iterator[None]:
 
 
 def warn_of_slow_bfloat16(precision: str, device: str) -> None:
-    """Say that products in bfloat16 slow a training down, where the processor has none.
+    """Say that products in bfloat16 may slow a training down, where the processor has none.
 
     Args:
         precision: `network.precision`.
@@ -77,7 +77,7 @@ def warn_of_slow_bfloat16(precision: str, device: str) -> None:
     if not {"avx512_bf16", "amx_bf16", "bf16"} & set(_CPUINFO.read_text().split()):
         _log.warning(
             "innerattn: warning: network.precision = 'bfloat16': this processor has no "
-            "instructions for it, and multiplies float32 faster"
+            "instructions for it; 'float32' may be faster"
         )
 
 
