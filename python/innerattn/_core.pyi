@@ -12,6 +12,7 @@ __all__ = [
     "Batch",
     "Dispatcher",
     "Instance",
+    "Orders",
     "Routes",
     "Rules",
     "__version__",
@@ -21,6 +22,9 @@ __version__: str
 
 FAULT_KINDS: tuple[tuple[str, str, float, float, float, str], ...]
 """Name, unit ("" for a share), least, most and healthy value, and meaning of each kind of fault."""
+
+ORDER_FEATURES: int
+"""Numbers that are known of a task that could come next in an order."""
 
 REWARD_COMPONENTS: tuple[tuple[str, str], ...]
 """Name and meaning of each reward component, in the order of their columns."""
@@ -75,15 +79,28 @@ class Instance:
         tasks: Sequence[tuple[Sequence[float], Sequence[int], float]],
     ) -> Instance: ...
     def plan(
-        self, seed: int, evaluations: int | None, seconds: float | None
-    ) -> tuple[list[list[int]], int]:
-        """The best schedule of a search, and how many orders of tasks it tried.
+        self,
+        seed: int,
+        evaluations: int | None,
+        seconds: float | None,
+        order: Sequence[int] | None = None,
+    ) -> tuple[list[list[int]], list[int], int]:
+        """The best schedule of a search, an order for it, and how many orders of tasks it tried.
 
-        It ends at the first limit. With `evaluations` alone it gives the same bits on every
-        machine.
+        It begins with `order`, or with the one of `greedy`, and ends at the first limit. With
+        `evaluations` alone it gives the same bits on every machine. In the order that is returned,
+        tasks come as they begin, as far as that makes no schedule longer.
 
         Raises:
-            ValueError: there is no limit, or `seconds` is not 0 to 1e6.
+            ValueError: there is no limit, `seconds` is not 0 to 1e6, or `order` has not each task
+                once.
+        """
+
+    def schedule(self, order: Sequence[int]) -> list[list[int]]:
+        """The schedule of an order of all tasks.
+
+        Raises:
+            ValueError: `order` has not each task once.
         """
 
     def greedy(self) -> list[list[int]]:
@@ -159,6 +176,35 @@ class Dispatcher:
             TypeError: not arrays of such numbers.
             ValueError: wrong shapes, an unknown type, or victims wait for each other in a circle.
         """
+
+@final
+class Orders:
+    """B orders of the tasks of instances, made task by task. F is `ORDER_FEATURES`.
+
+    T is the most tasks of an instance; rows of tasks that an instance does not have are 0. One
+    thread at a time may use it.
+
+    Raises:
+        ValueError: (of `Orders(...)`) there are no instances.
+    """
+
+    def __new__(cls, instances: Sequence[Instance]) -> Orders: ...
+    def features(self) -> NDArray[np.float32]:
+        """What is known of each task that could come next (B, T, F); 0 of the others."""
+
+    def take(self, tasks: ArrayLike) -> None:
+        """Put a task at the end of each order: (B) integers, -1 where an order has all of them.
+
+        Raises:
+            TypeError: they are no integers.
+            ValueError: there are not B, or one could not come next; no order is changed.
+        """
+
+    def makespans(self) -> NDArray[np.float64]:
+        """When the last robot would be back if nothing came any more (B)."""
+
+    def orders(self) -> list[list[int]]:
+        """The tasks so far."""
 
 @final
 class Routes:

@@ -64,37 +64,60 @@ def played(
     return None if math.inf in starts else (starts, returns)
 
 
-def made_greedily(instance: Instance) -> list[list[int]]:
-    """The schedule of `greedy`: always the task that can begin soonest, by trying all coalitions.
+class PlainOrder:
+    """Tasks that are given out one by one; of each coalition all are tried."""
 
-    Of coalitions that begin equally soon it takes the robots that come last, the way home counted
-    1.01 times against them.
-    """
-    schedule: list[list[int]] = [[] for _ in instance.robots]
-    free = [0.0] * len(instance.robots)
-    place = [robot.depot for robot in instance.robots]
-    tasks = list(range(len(instance.tasks)))
-    while tasks:
-        best = None
-        for task in tasks:
-            there = instance.tasks[task].position
-            arrival = [
-                free[robot] + travel(instance, place[robot], there) for robot in range(len(free))
-            ]
-            rank = [
-                arrival[robot] - 1.01 * travel(instance, described.depot, there)
-                for robot, described in enumerate(instance.robots)
-            ]
-            for team in itertools.combinations(range(len(free)), len(instance.tasks[task].skills)):
-                if can_do(instance, task, team):
-                    start = max(arrival[robot] for robot in team)
-                    key = start, task, sorted((-rank[robot], robot) for robot in team)
-                    best = min(best, (key, team)) if best else (key, team)
-        assert best is not None
-        (start, task, _), team = best
-        tasks.remove(task)
+    def __init__(self, instance: Instance) -> None:
+        self.instance = instance
+        self.schedule: list[list[int]] = [[] for _ in instance.robots]
+        self.free = [0.0] * len(instance.robots)
+        self.place = [robot.depot for robot in instance.robots]
+        self.open = list(range(len(instance.tasks)))
+        self.makespan = 0.0
+
+    def coalition(self, task: int) -> tuple[float, tuple[int, ...]]:
+        """When a task could begin now, and with whom.
+
+        Of coalitions that begin equally soon it takes the robots that come last, the way home
+        counted 1.01 times against them.
+        """
+        there = self.instance.tasks[task].position
+        arrival = [
+            free + travel(self.instance, place, there)
+            for free, place in zip(self.free, self.place, strict=True)
+        ]
+        rank = [
+            arrival[robot] - 1.01 * travel(self.instance, described.depot, there)
+            for robot, described in enumerate(self.instance.robots)
+        ]
+        teams = itertools.combinations(range(len(self.free)), len(self.instance.tasks[task].skills))
+        found = [
+            (
+                max(arrival[robot] for robot in team),
+                sorted((-rank[robot], robot) for robot in team),
+                team,
+            )
+            for team in teams
+            if can_do(self.instance, task, team)
+        ]
+        start, _, team = min(found)
+        return start, team
+
+    def take(self, task: int) -> None:
+        """Give out a task."""
+        start, team = self.coalition(task)
+        self.open.remove(task)
+        end, there = start + self.instance.tasks[task].duration, self.instance.tasks[task].position
         for robot in team:
-            schedule[robot].append(task)
-            free[robot] = start + instance.tasks[task].duration
-            place[robot] = instance.tasks[task].position
-    return schedule
+            self.schedule[robot].append(task)
+            self.free[robot], self.place[robot] = end, there
+            home = travel(self.instance, self.instance.robots[robot].depot, there)
+            self.makespan = max(self.makespan, end + home)
+
+
+def made_greedily(instance: Instance) -> list[list[int]]:
+    """The schedule of `greedy`: always the task that can begin soonest."""
+    order = PlainOrder(instance)
+    while order.open:
+        order.take(min(order.open, key=lambda task: (order.coalition(task)[0], task)))
+    return order.schedule

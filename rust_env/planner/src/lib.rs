@@ -17,6 +17,8 @@ pub mod order;
 
 pub mod simple;
 
+pub mod choice;
+
 pub mod search;
 
 pub mod ways;

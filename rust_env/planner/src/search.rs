@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::instance::Instance;
 use crate::order::{Trace, schedule_of};
 use crate::schedule::Schedule;
-use crate::simple::{below, greedy_order};
+use crate::simple::below;
 
 /// First and last temperature, in makespans of the order that the search begins with.
 const TEMPERATURES: (f64, f64) = (0.008, 0.002);
@@ -37,24 +37,34 @@ pub struct Limits {
 pub struct Plan {
     /// The best schedule.
     pub schedule: Schedule,
+    /// The order of the tasks that gives it.
+    pub order: Vec<usize>,
     /// Orders that were tried.
     pub evaluations: u64,
 }
 
-/// Looks for the schedule with the least makespan. Calls `poll` now and then; true ends the search.
+/// Looks for the schedule with the least makespan, beginning with an order of all tasks. Calls `poll` now and
+/// then; true ends the search.
 ///
 /// # Errors
 /// [`Error::Limit`] without any limit or with one that is no limit, [`Error::Interrupted`] if the poll ended
 /// it.
-pub fn plan(instance: &Instance, seed: u64, limits: Limits, poll: &dyn Fn() -> bool) -> Result<Plan> {
+pub fn plan(
+    instance: &Instance,
+    order: Vec<usize>,
+    seed: u64,
+    limits: Limits,
+    poll: &dyn Fn() -> bool,
+) -> Result<Plan> {
     let mut clock = Clock::new(limits, poll)?;
-    let mut search = Search::new(instance, seed);
+    let mut search = Search::new(instance, order, seed);
     let per_look = (TASKS_PER_LOOK / instance.tasks.len()).max(1) as u64;
     while let Some(done) = clock.share_done(search.evaluations)? {
         let left = limits.evaluations.map_or(u64::MAX, |most| most - search.evaluations);
         search.go_on(done, per_look.min(left));
     }
-    Ok(Plan { schedule: schedule_of(instance, &search.best.0), evaluations: search.evaluations })
+    let order = search.best.0;
+    Ok(Plan { schedule: schedule_of(instance, &order), order, evaluations: search.evaluations })
 }
 
 /// How much of its limits a search has used.
@@ -111,8 +121,7 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(instance: &'a Instance, seed: u64) -> Self {
-        let order = greedy_order(instance);
+    fn new(instance: &'a Instance, order: Vec<usize>, seed: u64) -> Self {
         let mut trace = Trace::new(instance);
         for (done, task) in order.iter().enumerate() {
             trace.give_out(instance, done, *task);

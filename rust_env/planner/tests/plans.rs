@@ -3,7 +3,7 @@
 use innerattn_planner::coalition::fills;
 use innerattn_planner::error::Error;
 use innerattn_planner::instance::{Instance, Robot, Task};
-use innerattn_planner::order::{add, schedule_of};
+use innerattn_planner::order::{add, as_they_begin, schedule_of};
 use innerattn_planner::schedule::{Schedule, simulate};
 use innerattn_planner::search::{Limits, Plan, plan};
 use innerattn_planner::simple::{greedy_order, random_schedule};
@@ -16,7 +16,14 @@ fn makespan(instance: &Instance, schedule: &Schedule) -> f64 {
 }
 
 fn planned(instance: &Instance, seed: u64, evaluations: u64) -> Plan {
-    plan(instance, seed, Limits { evaluations: Some(evaluations), seconds: None }, &|| false).unwrap()
+    plan(
+        instance,
+        greedy_order(instance),
+        seed,
+        Limits { evaluations: Some(evaluations), seconds: None },
+        &|| false,
+    )
+    .unwrap()
 }
 
 fn place() -> impl Strategy<Value = [f64; 2]> {
@@ -74,6 +81,28 @@ proptest! {
     #[test]
     fn no_plan_is_shorter_than_the_shortest(instance in instances(5, 3)) {
         prop_assert!(makespan(&instance, &planned(&instance, 1, 200).schedule) >= least(&instance) - 1e-12);
+    }
+
+    #[test]
+    fn an_order_of_tasks_as_they_begin_is_no_longer(instance in instances(5, 6), seed in 0_u64..9) {
+        let order = planned(&instance, seed, 20).order;
+        let settled = as_they_begin(&instance, &order);
+        let mut tasks = settled.clone();
+        tasks.sort_unstable();
+        prop_assert!(tasks.into_iter().eq(0..instance.tasks.len()));
+        let length = |order: &[usize]| makespan(&instance, &schedule_of(&instance, order));
+        prop_assert!(length(&settled) <= length(&order));
+        prop_assert_eq!(schedule_of(&instance, &order), planned(&instance, seed, 20).schedule);
+    }
+
+    #[test]
+    fn a_search_is_no_longer_than_the_order_that_it_begins_with(instance in instances(5, 5), seed in 0_u64..9) {
+        let mut order: Vec<usize> = (0..instance.tasks.len()).collect();
+        order.rotate_left(seed as usize % instance.tasks.len());
+        let limits = Limits { evaluations: Some(30), seconds: None };
+        let found = plan(&instance, order.clone(), seed, limits, &|| false).unwrap();
+        let begun = makespan(&instance, &schedule_of(&instance, &order));
+        prop_assert!(makespan(&instance, &found.schedule) <= begun);
     }
 
     #[test]
@@ -151,7 +180,7 @@ fn what_no_team_could_do_is_refused() {
 #[test]
 fn a_search_ends_when_it_is_told() {
     let limits = |evaluations, seconds| Limits { evaluations, seconds };
-    let ended = |limits, stop: bool| plan(&meeting(), 0, limits, &|| stop);
+    let ended = |limits, stop: bool| plan(&meeting(), vec![0, 1], 0, limits, &|| stop);
     assert_eq!(ended(limits(None, Some(60.0)), true), Err(Error::Interrupted));
     assert_eq!(ended(limits(None, Some(0.0)), false).unwrap().evaluations, 0);
     assert!(ended(limits(None, Some(0.02)), false).unwrap().evaluations > 100);

@@ -1,11 +1,11 @@
 //! `_core.Instance`: a valid instance of task allocation as a Python object. Making one is the only way to
 //! check an instance.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use innerattn_planner::error::Error;
 use innerattn_planner::instance::{Instance as Valid, MAX_SKILLS, Robot, Task};
-use innerattn_planner::order::schedule_of;
+use innerattn_planner::order::{as_they_begin, schedule_of};
 use innerattn_planner::schedule::{Schedule, simulate};
 use innerattn_planner::search::{Limits, plan};
 use innerattn_planner::simple::{greedy_order, random_schedule};
@@ -14,10 +14,23 @@ use pyo3::prelude::*;
 
 /// An instance that was found valid.
 #[pyclass(frozen, module = "innerattn._core")]
-pub struct Instance(Valid);
+pub struct Instance(pub(crate) Arc<Valid>);
 
 fn raised(error: &Error) -> PyErr {
     PyValueError::new_err(error.to_string())
+}
+
+impl Instance {
+    /// An order, if it has each task once.
+    fn checked(&self, order: Vec<usize>) -> PyResult<Vec<usize>> {
+        let mut tasks = order.clone();
+        tasks.sort_unstable();
+        if tasks.into_iter().eq(0..self.0.tasks.len()) {
+            return Ok(order);
+        }
+        let last = self.0.tasks.len() - 1;
+        Err(PyValueError::new_err(format!("order = {order:?}: must have each task from 0 to {last} once")))
+    }
 }
 
 #[pymethods]
@@ -39,17 +52,19 @@ impl Instance {
         let robots = robots.into_iter().enumerate().map(robot).collect::<PyResult<_>>()?;
         let task = |(position, needs, duration)| Task { position, needs, duration };
         let tasks = tasks.into_iter().map(task).collect();
-        Valid::new(speed, robots, tasks).map(Self).map_err(|error| raised(&error))
+        Valid::new(speed, robots, tasks).map(|valid| Self(Arc::new(valid))).map_err(|error| raised(&error))
     }
 
-    #[pyo3(signature = (seed, evaluations, seconds))]
+    #[pyo3(signature = (seed, evaluations, seconds, order = None))]
     fn plan(
         &self,
         py: Python,
         seed: u64,
         evaluations: Option<u64>,
         seconds: Option<f64>,
-    ) -> PyResult<(Schedule, u64)> {
+        order: Option<Vec<usize>>,
+    ) -> PyResult<(Schedule, Vec<usize>, u64)> {
+        let order = order.map_or_else(|| Ok(greedy_order(&self.0)), |order| self.checked(order))?;
         let interruption = Mutex::new(None);
         let poll = || {
             let interrupted = Python::attach(|py| py.check_signals().err());
@@ -57,10 +72,16 @@ impl Instance {
             *interruption.lock().unwrap_or_else(PoisonError::into_inner) = interrupted;
             stops
         };
-        let found = py.detach(|| plan(&self.0, seed, Limits { evaluations, seconds }, &poll));
+        let found = py.detach(|| plan(&self.0, order, seed, Limits { evaluations, seconds }, &poll));
         let interruption = interruption.into_inner().unwrap_or_else(PoisonError::into_inner);
         let found = found.map_err(|error| interruption.unwrap_or_else(|| raised(&error)))?;
-        Ok((found.schedule, found.evaluations))
+        let order = as_they_begin(&self.0, &found.order);
+        Ok((found.schedule, order, found.evaluations))
+    }
+
+    fn schedule(&self, py: Python, order: Vec<usize>) -> PyResult<Schedule> {
+        let order = self.checked(order)?;
+        Ok(py.detach(|| schedule_of(&self.0, &order)))
     }
 
     fn greedy(&self, py: Python) -> Schedule {

@@ -6,6 +6,7 @@ mod batch;
 mod dispatch;
 mod door;
 mod instance;
+mod orders;
 mod routes;
 mod rules;
 
@@ -56,11 +57,13 @@ fn reward_components(py: Python) -> PyResult<Bound<PyTuple>> {
 #[pymodule]
 fn _core(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("ORDER_FEATURES", innerattn_planner::choice::FEATURES)?;
     module.add("FAULT_KINDS", fault_kinds(module.py())?)?;
     module.add("REWARD_COMPONENTS", reward_components(module.py())?)?;
     module.add_class::<rules::Rules>()?;
     module.add_class::<dispatch::Dispatcher>()?;
     module.add_class::<instance::Instance>()?;
+    module.add_class::<orders::Orders>()?;
     module.add_class::<routes::Routes>()?;
     module.add_class::<batch::Batch>()
 }

@@ -100,6 +100,16 @@ def test_the_planner_beats_the_program_of_the_authors() -> None:
     assert all(ours <= theirs for ours, theirs in zip(found, greedy, strict=True))
 
 
+def test_the_learnt_policy_is_shorter_than_published_and_helps_a_short_search() -> None:
+    def mean(name: str, evaluations: int) -> float:
+        found = (schedule_by(name, one, None, 0, evaluations) for one in RAL)
+        return sum(one.makespan for one in found) / len(RAL)
+
+    published = sum(instance.makespan_milp_600s or math.nan for instance in RAL) / len(RAL)
+    assert mean("learnt", 1) < 0.995 * published
+    assert mean("guided", 1_000) < mean("planner", 1_000)
+
+
 def test_a_number_of_evaluations_gives_the_same_bits_everywhere() -> None:
     found = [plan(instance, None, 2_000, seed=7).makespan.hex() for instance in RAL[:4]]
     assert found == [
