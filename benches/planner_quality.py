@@ -18,6 +18,7 @@ from innerattn.evaluate.instances import InstanceResults, solve_instances
 PAGE = Path(__file__).parents[1] / "docs" / "instances.md"
 SEEDS = range(3)
 LIMITS_MS = (10, 50, 1000)
+GUIDED_MS = (100, 1000)
 HEAD = ["schedule", "mean makespan", "ratio", "shorter than published", "seconds each"]
 
 
@@ -30,6 +31,8 @@ def main() -> None:
     rows += [row("random", "random", instances, 1), row("greedy", "greedy", instances, 1)]
     for limit in LIMITS_MS:
         rows.append(row(f"planner, {limit:,} ms", "planner", instances, limit))
+    rows.append(row("learnt", "learnt", instances, 1))
+    rows += [row(f"guided, {limit:,} ms", "guided", instances, limit) for limit in GUIDED_MS]
     seeds = f"Seeds {SEEDS[0]} to {SEEDS[-1]}; the load was {load:.1f} before the first run."
     publish("planner_quality", f"{table(HEAD, rows)}\n\n{machine()}. {seeds}", PAGE)
 

@@ -12,6 +12,7 @@ from innerattn.config.instances import read_instances, read_worlds
 from innerattn.policies.scripted.planner import schedule_by
 
 Captured = pytest.CaptureFixture[str]
+RAL = read_instances("ral")
 
 
 def document(capsys: Captured, policy: str, *options: str) -> dict[str, Any]:
@@ -21,24 +22,33 @@ def document(capsys: Captured, policy: str, *options: str) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize("policy", ["planner", "greedy", "random"])
+@pytest.mark.parametrize("policy", ["planner", "guided", "learnt", "greedy", "random"])
 def test_the_document_has_every_instance(policy: str, capsys: Captured) -> None:
     found = document(capsys, policy, "--instances", "ral", "--time-limit-ms", "2", "--seed", "4")
     assert (found["schema_version"], found["policy"], found["seed"]) == (1, policy, 4)
-    assert found["time_limit_ms"] == (2 if policy == "planner" else None)
+    assert found["time_limit_ms"] == (2 if policy in ("planner", "guided") else None)
     instances = read_instances("ral")
     assert [one["name"] for one in found["instances"]] == [one.name for one in instances]
     for one, instance in zip(found["instances"], instances, strict=True):
         assert one["published_makespan"] == instance.makespan_milp_600s
         assert one["lower_bound"] == instance.lower_bound_milp <= one["makespan"]
         assert one["seconds"] > 0.0
-        if policy != "planner":
+        if policy not in ("planner", "guided"):
             assert one["makespan"] == schedule_by(policy, instance, 0.0, 4).makespan
     makespans = [one["makespan"] for one in found["instances"]]
     assert found["mean_makespan"] == pytest.approx(sum(makespans) / 30)
     assert found["published_mean_makespan"] == pytest.approx(23.9242, abs=1e-4)
     ratio = found["mean_makespan"] / found["published_mean_makespan"]
     assert found["ratio"] == pytest.approx(ratio)
+
+
+@pytest.mark.parametrize("policy", ["planner", "guided"])
+def test_a_number_of_orders_gives_the_same_schedules(policy: str, capsys: Captured) -> None:
+    words = ("--instances", "ral", "--evaluations", "400")
+    found, again = (document(capsys, policy, *words) for _ in range(2))
+    assert (found["evaluations"], found["time_limit_ms"]) == (400, None)
+    for one, other in zip(found["instances"], again["instances"], strict=True):
+        assert one["makespan"] == other["makespan"]
 
 
 def test_instances_without_published_values(tmp_path: Path, capsys: Captured) -> None:
@@ -69,9 +79,23 @@ def test_wrong_words(tmp_path: Path, capsys: Captured) -> None:
     bad.write_text("[{}]")
     cases = [
         (2, "greedy --time-limit-ms 3", "--time-limit-ms: needs --instances"),
-        (2, "gredy --instances ral", "gredy: with --instances must be one of planner, greedy, ra"),
+        (2, "gredy --instances ral", "gredy: with --instances must be one of planner, guided, le"),
+        (2, "greedy:a --instances ral", "greedy:a: only learnt and guided take a file"),
+        (2, "learnt: --instances ral", "learnt:: needs a file after the colon, or no colon"),
+        (1, "guided:none.bin --instances ral", "none.bin: missing, or not a plain file"),
         (2, "planner --instances ral --episodes 3", "--episodes: has no meaning with --instances"),
         (2, "planner --instances ral --time-limit-ms 0", "--time-limit-ms 0: must be 1 to 8640000"),
+        (
+            2,
+            "planner --instances ral --evaluations 0",
+            "--evaluations 0: must be 1 to 10",
+        ),
+        (2, "planner --evaluations 9", "--evaluations: needs --instances"),
+        (
+            2,
+            "planner --instances standard --evaluations 9",
+            "--evaluations: has no meaning",
+        ),
         (2, "planner --instances ral --seed -1", "--seed -1: must be 0 to 2**63 - 1"),
         (1, "planner --instances rall", "rall: missing, or not a plain file, did you mean 'ral'?"),
         (1, f"planner --instances {bad}", f"{bad}: instances[0].name: must be given"),
@@ -142,7 +166,7 @@ def test_wrong_words_for_a_replay(tmp_path: Path, capsys: Captured) -> None:
     most = 86_400_000
     cases = [
         (2, "greedy --time-limit-ms 3", "--time-limit-ms: needs --instance"),
-        (2, "gredy --instance ral", "gredy: with --instance must be one of planner, greedy, rand"),
+        (2, "gredy --instance ral", "gredy: with --instance must be one of planner, guided, lea"),
         (2, "greedy random --instance ral", "2 policies: with --instance must be one"),
         (2, "--instance ral --episodes 3", "--episodes: has no meaning with --instance"),
         (2, "--instance ral --scenario x.toml", "--scenario: has no meaning with --instance"),
@@ -183,6 +207,23 @@ def test_schedules_are_played_with_bodies(tmp_path: Path, capsys: Captured) -> N
     assert "by robots with bodies (engine discs)" in " ".join(capsys.readouterr().out.split())
     assert main(["evaluate", "greedy", "--engine", "discs"]) == 2
     assert "--engine: needs --instances" in capsys.readouterr().err
+
+
+def test_a_schedule_is_shown_as_robots_with_bodies_carry_it_out(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    words = ["replay", "greedy", "--instance", "ral:ral_03", "-o", str(tmp_path / "page.html")]
+    assert main([*words, "--engine", "discs"]) == 0
+    makespan = float(capsys.readouterr().out.split()[-1])
+    assert makespan == pytest.approx(schedule_by("greedy", RAL[3], 0.0, 0).makespan, rel=0.03)
+    page = (tmp_path / "page.html").read_text()
+    assert "Replay of greedy" in page
+    for line, told in (
+        ("replay greedy --engine discs", "--engine: needs --instance"),
+        (f"replay greedy --engine discs --instance {tiny(tmp_path)}", "--engine: has no meaning"),
+    ):
+        assert main(line.split()) == 2
+        assert told in capsys.readouterr().err
 
 
 def tiny(folder: Path) -> Path:

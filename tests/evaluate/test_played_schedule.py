@@ -8,7 +8,7 @@ import pytest
 from innerattn.config.instances import Instance, read_instances
 from innerattn.config.instances.bodies import DT_S, REACH_M, world_of
 from innerattn.errors import ConfigError
-from innerattn.evaluate.played_schedule import most_time, play_schedule
+from innerattn.evaluate.played_schedule import most_time, play_schedule, record_schedule
 from innerattn.policies.scripted.planner import Schedule, plan, schedule_by, simulate
 
 ENGINES: list[Any] = ["none", "discs", "rapier"]
@@ -100,3 +100,18 @@ def test_robots_of_one_depot_start_beside_each_other() -> None:
     assert apart.min() >= 0.02
     same = np.array([robot.start_m for robot in world_of(many, "none", 10.0).robots])
     assert (same == same[0]).all()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_record_ends_when_the_last_robot_is_back(engine: Any) -> None:
+    one = read_instances("ral")[4]
+    schedule = schedule_by("greedy", one, 0.0, 0)
+    record = record_schedule(one, schedule, engine)
+    played = play_schedule(one, schedule, engine)
+    assert played is not None
+    assert record.num_episodes == 1
+    assert record.scenario.episode_steps * DT_S == pytest.approx(played)
+    assert sorted(record.rescues["task"].tolist()) == list(range(20))
+    starts = [robot.start_m for robot in record.scenario.robots]
+    away = np.linalg.norm(record.steps["positions"][0, -1] - starts, axis=-1)
+    assert away.max() <= REACH_M + 0.05

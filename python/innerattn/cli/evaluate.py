@@ -17,7 +17,7 @@ from innerattn.cli.options import (
     check_target,
     option_values,
 )
-from innerattn.cli.planners import check_planner, limit_ms
+from innerattn.cli.planners import check_evaluations, check_planner, limit_ms
 from innerattn.cli.progress import Evaluating, Planning
 from innerattn.cli.runs import named_policy
 from innerattn.config import EvaluateConfig, Scenario
@@ -48,6 +48,8 @@ _OF_WORLDS = (
     "long_episode_steps",
 )
 """Options that have no meaning for instances."""
+_OF_POINTS = ("time_limit_ms", "evaluations", "engine")
+"""Options that have a meaning for instances of points alone."""
 
 
 @dataclass(kw_only=True)
@@ -56,8 +58,8 @@ class Evaluate(LongCommand):
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="RUN|POLICY")]
     """A run, or one of random, greedy, hungarian, planner, oracle, greedy-seen. A run is a folder,
-    latest, or the beginning of the name of one in runs. With --instances ral: planner, greedy or
-    random."""
+    latest, or the beginning of the name of one in runs. With --instances ral: planner, learnt,
+    guided, greedy or random; learnt:FILE and guided:FILE use a policy of your own."""
     scenario: Path | None = None
     """TOML file with the scenario to measure in; None: that of the run, or mixed."""
     situation: Literal["single", "double", "mixed", "poisson", "listed"] | None = None
@@ -81,7 +83,11 @@ class Evaluate(LongCommand):
     """Measure on these instead: a JSON file, or what comes with the package: ral (instances of
     task allocation, for planners) or standard (300 worlds)."""
     time_limit_ms: int | None = None
-    """How long planner searches for each instance [ms]; None: 1000."""
+    """How long planner and guided search for each instance [ms]; None: 1000, or without limit if
+    --evaluations is given."""
+    evaluations: int | None = None
+    """Orders that planner and guided try for each instance; results then do not depend on the speed
+    of the machine. None: as many as the time allows."""
     engine: Literal["none", "discs", "rapier"] | None = None
     """With --instances ral: play the schedules in worlds of bodies with these contacts, or none;
     None: exactly, as points."""
@@ -102,10 +108,8 @@ class Evaluate(LongCommand):
             check_target(self.json)
         if self.instances is not None:
             return self._on_instances(self.instances)
-        if self.time_limit_ms is not None:
-            raise UsageError("--time-limit-ms: needs --instances")
-        if self.engine is not None:
-            raise UsageError("--engine: needs --instances")
+        for name in self._given(*_OF_POINTS):
+            raise UsageError(f"--{name.replace('_', '-')}: needs --instances")
         evaluation = self._measure()
         if self._wrote(evaluation.summary.to_json()):
             return 0
@@ -144,10 +148,18 @@ class Evaluate(LongCommand):
         from innerattn.evaluate.instances import solve_instances
 
         check_planner(self.policy, "--instances")
-        limit = limit_ms(self.time_limit_ms)
+        check_evaluations(self.evaluations)
+        has_no_limit = self.time_limit_ms is None and self.evaluations is not None
+        limit = None if has_no_limit else limit_ms(self.time_limit_ms)
         with Planning(self.progress_console()) as progress:
             found = solve_instances(
-                self.policy, instances, limit, self.seed or 0, progress, self.engine
+                self.policy,
+                instances,
+                limit,
+                self.seed or 0,
+                progress,
+                self.engine,
+                self.evaluations,
             )
         if self._wrote(found.to_json()):
             return 0
@@ -159,7 +171,7 @@ class Evaluate(LongCommand):
         """Measure a script or a team in worlds."""
         from innerattn.evaluate.instance_worlds import evaluate_worlds
 
-        for name in self._given("time_limit_ms", "engine"):
+        for name in self._given(*_OF_POINTS):
             raise UsageError(f"--{name.replace('_', '-')}: has no meaning in worlds")
         policy = named_policy(self.policy, SCRIPTS)
         shown = self.policy if in_zoo(self.policy) else policy

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -58,7 +58,10 @@ class Replay(Command):
     """Show this instance instead: a JSON file, or ral or standard, and a name, as in ral:ral_03;
     without a name the first. Points are shown with a schedule, worlds with an episode."""
     time_limit_ms: int | None = None
-    """How long planner searches for the instance [ms]; None: 1000."""
+    """How long planner and guided search for the instance [ms]; None: 1000."""
+    engine: Literal["none", "discs", "rapier"] | None = None
+    """With --instance of points: show how robots with bodies carry out the schedule in a world with
+    these contacts, or none; None: the schedule itself."""
 
     def run(self) -> int:
         """Read or play, then write the file.
@@ -123,14 +126,28 @@ class Replay(Command):
         check_seed(self.seed)
         check_target(self.output)
         schedule = schedule_by(policy, instance, limit / 1000, self.seed or 0)
-        write_whole(self.output, schedule_page(instance, schedule, policy).encode())
-        print(f"{self.output}: {instance.name}, {policy}, {schedule_line(instance, schedule)}")
+        line = schedule_line(instance, schedule)
+        if self.engine is None:
+            page = schedule_page(instance, schedule, policy)
+        else:
+            from innerattn.evaluate.played_schedule import record_schedule
+            from innerattn.report.replay import replay_page
+
+            record = record_schedule(instance, schedule, self.engine)
+            page = replay_page([record], [policy])
+            makespan = record.scenario.episode_steps * record.scenario.dt_s
+            line = f"{line}; with {self.engine} {makespan:.2f}"
+        write_whole(self.output, page.encode(errors="backslashreplace"))
+        print(f"{self.output}: {instance.name}, {policy}, {line}")
         return 0
 
     def _check(self) -> None:
         if self.time_limit_ms is not None:
             needs = "needs --instance" if self.instance is None else "has no meaning in worlds"
             raise UsageError(f"--time-limit-ms: {needs}")
+        if self.engine is not None:
+            needs = "needs --instance" if self.instance is None else "has no meaning in worlds"
+            raise UsageError(f"--engine: {needs}")
         if not 1 <= len(self.policies) <= 4:
             raise UsageError(f"{len(self.policies)} policies: must be 1 to 4 of RUN|POLICY|FILE")
         if self.output.suffix not in SUFFIXES:

@@ -10,7 +10,7 @@ from typing import Any
 from innerattn.config.instances import Instance
 from innerattn.config.instances.bodies import Engine
 from innerattn.evaluate.played_schedule import most_time, play_schedule
-from innerattn.policies.scripted.planner import schedule_by
+from innerattn.policies.scripted.planner import SEARCHING, schedule_by
 
 SCHEMA_VERSION = 1
 
@@ -51,7 +51,9 @@ class InstanceResults:
     Attributes:
         policy: name of the planner.
         seed: of the planner.
-        time_limit_ms: how long it was to search for each instance [ms]; None: it does not search.
+        time_limit_ms: how long it was to search for each instance [ms]; None: it had no limit, or
+            does not search.
+        evaluations: orders that it was to try for each instance; None: it had no such limit.
         engine: of the worlds in which its schedules were played; None: they were simulated exactly.
         solved: one for each instance, in order.
     """
@@ -61,6 +63,7 @@ class InstanceResults:
     time_limit_ms: int | None
     solved: tuple[Solved, ...]
     engine: Engine | None = None
+    evaluations: int | None = None
 
     @property
     def mean_makespan(self) -> float:
@@ -92,6 +95,7 @@ class InstanceResults:
             "policy": self.policy,
             "seed": self.seed,
             "time_limit_ms": self.time_limit_ms,
+            "evaluations": self.evaluations,
             "engine": self.engine,
             "instances": [one.to_json() for one in self.solved],
             "mean_makespan": self.mean_makespan,
@@ -103,29 +107,33 @@ class InstanceResults:
 def solve_instances(
     policy: str,
     instances: Sequence[Instance],
-    time_limit_ms: int,
+    time_limit_ms: int | None,
     seed: int,
     progress: Callable[[int, int], None] | None = None,
     engine: Engine | None = None,
+    evaluations: int | None = None,
 ) -> InstanceResults:
     """Let a planner make a schedule for each instance, and simulate it or play it in a world.
 
     Args:
-        policy: one of `innerattn.policies.scripted.planner.PLANNERS`.
+        policy: one of `innerattn.policies.scripted.planner.PLANNERS`, as `schedule_by` takes it.
         instances: one or more.
-        time_limit_ms: how long ``planner`` searches for each [ms].
-        seed: of ``planner`` and ``random``, the same for each instance.
+        time_limit_ms: how long it searches for each [ms], if it does; None: as long as
+            ``evaluations`` says.
+        seed: of the planner, the same for each instance.
         progress: is told how many instances of how many are done.
         engine: of the worlds in which schedules are played, see `play_schedule`; None: they are
             simulated exactly, as of points.
+        evaluations: orders that it tries for each, if it searches; None: no limit.
 
     Raises:
         ConfigError: an instance has no world.
     """
     solved = []
+    limit_s = None if time_limit_ms is None else time_limit_ms / 1000
     for instance in instances:
         began = time.perf_counter()
-        schedule = schedule_by(policy, instance, time_limit_ms / 1000, seed)
+        schedule = schedule_by(policy, instance, limit_s, seed, evaluations)
         seconds = time.perf_counter() - began
         makespan: float | None = schedule.makespan
         if engine is not None:
@@ -134,5 +142,6 @@ def solve_instances(
         solved.append(Solved(instance, makespan or most_time(schedule), seconds, is_done))
         if progress is not None:
             progress(len(solved), len(instances))
-    limit = time_limit_ms if policy == "planner" else None
-    return InstanceResults(policy, seed, limit, tuple(solved), engine)
+    if policy.partition(":")[0] not in SEARCHING:
+        time_limit_ms = evaluations = None
+    return InstanceResults(policy, seed, time_limit_ms, tuple(solved), engine, evaluations)

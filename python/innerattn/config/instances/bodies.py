@@ -63,8 +63,8 @@ def world_of(instance: Instance, engine: Engine, most_s: float) -> Scenario:
         "robots": [
             {
                 "name": f"robot_{index}",
-                "kind": "robot",
-                "abilities": sorted({f"skill_{skill}" for skill in robot.skills}),
+                "kind": "_".join(_abilities(robot.skills)) or "none",
+                "abilities": _abilities(robot.skills),
                 "max_speed_mps": speed,
                 "mass_kg": 1.0,
                 "radius_m": RADIUS_M,
@@ -78,7 +78,7 @@ def world_of(instance: Instance, engine: Engine, most_s: float) -> Scenario:
         "tasks": [
             {
                 "name": f"task_{index}",
-                "needs": [f"skill_{skill}" for skill in task.skills],
+                "needs": [f"s{skill}" for skill in task.skills],
                 "service_s": task.duration,
             }
             for index, task in enumerate(instance.tasks)
@@ -92,6 +92,11 @@ def world_of(instance: Instance, engine: Engine, most_s: float) -> Scenario:
         return Scenario().replace(**values)
     except ConfigError as error:
         raise ConfigError(f"{instance.name}: cannot be played in a world: {error}") from error
+
+
+def _abilities(skills: tuple[int, ...]) -> list[str]:
+    """Short names, which fit into the marks of a page."""
+    return [f"s{skill}" for skill in sorted(set(skills))]
 
 
 def _frame(instance: Instance) -> tuple[float, Place]:
