@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "FAULT_KINDS",
+    "ORDER_FEATURES",
     "REWARD_COMPONENTS",
     "Batch",
     "Dispatcher",
