@@ -145,7 +145,8 @@ def test_without_attention_none_is_recorded_or_reported(tmp_path: Path) -> None:
     assert list(recorded.steps) == [
         name
         for name in FIELDS
-        if name not in ("headings", "charge", "load", "heard", "rays", "attention")
+        if name
+        not in ("headings", "charge", "load", "heard", "rays", "attention", "actor_attention")
     ]
 
 

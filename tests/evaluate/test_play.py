@@ -43,7 +43,8 @@ def test_record_against_a_plain_loop() -> None:
     assert list(record.steps) == [
         name
         for name in FIELDS
-        if name not in ("headings", "charge", "load", "heard", "rays", "attention")
+        if name
+        not in ("headings", "charge", "load", "heard", "rays", "attention", "actor_attention")
     ]
     policy = scripted_policy("hungarian", scenario)
     env = BatchEnv(scenario, 6, seed=SEED, copy=True)

@@ -6,9 +6,11 @@ import torch
 from innerattn.config import NetworkConfig, PPOConfig, TDConfig
 from innerattn.learn import PPO, TD, Team, Transitions
 from innerattn.learn.actor_critic import ActorCritic
-from innerattn.nn import EntityColumns
+from innerattn.learn.framed import FramedLearner
+from innerattn.nn import EntityColumns, SquareSymmetry, VectorColumns
 
 ENVS, STEPS, ACTIONS = 8, 4, 5
+CPU = torch.device("cpu")
 
 
 def columns(robots: int) -> EntityColumns:
@@ -92,6 +94,44 @@ def test_the_policy_heeds_no_order_of_teammates_and_victims(pooling: str) -> Non
         torch.testing.assert_close(
             learner.actor(given.transpose(0, 1)), learner.actor(obs.transpose(0, 1))
         )
+
+
+def test_the_attention_of_actors_names_teammates_by_their_number() -> None:
+    learner, obs = make("ppo", 4), observations(4, 3)
+    found = learner.actor_attention(obs)
+    weights = learner.actor.first.teammate_weights(obs.transpose(0, 1))
+    assert found is not None
+    assert found.shape == (ENVS, 1, 4, 4)
+    for i in range(4):
+        assert (found[:, :, i, i] == 0.0).all()
+        for k, j in enumerate(j for j in range(4) if j != i):
+            assert torch.equal(found[:, 0, i, j], weights[i, 0, k])
+    torch.testing.assert_close(found.sum(3), torch.ones(ENVS, 1, 4))
+    assert (found.amax(3) - found.sum(3) / 3).abs().max() > 0.01  # it is not even
+
+
+@pytest.mark.parametrize(
+    "network",
+    [
+        {"encoder": "flat"},
+        {"pooling": "mean"},
+        {"memory_width": 4},
+    ],
+)
+def test_other_actors_have_no_attention(network: dict[str, object]) -> None:
+    assert make("ppo", 3, **network).actor_attention(observations(3, 0)) is None
+
+
+def test_attention_in_a_frame_is_that_to_what_is_seen_there() -> None:
+    vectors = VectorColumns(17, ((0, 1), (3, 4), (7, 8)), (), ((0, 1),))
+    learner = make("ppo", 3)
+    framed = FramedLearner(learner, SquareSymmetry(vectors, CPU), drawn=None)
+    drawn = FramedLearner(learner, SquareSymmetry(vectors, CPU), drawn=5)
+    obs = observations(3, 0)
+    seen, _ = framed.as_seen(obs, torch.zeros(ENVS, 3, dtype=torch.int64))
+    assert not torch.equal(seen, obs)
+    assert torch.equal(framed.actor_attention(obs), learner.actor_attention(seen))
+    assert torch.equal(drawn.actor_attention(obs), learner.actor_attention(obs))
 
 
 def test_flat_networks_ignore_whose_the_columns_are() -> None:

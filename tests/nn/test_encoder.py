@@ -138,6 +138,35 @@ def plain_all(encoder: EntityEncoder, obs: Tensor, pooling: str, seen: bool) -> 
     return torch.stack(rows)
 
 
+@pytest.mark.parametrize(("extra", "out", "seen"), [(2, 64, True), (0, 64, False), (0, 6, True)])
+@torch.no_grad()
+def test_weights_on_teammates_against_plain_loops(extra: int, out: int, seen: bool) -> None:
+    encoder, obs = make(4, extra, out, seen=seen), observations(4, extra)
+    weights = encoder.teammate_weights(obs)
+    assert weights is not None
+    assert weights.shape == (4, max(1, out // 32), 3, B)
+    for robot, row in ((i, b) for i in range(4) for b in range(B)):
+        own = torch.cat([obs[robot, row, :OWN], obs[robot, row, columns(4).width :]])
+        encoded = leaky(affine(encoder, "own", robot, own))
+        query = affine(encoder, "query", robot, encoded)[len(encoded) :]
+        mates = list(teammates_of(obs)[robot, row])
+        keys = [leaky(affine(encoder, "teammate", robot, one)) for one in mates]
+        for head in range(len(query) // HEAD):
+            part = slice(head * HEAD, (head + 1) * HEAD)
+            shares = [float((query[part] @ key[part] / HEAD**0.5).exp()) for key in keys]
+            shares = [
+                x * (one[SEEN] > 0.5 or not seen) for x, one in zip(shares, mates, strict=True)
+            ]
+            whole = float(sum(shares)) or 1.0
+            expected = torch.tensor([float(x) / whole for x in shares], dtype=torch.float64)
+            torch.testing.assert_close(weights[robot, head, :, row], expected)
+
+
+@pytest.mark.parametrize(("robots", "pooling"), [(1, "attention"), (4, "mean"), (4, "nearest")])
+def test_only_attention_to_teammates_has_weights(robots: int, pooling: str) -> None:
+    assert make(robots, pooling=pooling).teammate_weights(observations(robots)) is None
+
+
 @pytest.mark.parametrize(
     ("robots", "extra", "out", "pooling", "seen"),
     [

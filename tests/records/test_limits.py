@@ -140,6 +140,7 @@ IN_A_STEP: dict[str, tuple[str, str, Any, str]] = {
     "reward": ("greedy", "rewards", 1e30, "rewards: must be in -1e"),
     "action": ("greedy", "actions", 5, "actions: must be in 0..=4"),
     "attention": ("attentive", "attention", 1.5, "attention: must be in "),
+    "attention of actors": ("attentive", "actor_attention", -0.1, "actor_attention: must be in "),
     "task": ("greedy", "victims", ("task", 2), "task of a victim: must be in 0..=1"),
     "place of a victim": ("greedy", "victims", ("x", 1e30), "x of a victim: must be in -1..=1"),
     "time of a victim": ("greedy", "victims", ("appeared_step", 26), "appeared_step of a victim"),
@@ -165,6 +166,9 @@ class EvenAttention:
         assert len(actions) == len(view.obs)
         even = (1 - np.eye(4, dtype=np.float32)) / 3
         return np.broadcast_to(even, (len(actions), 1, 4, 4))
+
+    def actor_attention(self, view: PolicyInput) -> np.ndarray:
+        return self.attention(view, np.zeros(len(view.obs)))
 
 
 @pytest.mark.parametrize("what", IN_A_STEP)

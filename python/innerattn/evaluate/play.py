@@ -31,6 +31,17 @@ class Attentive(Protocol):
         """Attention weights (E, H, R, R) for these actions; None where there are none."""
 
 
+@runtime_checkable
+class AttentiveActor(Protocol):
+    """A policy with actors whose attention, if they have any, can be recorded."""
+
+    def actor_attention(self, view: PolicyInput) -> NDArray[np.float32] | None:
+        """Attention weights (E, H, R, R) on teammates, which rows of ``view`` have in their order.
+
+        None where there are none.
+        """
+
+
 def run_episodes(
     policy: Policy,
     scenario: Scenario,
@@ -52,8 +63,9 @@ def run_episodes(
         seed: seed of the worlds, 0 to 2**63 - 1; with ``first_episode`` it fixes the starts.
         first_episode: number of the first episode.
         record: which of `FIELDS` to keep for every step; attention is kept only if the policy has
-            it, headings, charge, load and rays only if some robots have such, and heard only if
-            something limits communication.
+            it, actor_attention only if, besides, rows have all teammates in their order, headings,
+            charge, load and rays only if some robots have such, and heard only if something limits
+            communication.
         num_threads: threads that step the worlds; none: all cores.
         progress: called with the number of episodes each time some are done.
         purpose: "training" for the random streams that a training with this seed has; those of
@@ -122,6 +134,9 @@ def _run_batch(
         if "attention" in record and isinstance(policy, Attentive):
             weights = policy.attention(view, actions)
             seen |= {} if weights is None else {"attention": weights}
+        if "actor_attention" in record and _in_order(env) and isinstance(policy, AttentiveActor):
+            weights = policy.actor_attention(view)
+            seen |= {} if weights is None else {"actor_attention": weights}
         for name in seen.keys() & set(record):
             _keep(steps, name, step_index, total_steps, seen[name], running)
         step = env.step(actions)
@@ -154,6 +169,11 @@ def _run_batch(
         rewards_total=rewards_total,
         steps={name: steps[name] for name in FIELDS if name in steps},
     )
+
+
+def _in_order(env: BatchEnv) -> bool:
+    """Whether each row has all teammates, in their order."""
+    return env.scenario.observed_teammates is None
 
 
 def _keep(

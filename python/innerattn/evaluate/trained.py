@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from innerattn.config import RunConfig, Scenario
 from innerattn.envs import BatchEnv
 from innerattn.errors import RunError
-from innerattn.learn.types import Learner, RememberingLearner
+from innerattn.learn.types import ActorAttention, Learner, RememberingLearner
 from innerattn.policies import PolicyInput
 from innerattn.train import load_policy
 from innerattn.train.teams.policy import TeamPolicy
@@ -48,6 +48,13 @@ class TrainedPolicy:
     def attention(self, view: PolicyInput, actions: NDArray[Any]) -> NDArray[np.float32] | None:
         """See `Attentive.attention`."""
         weights = self._learner.attention(torch.tensor(view.obs), torch.tensor(actions))
+        return None if weights is None else np.asarray(weights.numpy())
+
+    def actor_attention(self, view: PolicyInput) -> NDArray[np.float32] | None:
+        """See `AttentiveActor.actor_attention`."""
+        if not isinstance(self._learner, ActorAttention):
+            return None
+        weights = self._learner.actor_attention(torch.tensor(view.obs))
         return None if weights is None else np.asarray(weights.numpy())
 
 

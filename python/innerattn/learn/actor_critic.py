@@ -242,6 +242,19 @@ class ActorCritic:
             )
         return None if output.attended is None else output.attended.weights
 
+    @torch.no_grad()
+    def actor_attention(self, obs: Tensor) -> Tensor | None:
+        """Attention weights (B, H, R, R) of the actor; see `ActorAttention`."""
+        if not isinstance(self.actor, Actor):
+            return None
+        weights = self.actor.teammate_weights(self._robots_first(obs))
+        if weights is None or weights.shape[2] != len(weights) - 1:
+            return None
+        robots, heads, _, batch = weights.shape
+        found = weights.new_zeros(robots, robots, heads, batch)
+        found[~torch.eye(robots, dtype=torch.bool)] = weights.transpose(1, 2).flatten(0, 1)
+        return found.permute(3, 2, 0, 1)
+
     def state(self) -> dict[str, Tensor]:
         """Copies of all weights, optimiser moments and running statistics, and the update count.
 

@@ -16,6 +16,7 @@ from innerattn.learn.interruptions import Interruptions
 from innerattn.learn.resume import State, inside, take_generator, under
 from innerattn.learn.ring import Ring
 from innerattn.learn.types import (
+    ActorAttention,
     Afterstates,
     Learner,
     RememberingLearner,
@@ -133,6 +134,16 @@ class FramedLearner:
         if isinstance(self.learner, RememberingLearner):
             return self.learner.attention(obs, actions, remembered, element)
         return self.learner.attention(obs, actions)
+
+    def actor_attention(self, obs: Tensor) -> Tensor | None:
+        """Attention weights (B, H, R, R) of the actor; see `ActorAttention`.
+
+        Elements that are drawn in training are left out.
+        """
+        if not isinstance(self.learner, ActorAttention):
+            return None
+        seen = obs if self._generator is not None else self._look(obs)[1]
+        return self.learner.actor_attention(seen)
 
     def forget(self) -> None:
         """Begin new episodes in all worlds; see `RememberingLearner`."""

@@ -217,6 +217,22 @@ class Learner(Protocol):
 
 
 @runtime_checkable
+class ActorAttention(Protocol):
+    """A learner whose actors may attend to their teammates."""
+
+    def actor_attention(self, obs: Tensor) -> Tensor | None:
+        """The weights with which actors sum up their teammates.
+
+        Args:
+            obs: (B, R, D) float32, in which each row has all teammates in their order.
+
+        Returns:
+            (B, H, R, R): row i holds robot i's weights over its teammates; the diagonal is 0. None
+            where actors sum up no teammates by attention, and where they remember or hear messages.
+        """
+
+
+@runtime_checkable
 class ScheduledLearner(Protocol):
     """A learner that can follow a schedule of its run (`train.schedule`)."""
 

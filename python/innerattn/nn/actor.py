@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from innerattn.nn.encoder import EntityColumns, observation_encoder
+from innerattn.nn.encoder import EntityColumns, EntityEncoder, observation_encoder
 from innerattn.nn.linear import PerRobotLinear
 
 
@@ -53,6 +53,10 @@ class Actor(nn.Module):
         hidden = functional.leaky_relu_(self.first(obs))
         hidden = functional.leaky_relu_(self.second(hidden))
         return self.output.batch_last(hidden)
+
+    def teammate_weights(self, obs: Tensor) -> Tensor | None:
+        """See `EntityEncoder.teammate_weights`; None where whole rows are encoded."""
+        return self.first.teammate_weights(obs) if isinstance(self.first, EntityEncoder) else None
 
 
 class MaskedActor(Actor):

@@ -147,6 +147,30 @@ class EntityEncoder(nn.Module):
         hidden: Tensor = self.output(torch.cat(parts, dim=1).transpose(1, 2))
         return hidden
 
+    def teammate_weights(self, obs: Tensor) -> Tensor | None:
+        """The weights with which teammates are summed up.
+
+        Args:
+            obs: (R, B, D + extra).
+
+        Returns:
+            (R, H, K, B): those of each robot on its K teammates, which add up to 1, or to 0 where
+            it sees none. None without teammates, or if the pooling is not "attention".
+        """
+        columns = self._columns
+        if self.query is None or self.teammate is None:
+            return None
+        mates = columns.own + columns.teammates * columns.teammate
+        own = torch.cat([obs[..., : columns.own], obs[..., columns.width :]], dim=2)
+        own = functional.leaky_relu_(self.own.batch_last(own))
+        queries = self.query.batch_last(own.transpose(1, 2)) * _HEAD_WIDTH**-0.5
+        blocks = _blocks(obs[..., columns.own : mates], columns.teammates)
+        encoded = functional.leaky_relu_(self.teammate.batch_last(blocks.flatten(1, 2)))
+        robots, entities, batch, _ = blocks.shape
+        encoded = encoded.view(robots, self._heads, _HEAD_WIDTH, entities, batch)
+        asked = queries[:, own.shape[1] :].view(robots, self._heads, _HEAD_WIDTH, 1, batch)
+        return _weights(encoded, asked, self._known(blocks))
+
     def _known(self, teammates: Tensor) -> Tensor | None:
         """(R, K, B) bool: which teammates (R, K, B, columns) are there; None: all are."""
         if self._columns.seen is not None:
@@ -195,7 +219,18 @@ class EntityEncoder(nn.Module):
 
 
 def _attend(encoded: Tensor, asked: Tensor, there: Tensor | None) -> Tensor:
-    """Attend to entities by heads.
+    """Attend to entities by heads; arguments as of `_weights`.
+
+    Returns:
+        (R, H, d, B).
+    """
+    weights = _weights(encoded, asked, there)
+    pooled: Tensor = (weights.unsqueeze(2) * encoded).sum(dim=3)
+    return pooled
+
+
+def _weights(encoded: Tensor, asked: Tensor, there: Tensor | None) -> Tensor:
+    """Weights on entities by heads.
 
     Args:
         encoded: (R, H, d, K, B) encodings of K entities.
@@ -203,19 +238,16 @@ def _attend(encoded: Tensor, asked: Tensor, there: Tensor | None) -> Tensor:
         there: (R, K, B) bool, the entities that are there; None: all are.
 
     Returns:
-        (R, H, d, B).
+        (R, H, K, B).
     """
     scores = (asked * encoded).sum(dim=2)  # (R, H, K, B)
     if there is None:
-        weights = scores.softmax(dim=2)
-    else:
-        # The lowest finite number instead of -inf avoids NaN in a world without victims; the
-        # softmax then gives equal weights, which the product sets to 0.
-        seen = there.unsqueeze(1)
-        scores = scores.masked_fill(~seen, torch.finfo(scores.dtype).min)
-        weights = scores.softmax(dim=2) * seen
-    pooled: Tensor = (weights.unsqueeze(2) * encoded).sum(dim=3)
-    return pooled
+        return scores.softmax(dim=2)
+    # The lowest finite number instead of -inf avoids NaN in a world without victims; the softmax
+    # then gives equal weights, which the product sets to 0.
+    seen = there.unsqueeze(1)
+    scores = scores.masked_fill(~seen, torch.finfo(scores.dtype).min)
+    return scores.softmax(dim=2) * seen
 
 
 def _blocks(columns: Tensor, count: int) -> Tensor:

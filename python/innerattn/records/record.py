@@ -15,6 +15,7 @@ from innerattn.shown import Shown
 FIELDS = (
     *("obs", "actions", "rewards", "positions", "velocities", "victims", "faults"),
     *("headings", "charge", "load", "heard", "rays", "attention"),
+    "actor_attention",
 )
 """What can be recorded step by step."""
 
@@ -57,7 +58,9 @@ class Record(Shown):
             [rad/s]), where some robots have a heading, charge and load (R,) float32, where some
             have a battery and a load, heard (R, R) bool (robot i hears robot j), where something
             limits communication, rays (R, K) float32 (1 - distance / range_m; 0: nothing is met, or
-            the robot has fewer rays), where some have a range sensor, attention (H, R, R) float32.
+            the robot has fewer rays), where some have a range sensor, attention (H, R, R) float32
+            of the critic, actor_attention (H, R, R) float32 of the actors, in which row i holds
+            robot i's weights over its teammates.
     """
 
     policy: str

@@ -118,8 +118,9 @@ def _ranges(record: Record) -> Iterator[tuple[str, NDArray[Any], float, float]]:
     for name, size in sizes.items():
         if name in steps:
             yield name, steps[name], -size, size
-    if "attention" in steps:
-        yield "attention", steps["attention"], -_ROUNDING, 1.0 + _ROUNDING
+    for name in ("attention", "actor_attention"):
+        if name in steps:
+            yield name, steps[name], -_ROUNDING, 1.0 + _ROUNDING
     if "headings" in steps:
         yield "heading", steps["headings"][..., 0], -_HALF_CIRCLE, _HALF_CIRCLE
         yield "turn rate", steps["headings"][..., 1], -_MOST_TURN, _MOST_TURN
