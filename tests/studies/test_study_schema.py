@@ -17,7 +17,14 @@ from innerattn.studies.plan import plan_study
 from innerattn.studies.schema import COPY, study_schema_text
 from innerattn.studies.shown import Report, ReportPage, StudyTable
 from innerattn.studies.space import Search
-from innerattn.studies.study import Faults, Study, StudyContrast, UnseenTeams, study_in
+from innerattn.studies.study import (
+    ActorAttention,
+    Faults,
+    Study,
+    StudyContrast,
+    UnseenTeams,
+    study_in,
+)
 
 
 @pytest.fixture(scope="module")
@@ -89,12 +96,13 @@ def test_the_new_file_is_a_study_and_names_every_key(
     assert given["tables"][0].keys() == StudyTable.model_fields.keys()
     assert given["faults"].keys() == Faults.model_fields.keys()
     assert given["unseen_teams"].keys() == UnseenTeams.model_fields.keys()
+    assert given["actor_attention"].keys() == ActorAttention.model_fields.keys()
     assert given["report"].keys() == Report.model_fields.keys()
     assert given["report"]["pages"][0].keys() <= ReportPage.model_fields.keys()
     assert given["search"].keys() == Search.model_fields.keys() | {"ppo"}
     assert validator.is_valid(given)
     del given["search"]  # it stands without the other parts
-    del given["unseen_teams"]  # its runs are for one team
+    del given["unseen_teams"], given["actor_attention"]  # its runs are for one team, and plain
     examples = study_in(tomli_w.dumps(given).encode(), "all.toml")
     assert len(plan_study(examples, Path)) == 20
     assert main(["new", "study", "sharing"]) == 1

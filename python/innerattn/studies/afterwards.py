@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from innerattn.studies.actor_attention import RunAttention
 from innerattn.studies.faults import RunUnderFaults
 from innerattn.studies.folder import StudyFolder
 from innerattn.studies.measurement import Measurement
 from innerattn.studies.plan import PlannedRun
 from innerattn.studies.teams import RunInTeams
 
-_KINDS: tuple[type[Measurement], ...] = (RunUnderFaults, RunInTeams)
+_KINDS: tuple[type[Measurement], ...] = (RunUnderFaults, RunInTeams, RunAttention)
 
 
 def to_measure(study: StudyFolder) -> list[Measurement]:

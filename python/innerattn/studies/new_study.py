@@ -43,6 +43,8 @@ a = {{ variant = "kind" }}
 b = {{ variant = "own" }}
 # score, rescues_per_episode or a registered measure
 measure = "score"
+# measure of b, if it is another one
+#measure_b = "score_as_seen"
 # length of the measured episodes: standard, long or both
 length = "standard"
 # differences that are smaller count as none
@@ -90,6 +92,11 @@ title = "Learning curves"
 # unseen_teams_worst and means of four groups: scores in 24 teams.
 #[unseen_teams]
 #episodes = 500
+
+# Handoffs and failures of runs whose actors attend to teammates, as network.encoder = "entities"
+# lets them (docs/studies.md). They add measures that begin with actor_.
+#[actor_attention]
+#episodes = 400
 
 # A search for better values (Optuna) instead of variants and contrasts: trials race over the seeds
 # of the grid. It needs innerattn[search].

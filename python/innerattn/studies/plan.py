@@ -19,8 +19,10 @@ from innerattn.experiments.plan import Case, of_seed
 from innerattn.measures.registry import MEASURES
 from innerattn.studies.space import Search, Value
 from innerattn.studies.study import (
+    ACTOR,
     RETAINED,
     UNSEEN,
+    ActorAttention,
     Faults,
     Grid,
     Study,
@@ -41,7 +43,11 @@ MOST_RUNS = 10_000
 RECIPE = "recipe"
 """The trial of a search that changes nothing, as its variant is called."""
 _NAMED_BY_THE_GRID = {"train.seed": "seeds", "train.method": "methods"}
-_SECTION = {RETAINED: Faults.place, UNSEEN: UnseenTeams.place}
+_SECTION = {
+    RETAINED: Faults.place,
+    UNSEEN: UnseenTeams.place,
+    f"{ACTOR}_": ActorAttention.place,
+}
 """The section that adds a measure."""
 _MEASURED = ("scenario", "evaluate")
 """Sections that say what is measured, so that no search may change them."""
@@ -138,12 +144,15 @@ def plan_study(study: Study, find: Callable[[str], Path]) -> list[PlannedRun]:
                 planned.setdefault((seed, *run.place.items()), run)  # several grids may have it
     for part in study.afterwards:
         if not any(part.takes(run.config) for run in planned.values()):
-            raise ConfigError(f"{part.place}: must stand beside a method for any team: team-...")
+            raise ConfigError(f"{part.place}: must stand beside {part.needs}")
     places = list({tuple(run.place.items()): run.place for run in planned.values()}.values())
     for contrast in study.contrasts:
         _refuse_other_measure(
             f"contrasts, {contrast.name!r}: measure", contrast.measure, study, contrast.length
         )
+        if contrast.measure_b is not None:
+            where = f"contrasts, {contrast.name!r}: measure_b"
+            _refuse_other_measure(where, contrast.measure_b, study, contrast.length)
         pairs(contrast, places)
     for shown in study.shown:
         where = f"{shown.place}, {shown.title!r}"
@@ -291,7 +300,7 @@ def pairs(
     if len(others) < len(sides[1]):
         raise ConfigError(f"{where}: a names a key that b leaves open; name it in b, too")
     found = [(place, others[rest]) for place in sides[0] if (rest := _rest(place, free)) in others]
-    if not found or any(a == b for a, b in found):
+    if not found or (contrast.measure_b is None and any(a == b for a, b in found)):
         raise ConfigError(f"{where}: a and b must be different runs of the grid")
     return found
 

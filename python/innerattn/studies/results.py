@@ -319,7 +319,8 @@ def _compared(
 ) -> Compared:
     values: dict[int, tuple[float, float]] = {}
     for seed in sorted(of_a.keys() & of_b.keys()):
-        x, y = (one.value(wanted.measure, length) for one in (of_a[seed], of_b[seed]))
+        x = of_a[seed].value(wanted.measure, length)
+        y = of_b[seed].value(wanted.measure_b or wanted.measure, length)
         if x is not None and y is not None:
             values[seed] = x, y
     differences = [x - y for x, y in values.values()]

@@ -14,6 +14,8 @@ _MOST_MEASURES = 12
 
 CONTRASTS, OVER_ALL, DATED_RULES = "Contrasts", "Over all scenarios", "Rules"
 """Headings of sections that are neither a table nor a figure of curves."""
+HANDOFFS = "Handoffs"
+"""That of the figure of attention in the actor."""
 OPENING = "opening"
 """What a page calls the text of a report above its first section."""
 
@@ -107,7 +109,7 @@ class Report(Model):
     sections: tuple[str, ...] | None = Field(
         None,
         description=f"the sections below the answer, in this order: {CONTRASTS}, titles of tables "
-        f"and curves, {OVER_ALL}, {DATED_RULES}; none: all",
+        f"and curves, {HANDOFFS} with [actor_attention], {OVER_ALL}, {DATED_RULES}; none: all",
     )
     pages: tuple[ReportPage, ...] = Field(
         (), max_length=50, description="parts of pages that sections of the report fill"

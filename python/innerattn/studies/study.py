@@ -18,6 +18,7 @@ from innerattn.studies.seeds import listed_seeds
 from innerattn.studies.shown import (
     CONTRASTS,
     DATED_RULES,
+    HANDOFFS,
     OVER_ALL,
     Curves,
     Report,
@@ -134,6 +135,9 @@ class StudyContrast(Model):
         description="score, score_as_seen, rescues_per_episode, train_seconds, "
         "train_cpu_seconds or a registered measure of a run",
     )
+    measure_b: str | None = Field(
+        None, description="measure of b, if it is another one than that of a"
+    )
     length: Length | Literal["both"] = Field(
         "standard",
         description="length of the episodes: standard, long, or both, each with its own family",
@@ -143,6 +147,12 @@ class StudyContrast(Model):
         "two-sided", description="hypothesis: a is another, a greater or a smaller value than b"
     )
     family: str = Field("all", description="contrasts whose p-values are adjusted together (Holm)")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.measure_b == self.measure:
+            raise ValueError(f"contrasts.measure_b = {self.measure_b!r}: must be another measure")
+        return self
 
     @property
     def lengths(self) -> tuple[Length, ...]:
@@ -164,9 +174,13 @@ UNSEEN = "unseen_teams"
 """The measure of a run in teams that it has never met: its mean score."""
 
 
+ACTOR = "actor"
+"""How the measures of a run's attention in the actor begin."""
+
+
 def has_own_episodes(measure: str) -> bool:
     """Whether a measure is of worlds of its own, so that it has one length of episodes."""
-    return measure.startswith((RETAINED, UNSEEN))
+    return measure.startswith((RETAINED, UNSEEN, f"{ACTOR}_"))
 
 
 class Faults(Model):
@@ -190,6 +204,8 @@ class Faults(Model):
             raise ValueError(f"faults.kinds: {twice!r} stands twice")
         return kinds
 
+    needs: ClassVar[str] = "any run"
+
     @staticmethod
     def takes(_: RunConfig) -> bool:
         """Whether a run meets them: every one does."""
@@ -211,6 +227,7 @@ class UnseenTeams(Model):
     """Teams that no run has met, in which each finished run of a policy for any team acts."""
 
     place: ClassVar[str] = "unseen_teams"
+    needs: ClassVar[str] = "a method for any team: team-..."
 
     episodes: int = Field(500, ge=2, le=100_000, description="episodes in each of the 24 teams")
 
@@ -229,6 +246,50 @@ class UnseenTeams(Model):
     def table(self) -> StudyTable:
         """What is shown of them in a study that lists no tables."""
         return StudyTable(title="Scores in unseen teams", measures=self.measures, seeds=False)
+
+
+class ActorAttention(Model):
+    """Episodes in which the attention in a run's actors is looked at, and attended robots fail."""
+
+    place: ClassVar[str] = "actor_attention"
+    needs: ClassVar[str] = (
+        "network.encoder = 'entities' with network.pooling = 'attention', all teammates in the "
+        "observation, no memory and no messages"
+    )
+
+    measures: ClassVar[tuple[str, ...]] = (
+        f"{ACTOR}_handoffs",
+        f"{ACTOR}_lead_before",
+        f"{ACTOR}_lead_before_bystander",
+        f"{ACTOR}_lead_after",
+        f"{ACTOR}_lead_after_bystander",
+        f"{ACTOR}_{RETAINED}_most_attended",
+        f"{ACTOR}_{RETAINED}_least_attended",
+        f"{ACTOR}_{RETAINED}_helper",
+        f"{ACTOR}_{RETAINED}_other",
+        f"{ACTOR}_attends_helper",
+    )
+    """The measures of a run that they add; see docs/studies.md."""
+
+    episodes: int = Field(400, ge=2, le=10_000, description="episodes, of twice the usual length")
+
+    @staticmethod
+    def takes(run: RunConfig) -> bool:
+        """Whether a run's actors attend to teammates."""
+        network = run.network
+        attends = (network.encoder, network.pooling) == ("entities", "attention")
+        plain = not network.memory_width and not network.message_width
+        in_order = run.scenario.observed_teammates is None
+        return attends and plain and in_order and not run.algorithm.for_any_team
+
+    @property
+    def table(self) -> StudyTable:
+        """What is shown of them in a study that lists no tables."""
+        return StudyTable(title="Attention in the actor", measures=self.measures, seeds=False)
+
+
+Afterwards = Faults | UnseenTeams | ActorAttention
+"""What finished runs are measured in beside their own evaluation."""
 
 
 class Study(Model):
@@ -259,6 +320,9 @@ class Study(Model):
     unseen_teams: UnseenTeams | None = Field(
         None, description="teams that finished runs of policies for any team meet"
     )
+    actor_attention: ActorAttention | None = Field(
+        None, description="episodes in which attention in the actors of finished runs is looked at"
+    )
     search: Search | None = Field(None, description="which values of a run are to be found")
     report: Report | None = Field(
         None, description="what the report shows, and which pages take parts of it"
@@ -276,7 +340,11 @@ class Study(Model):
             ("contrasts", [one.name for one in self.contrasts]),
             (
                 "tables and curves",
-                [CONTRASTS, OVER_ALL, DATED_RULES, *(s.title for s in self.shown)],
+                [
+                    *(CONTRASTS, OVER_ALL, DATED_RULES),
+                    *([HANDOFFS] if self.actor_attention is not None else []),
+                    *(s.title for s in self.shown),
+                ],
             ),
         ):
             if (twice := _first_twice(names)) is not None:
@@ -295,7 +363,8 @@ class Study(Model):
     def _check_sections(self, sections: tuple[str, ...]) -> None:
         """Refuse what no report of it can show."""
         titles = [one.title for one in (*self.listed_tables, *self.curves)]
-        known = (CONTRASTS, *titles, OVER_ALL, DATED_RULES)
+        handoffs = [HANDOFFS] if self.actor_attention is not None else []
+        known = (CONTRASTS, *titles, *handoffs, OVER_ALL, DATED_RULES)
         for one in sections:
             if one not in known:
                 near = did_you_mean(one, known, repr)
@@ -307,7 +376,15 @@ class Study(Model):
 
     def _check_search(self, search: Search) -> None:
         """Refuse what a search does not stand beside."""
-        for key in ("variants", "contrasts", "tables", "curves", "faults", "unseen_teams"):
+        for key in (
+            "variants",
+            "contrasts",
+            "tables",
+            "curves",
+            "faults",
+            "unseen_teams",
+            "actor_attention",
+        ):
             if getattr(self, key):
                 raise ValueError(f"search: must stand without {key}")
         lists: dict[str, tuple[Value, ...]] = {
@@ -341,9 +418,10 @@ class Study(Model):
         return (SCORES, *(part.table for part in self.afterwards))
 
     @property
-    def afterwards(self) -> list[Faults | UnseenTeams]:
+    def afterwards(self) -> list[Afterwards]:
         """What finished runs are measured in beside their own evaluation."""
-        return [one for one in (self.faults, self.unseen_teams) if one is not None]
+        parts = self.faults, self.unseen_teams, self.actor_attention
+        return [one for one in parts if one is not None]
 
     @property
     def shown(self) -> tuple[Shown, ...]:

@@ -8,16 +8,16 @@ import pytest
 
 from innerattn.envs.colours import robot_looks
 from innerattn.experiments.paper.claims import handoff_claims
-from innerattn.experiments.paper.fig5 import (
-    Evidence,
-    all_handoffs,
-    evidence,
-    evidence_json,
-    with_control,
-)
+from innerattn.experiments.paper.fig5 import Evidence, evidence, evidence_json
 from innerattn.experiments.paper.scene import choose_scene, scene_json
 from innerattn.experiments.run import FinishedRun
-from innerattn.measures.sharing.handoff import HANDOFF, handoffs, need_following_attention
+from innerattn.measures.sharing.handoff import (
+    HANDOFF,
+    all_handoffs,
+    handoffs,
+    need_following_attention,
+    with_control,
+)
 from innerattn.measures.sharing.handoff_attention import handoff_attention
 from innerattn.report.paper.fig5 import shift_sentence
 from innerattn.report.plots.aligned import draw_aligned

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from innerattn.config import Scenario
-from innerattn.experiments.paper.fig5 import alike_robots
 from innerattn.experiments.run import FinishedRun
-from innerattn.measures.sharing.handoff import handoffs
+from innerattn.measures.sharing.handoff import alike_robots, handoffs
 
 SCHEMA_VERSION = 1
 

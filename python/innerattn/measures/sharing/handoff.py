@@ -5,9 +5,12 @@ They are read off rescue events; `handoff_attention` measures attention around t
 
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
 from numpy.typing import NDArray
 
+from innerattn.measures.cooperation import shared_abilities
 from innerattn.records.record import Record
 
 Steps = NDArray[np.int64]
@@ -68,6 +71,36 @@ def handoffs(record: Record, robot: str, first_task: str, later_task: str) -> ND
     rows["start"] = np.where(again, events["step"][earlier] + 1, 0)
     rows["first"], rows["second"] = events["step"][chosen], events["step"][chosen + 1]
     return rows
+
+
+def all_handoffs(record: Record) -> NDArray[np.void]:
+    """The handoffs of all robots that share an ability, between any two tasks of two needs.
+
+    Returns:
+        (N,) `HANDOFF`, by robot, then by order of the tasks.
+    """
+    tasks = [task.name for task in record.scenario.tasks if len(task.roles) == 2]
+    rows = [
+        handoffs(record, robot, first, later)
+        for robot in alike_robots(record)
+        for first, later in permutations(tasks, 2)
+    ]
+    return np.concatenate([np.zeros(0, HANDOFF), *rows])
+
+
+def alike_robots(record: Record) -> tuple[str, ...]:
+    """Names of the robots with the first ability that several have; the two food robots."""
+    robots, shared = record.scenario.robots, shared_abilities(record.scenario)
+    return tuple(robot.name for robot in robots if shared and shared[0] in robot.abilities)
+
+
+def with_control(record: Record, events: NDArray[np.void]) -> NDArray[np.void]:
+    """The same handoffs with ``robot`` replaced by the next of the robots alike."""
+    alike = [record.robot_names.index(name) for name in alike_robots(record)]
+    other = dict(zip(alike, alike[1:] + alike[:1], strict=True))
+    control = events.copy()
+    control["robot"] = [other[robot] for robot in events["robot"].tolist()]
+    return control
 
 
 def window(handoffs: NDArray[np.void], reach: int = REACH) -> tuple[Steps, Steps]:

@@ -118,14 +118,18 @@ def handoff_attention(
 
 
 def aligned_weights(
-    record: Record, handoffs: NDArray[np.void], offsets: NDArray[np.int64]
+    record: Record,
+    handoffs: NDArray[np.void],
+    offsets: NDArray[np.int64],
+    field: str = "attention",
 ) -> tuple[Array, NDArray[np.bool_]]:
     """A robot's attention around its handoffs.
 
     Args:
-        record: with attention.
+        record: with ``field`` step by step.
         handoffs: (N,) `handoff.HANDOFF`.
         offsets: (W,) steps since the first rescue's.
+        field: "attention", of the critic, or "actor_attention".
 
     Returns:
         (N, W, 1 + H, R - 1) float64 weights on teammates by index, the robot itself left out: their
@@ -134,7 +138,7 @@ def aligned_weights(
     """
     step = handoffs["first"][:, None] + offsets
     inside = (step >= handoffs["start"][:, None]) & (step <= handoffs["second"][:, None])
-    attention = record.steps["attention"]
+    attention = record.steps[field]
     robots = np.arange(attention.shape[-1])
     teammates = np.stack([np.delete(robots, robot) for robot in robots])
     robot = handoffs["robot"]

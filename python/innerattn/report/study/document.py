@@ -56,7 +56,7 @@ def study_document(found: Found) -> dict[str, Any]:
         ],
         "contrasts": [
             {
-                **one.contrast.model_dump(mode="json"),
+                **one.contrast.model_dump(mode="json", exclude_none=True),
                 "length": one.length,
                 "family": one.family,
                 "of": {"a": dict(one.a), "b": dict(one.b)},

@@ -24,15 +24,16 @@ from innerattn.stats.text import (
     format_seeds,
     format_signed,
 )
+from innerattn.studies.actor_attention import LeadCurves
 from innerattn.studies.aggregates import THRESHOLDS, Aggregate
 from innerattn.studies.curves import EPISODES, LearningCurve
 from innerattn.studies.folder import Rules, StudyFolder
 from innerattn.studies.ledger import State
 from innerattn.studies.plan import TIMES, TRAIN_CPU_SECONDS, TRAIN_SECONDS
 from innerattn.studies.results import RULES, Compared, Mean, Results, Values
-from innerattn.studies.shown import CONTRASTS, DATED_RULES, OVER_ALL, StudyTable
+from innerattn.studies.shown import CONTRASTS, DATED_RULES, HANDOFFS, OVER_ALL, StudyTable
 from innerattn.studies.space import Length
-from innerattn.studies.study import RETAINED, UNSEEN, Faults, UnseenTeams, has_own_episodes
+from innerattn.studies.study import ACTOR, RETAINED, UNSEEN, Afterwards, has_own_episodes
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class Found:
         compared: its contrasts.
         aggregates: of its algorithms by name, for each length of episodes.
         curves: learning curves by title; without those of archived runs.
+        leads: of attention in the actor around handoffs, by the place in the grid.
         search: its search, if it has one.
         note: what is said of runs that are too short to mean anything.
     """
@@ -58,6 +60,7 @@ class Found:
     compared: Sequence[Compared] = ()
     aggregates: Mapping[Length, Mapping[str, Aggregate]] = field(default_factory=dict)
     curves: Mapping[str, Sequence[LearningCurve]] = field(default_factory=dict)
+    leads: Mapping[str, LeadCurves] = field(default_factory=dict)
     search: SearchFound | None = None
     note: str | None = None
 
@@ -67,7 +70,7 @@ def study_page(found: Found, figures: Mapping[str, str]) -> str:
 
     Args:
         found: what it shows.
-        figures: files of figures, "scores", "search" and by title of curves.
+        figures: files of figures, "scores", "search", `HANDOFFS` and by title of curves.
     """
     study, results, compared = found.study, found.results, found.compared
     keys = {one.run.key for one in results.finished}
@@ -97,6 +100,9 @@ def study_page(found: Found, figures: Mapping[str, str]) -> str:
             for title in found.curves
             if title in figures
         },
+        HANDOFFS: [f"![{_LEADS_SHOW}]({figures[HANDOFFS]})\n", _LEADS]
+        if HANDOFFS in figures
+        else [],
         OVER_ALL: (
             [markdown(aggregates_table(found.aggregates)), _AGGREGATES]
             if any(found.aggregates.values())
@@ -124,11 +130,16 @@ def _means_section(shown: StudyTable, rows: Sequence[Mean], planned: bool) -> li
         return []
     of_faults = any(one.startswith(RETAINED) for one in shown.measures)
     of_teams = any(one.startswith(UNSEEN) for one in shown.measures)
-    captions = [_SCORE, *[_PLANNED] * planned, *[_RETAINED] * of_faults, *[_UNSEEN] * of_teams]
+    of_actors = any(one.startswith(f"{ACTOR}_") for one in shown.measures)
+    captions = [
+        *[_MEANS if of_actors else _SCORE, *[_PLANNED] * planned, *[_RETAINED] * of_faults],
+        *[_UNSEEN] * of_teams,
+        *[_ACTOR] * of_actors,
+    ]
     return [markdown(means_table(rows, shown.seeds)), *captions]
 
 
-def _not_measured(results: Results, part: Faults | UnseenTeams) -> int:
+def _not_measured(results: Results, part: Afterwards) -> int:
     """How many finished runs lack measures that a part of the study adds."""
     able = [one for one in results.finished if part.takes(one.run.config)]
     return len({one.run.key for one in able if not {*part.measures} <= {*one.measured}})
@@ -186,6 +197,22 @@ _UNSEEN = (
     "robots, four with bodies outside of the family's ranges, and four in which a robot leaves, "
     "joins or becomes slow at half time (changes). The score is that in each team, a mean over "
     "them or the worst. Episodes have 50 steps.\n"
+)
+_MEANS = (
+    "± is half the 95 % interval over seeds (Student's t); in brackets are the values of the "
+    "seeds.\n"
+)
+_ACTOR = (
+    "A lead is a robot's weight on the next partner minus that on the last one, a mean over three "
+    "steps up to the first rescue (before) or after it. Retained is the share of the rescues after "
+    "a food robot fails: the one that the other robots attend to most, or least, or that would "
+    "help first, or the other one. Episodes are twice as long as those of the training.\n"
+)
+_LEADS_SHOW = "Weight of actors on the next partner less that on the last one, around handoffs"
+_LEADS = (
+    "Curves are means over seeds with 95 % intervals (Student's t), each of a run's handoffs. The "
+    "action of step 0 completes the first rescue. The bystander is the other robot of the same "
+    "ability, in the same steps.\n"
 )
 _DOTS = "A dot is a run; a bar is the mean over seeds with its 95 % interval.\n"
 _CURVES = (
@@ -259,9 +286,15 @@ def means_table(found: Sequence[Mean], seeds: bool = False) -> Table:
 
 def _own_head(measure: str) -> str:
     """A measure whose episodes have a length of their own, in words."""
+    if measure.startswith(f"{ACTOR}_"):
+        return measure.removeprefix(f"{ACTOR}_").replace("_", " ")
     whole = next(one for one in (RETAINED, UNSEEN) if measure.startswith(one))
     part = measure.removeprefix(whole).replace("_", " ").strip()
     return ", ".join(filter(None, (whole.replace("_", " "), part)))
+
+
+def _in_words(measure: str) -> str:
+    return _own_head(measure) if has_own_episodes(measure) else measure.replace("_", " ")
 
 
 _IN_WORDS = {
@@ -285,7 +318,8 @@ def contrasts_tables(compared: Sequence[Compared]) -> str:
     """Every contrast with its numbers, a table for each measure, length and margin."""
     groups: dict[tuple[str, Length, float], list[tuple[Compared, str]]] = {}
     for one, (sides, where) in zip(compared, _sides(compared), strict=True):
-        key = one.contrast.measure, one.length, one.contrast.margin
+        measure = one.contrast.measure if one.contrast.measure_b is None else ""
+        key = measure, one.length, one.contrast.margin
         groups.setdefault(key, []).append((one, f"{sides} ({where})" if where else sides))
     parts = []
     for (measure, length, margin), own in groups.items():
@@ -302,8 +336,12 @@ def contrasts_tables(compared: Sequence[Compared]) -> str:
             for one, sides in own
         ]
         heads = ["seeds", "difference [95 %]", "P(a > b) [95 %]", "Holm's p", "verdict"]
-        words = measure.replace("_", " ")
-        episodes = "" if has_own_episodes(measure) else f", {length} episodes"
+        words = measure.replace("_", " ") or "difference of two measures"
+        episodes = (
+            ""
+            if has_own_episodes(measure or own[0][0].contrast.measure)
+            else f", {length} episodes"
+        )
         parts += [
             f"**{words[:1].upper()}{words[1:]}{episodes}**; within {margin:g} is alike.\n",
             markdown(plain_table(columns(["contrast", "a - b"], heads), rows)),
@@ -341,7 +379,7 @@ def _sentence(one: Compared, sides: str, where: str) -> str:
     head = f"**{one.contrast.name}**, {sides}{f' ({where})' if where else ''}: {one.verdict}"
     if one.mean is None:
         return f"{head}, no seed has both runs."
-    measure = one.contrast.measure.replace("_", " ")
+    measure = one.contrast.measure.replace("_", " ") if one.contrast.measure_b is None else "a"
     if one.found is None:
         return f"{head}; {measure} differs by {format_signed(one.mean)} over {_seeds(one)}."
     difference = format_estimate(one.found.difference)
@@ -360,6 +398,9 @@ def _sides(compared: Sequence[Compared]) -> list[tuple[str, str]]:
     for one in compared:
         free = [key for key in varied if one.a.get(key) != one.b.get(key)]
         a, b = (" ".join(str(side[key]) for key in free if key in side) for side in (one.a, one.b))
+        if one.contrast.measure_b is not None:
+            of_a, of_b = (_in_words(x) for x in (one.contrast.measure, one.contrast.measure_b))
+            a, b = f"{a} {of_a}".strip(), f"{b} {of_b}".strip()
         shared = [key for key in varied if key not in free]
         texts.append((f"{a} - {b}", names.name(one.a, shared)))
     return texts

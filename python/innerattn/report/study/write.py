@@ -13,6 +13,7 @@ from innerattn.experiments.smoke import smoke_note
 from innerattn.report.folder import ReportFolder
 from innerattn.report.plots.arms import ArmDots, ArmPanel, draw_arms
 from innerattn.report.plots.curves import draw_curves
+from innerattn.report.plots.leads import draw_leads
 from innerattn.report.plots.search import TrialDot, draw_search
 from innerattn.report.study.document import study_document
 from innerattn.report.study.exports import marl_eval_document, rliable_document
@@ -23,12 +24,15 @@ from innerattn.report.study.page import (
 )
 from innerattn.report.study.places import varied_in
 from innerattn.report.study.search import SearchFound, search_found
+from innerattn.studies.actor_attention import LeadCurves, lead_curves
 from innerattn.studies.aggregates import aggregate
 from innerattn.studies.curves import LearningCurve, learning_curves
 from innerattn.studies.folder import StudyFolder
+from innerattn.studies.plan import PlannedRun
 from innerattn.studies.results import Mean, Result, Results, chosen, compare, means
 from innerattn.studies.search.optuna import write_journal
 from innerattn.studies.search.state import Now, Watched
+from innerattn.studies.shown import HANDOFFS
 from innerattn.studies.space import Length, Value
 
 if TYPE_CHECKING:
@@ -57,7 +61,7 @@ def write_study(
         What the report says, and its files.
 
     Raises:
-        RunError: metrics of a run cannot be read.
+        RunError: metrics of a run, or what was measured of it, cannot be read.
         OSError: a file cannot be written; each is written whole or not at all.
     """
     found = find(study, results, now)
@@ -108,7 +112,20 @@ def find(study: StudyFolder, results: Results, now: Now | None = None) -> Found:
         compared=compare(study.study, study.planned, finished),
         aggregates={length: algorithm_names(aggregate(finished, length)) for length in _LENGTHS},
         curves={one.title: _curves(chosen(finished, one.of)) for one in study.study.curves},
+        leads=_leads(study, finished) if study.study.actor_attention else {},
     )
+
+
+def _leads(study: StudyFolder, results: Sequence[Result]) -> dict[str, LeadCurves]:
+    """Attention around handoffs by place in the grid, named by what differs between places."""
+    places = [one.run.place for one in results]
+    varied = varied_in(places) or ["scenario"]
+    groups: dict[str, list[PlannedRun]] = {}
+    for one in results:
+        name = " ".join(str(one.run.place[key]) for key in varied if key in one.run.place)
+        groups.setdefault(name, []).append(one.run)
+    found = {name: lead_curves(study, runs) for name, runs in groups.items()}
+    return {name: one for name, one in found.items() if one is not None}
 
 
 def _curves(results: Sequence[Result]) -> list[LearningCurve]:
@@ -143,6 +160,9 @@ def _draw(folder: ReportFolder, found: Found) -> dict[str, str]:
     folder.draw("scores", draw_arms(panels) if panels else None)
     if panels:
         figures["scores"] = "scores.png"
+    if found.leads:
+        folder.draw("handoffs", draw_leads(found.leads))
+        figures[HANDOFFS] = "handoffs.png"
     for title, curves in found.curves.items():
         name = f"curves-{re.sub('[^a-z0-9]+', '-', title.lower()).strip('-')}"
         folder.draw(name, draw_curves(curves) if curves else None)
