@@ -128,6 +128,53 @@ def test_weights_on_the_page_are_those_of_the_record(browser: Browser, tmp_path:
         assert (x, y) == pytest.approx(record.steps["positions"][2, 5, 1].tolist(), abs=1e-4)
 
 
+def test_the_attention_of_the_actor_stands_beside_that_of_the_critic(
+    browser: Browser, tmp_path: Path
+) -> None:
+    both = watched(episodes=3, heads=4, actor_heads=2)
+    critic = watched(episodes=3, heads=4)
+    with visit(browser, written(tmp_path, both, critic, names=["both", "critic only"])) as seen:
+        page = seen.page
+        ready(page)
+        page.get_by_role("combobox", name="Episode").select_option("2")
+        page.get_by_role("slider", name="Step").fill("5")
+        page.locator("#robots button").nth(1).click()
+        page.get_by_role("combobox", name="Head").select_option(label="4")
+        of_critic = pixels(page)
+        page.get_by_role("combobox", name="Attention of the").select_option("actor")
+        assert page.locator("#head option").all_inner_texts() == ["mean", "1", "2"]
+        assert page.get_by_role("combobox", name="Head").input_value() == "-1"
+        page.get_by_role("combobox", name="Head").select_option(label="2")
+        assert pixels(page) != of_critic
+        weight = round(float(both.steps["actor_attention"][2, 5, 1, 1, 2]) * 255) / 255
+        text = page.locator("#robots button").nth(2).inner_text()
+        assert f"{round(100 * weight)} % of food_1's" in text
+        assert page.locator(".chart h2").first.inner_text().startswith("Attention of food_1")
+        assert not seen.serious_faults()
+
+        page.get_by_role("button", name="critic only").click()
+        assert page.get_by_text("The actor of this policy has no attention.").is_visible()
+        assert page.locator(".chart h2").first.inner_text().startswith("Reward")
+        page.locator("body").click(position={"x": 3, "y": 3})
+        page.keyboard.press("c")
+        assert page.get_by_role("combobox", name="Attention of the").input_value() == "critic"
+        assert page.locator(".chart h2").first.inner_text().startswith("Attention of food_1")
+        assert page.locator("#head option").count() == 5
+
+
+def test_attention_of_actors_alone_is_shown_without_a_choice(
+    browser: Browser, tmp_path: Path
+) -> None:
+    record = watched(episodes=2, heads=0, actor_heads=2)
+    with visit(browser, written(tmp_path, record)) as seen:
+        page = seen.page
+        ready(page)
+        assert not page.locator("#whose-box").is_visible()
+        assert page.locator(".chart h2").first.inner_text().startswith("Attention of")
+        page.get_by_text("How to read this").click()
+        assert page.get_by_text("sums up its teammates in order to act").is_visible()
+
+
 def test_episodes_can_be_sorted(browser: Browser, one: Path) -> None:
     with visit(browser, one) as seen:
         page = seen.page

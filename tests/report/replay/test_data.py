@@ -30,15 +30,16 @@ def unpacked(document: dict[str, Any], spec: dict[str, Any]) -> Any:
 
 
 def test_steps_are_kept_to_a_fraction_of_what_can_be_seen() -> None:
-    record = watched(episodes=3)
+    record = watched(episodes=3, actor_heads=2)
     document = json.loads(json.dumps(replay_document([record], ["one"])))
     run, unit = document["runs"][0], document["worlds"]["position_unit_m"]
     positions = unpacked(document, run["positions"]) * unit
     assert np.abs(positions - record.steps["positions"]).max() < 1e-4
     velocities = unpacked(document, run["velocities"]) * run["velocity_unit_mps"]
     assert np.abs(velocities - record.steps["velocities"]).max() < 0.01
-    attention = unpacked(document, run["attention"]) / 255
-    assert np.abs(attention - record.steps["attention"]).max() <= 0.5 / 255 + 1e-6
+    for whose in ("attention", "actor_attention"):
+        attention = unpacked(document, run[whose]) / 255
+        assert np.abs(attention - record.steps[whose]).max() <= 0.5 / 255 + 1e-6
     names = [one["name"] for one in run["rewards"]]
     assert names == ["rescue", "progress"]
     for one in run["rewards"]:

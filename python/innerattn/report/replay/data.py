@@ -183,8 +183,9 @@ def _run(record: Record, name: str, arrays: _Arrays) -> dict[str, Any]:
     if "rays" in kept:
         readings = np.ceil(_STEPS_OF_INT16 * kept["rays"].astype(np.float64))  # 0: met nothing
         found["rays"] = arrays.add(readings.astype(np.int16))
-    if "attention" in kept and record.scenario.num_robots > 1:
-        found["attention"] = arrays.add(_quantised(kept["attention"], 1 / 255, "uint8"))
+    for whose in ("attention", "actor_attention"):
+        if whose in kept and record.scenario.num_robots > 1:
+            found[whose] = arrays.add(_quantised(kept[whose], 1 / 255, "uint8"))
     if "rewards" in kept:
         found["rewards"] = _rewards(record, kept["rewards"], arrays)
     return found

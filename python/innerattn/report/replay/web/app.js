@@ -11,6 +11,7 @@ class App {
     this.look.least = strongWeight(this.worlds.robots.length);
     Object.assign(this, { chosen: 0, step: 0, playing: false, hovered: -1, times: [] });
     this.order = [];
+    this.attendAs(this.runs.some((run) => run.attentions.critic) ? "critic" : "actor");
     this.chosen = Math.max(this.runs.findIndex((run) => run.attention), 0);
     this.charts = new Charts($("charts"), (step) => this.goTo(step));
     this.robots = new RobotList($("robots"), this.worlds, (robot) => this.choose(robot));
@@ -69,9 +70,10 @@ class App {
       `worlds of seed ${seed}` + (this.runs.length > 1 ? ", the same for each policy" : "");
     fillSelect($("sort"), this.sorts().map((name) => [name, SORTS[name].label]), "");
     fillSelect($("speed"), SPEEDS.map((speed) => [String(speed), `${speed}×`]), "");
-    const heads = Math.max(...this.runs.map((run) => run.heads));
-    const options = Array.from({ length: heads }, (_, head) => [String(head), String(head + 1)]);
-    fillSelect($("head"), [["-1", "mean"], ...options], "-1");
+    const both = ["critic", "actor"].every((whose) => this.runs.some((run) => run.attentions[whose]));
+    $("whose-box").hidden = !both;
+    $("whose-key").hidden = !both;
+    this.fillHeads();
     const sensing = this.runs.find((run) => run.heard || run.rays) ?? this.run;
     fillSenses($("senses"), sensing, this.look, (look) => this.setLook(look));
     $("policies").hidden = this.runs.length < 2;
@@ -81,6 +83,29 @@ class App {
       $("which").append(button);
     });
     fillLegend($("legend"), this.worlds);
+  }
+
+  fillHeads() {
+    const heads = Math.max(...this.runs.map((run) => run.heads));
+    const options = Array.from({ length: heads }, (_, head) => [String(head), String(head + 1)]);
+    fillSelect($("head"), [["-1", "mean"], ...options], String(this.look.head));
+  }
+
+  /** Takes the attention of the critic or of the actor for all that is shown. */
+  attendAs(whose) {
+    this.whose = whose;
+    this.runs.forEach((run) => run.attendAs(whose));
+    $("of-critic").hidden = whose !== "critic";
+    $("of-actor").hidden = whose !== "actor";
+  }
+
+  setWhose(whose) {
+    $("whose").value = whose;
+    this.attendAs(whose);
+    this.look.head = -1;
+    this.fillHeads();
+    this.showRun();
+    this.draw();
   }
 
   listen() {
@@ -96,6 +121,7 @@ class App {
     on("sort", "change", () => this.setSort($("sort").value));
     on("speed", "change", () => this.setSpeed(Number($("speed").value)));
     on("head", "change", () => this.setLook({ head: Number($("head").value) }));
+    on("whose", "change", () => this.setWhose($("whose").value));
     on("all", "change", () => this.setLook({ all: $("all").checked }));
     on("least", "input", () => this.setLook({ least: $("least").value / 100 }));
     on("direction", "change", () => this.setLook({ received: $("direction").value === "received" }));
@@ -123,6 +149,7 @@ class App {
       h: () => this.setLook({ head: ((this.look.head + 2) % (this.run.heads + 1)) - 1 }),
       g: () => this.setLook({ received: !this.look.received }),
       a: () => this.setLook({ all: !this.look.all }),
+      c: $("whose-box").hidden ? null : () => this.setWhose(next(["critic", "actor"], this.whose)),
       "-": () => this.setSpeed(SPEEDS[Math.max(SPEEDS.indexOf(this.speed) - 1, 0)]),
       "+": () => this.setSpeed(SPEEDS[Math.min(SPEEDS.indexOf(this.speed) + 1, SPEEDS.length - 1)]),
     };
@@ -199,8 +226,11 @@ class App {
   /** Shows everything that depends on the policy and the episode. */
   showRun() {
     const { run } = this;
+    const attends = (one) => Object.keys(one.attentions).length > 0;
     $("no-attention").hidden = Boolean(run.attention);
-    $("attention-settings").hidden = !this.runs.some((one) => one.attention);
+    $("no-attention").textContent = attends(run) ?
+      `The ${this.whose} of this policy has no attention.` : "This policy has no attention.";
+    $("attention-settings").hidden = !this.runs.some(attends);
     [...$("which").children].forEach((button, index) => {
       button.setAttribute("aria-pressed", String(index === this.chosen));
     });
@@ -275,7 +305,7 @@ class App {
   /** The texts, only when the step, the robot or the policy is another one. */
   showTexts(look) {
     const { run, episode } = this, step = Math.min(Math.floor(this.step), run.lengths[episode] - 1);
-    const key = [this.chosen, episode, step, look.robot, look.received, look.head, document.documentElement.dataset.theme].join();
+    const key = [this.chosen, this.whose, episode, step, look.robot, look.received, look.head, document.documentElement.dataset.theme].join();
     $("scrubber").value = Math.floor(this.step);
     if (key === this.shown) return;
     this.shown = key;

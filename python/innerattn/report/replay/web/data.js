@@ -41,8 +41,12 @@ class Run {
     for (const name of ["positions", "velocities", "blocked"]) {
       this[name] = view(buffer, described[name]);
     }
-    this.heads = described.attention ? described.attention.shape[2] : 0;
-    this.attention = described.attention ? view(buffer, described.attention) : null;
+    this.attentions = {};
+    for (const [whose, name] of [["critic", "attention"], ["actor", "actor_attention"]]) {
+      const spec = described[name];
+      if (spec) this.attentions[whose] = { heads: spec.shape[2], weights: view(buffer, spec) };
+    }
+    this.attendAs("critic");
     this.rewards = (described.rewards || []).map(({ name, unit, values }) => (
       { name, unit, values: view(buffer, values) }
     ));
@@ -70,6 +74,12 @@ class Run {
     this.faults = lists(described.faults, ([, robot, kind, start, end], row) => (
       { robot, kind, start, end, value: values[row] }
     ));
+  }
+
+  /** Looks at the attention of the critic or of the actor from now on, if there is any. */
+  attendAs(whose) {
+    const { heads = 0, weights = null } = this.attentions[whose] ?? {};
+    Object.assign(this, { heads, attention: weights });
   }
 
   /** The first step from which on a robot has moved by itself. */
