@@ -80,6 +80,8 @@ def test_a_run_is_measured_once_and_only_if_its_actors_attend(study: StudyFolder
     assert failures is not None
     assert found["actor_retained_most_attended"] == failures.retained_most()
     assert found["actor_retained_least_attended"] == failures.retained_least()
+    assert found["actor_retained_nearest"] == failures.retained_nearest()
+    assert found["actor_attends_nearest"] == failures.attends_nearest()
     assert found["actor_retained_helper"] == failures.retained_helper()
     assert found["actor_retained_other"] == failures.retained_other()
     assert found["actor_attends_helper"] == failures.attends_helper()

@@ -79,8 +79,10 @@ class RunAttention(Measurement):
             values |= {
                 f"{RETAINED}_most_attended": failures.retained_most(),
                 f"{RETAINED}_least_attended": failures.retained_least(),
+                f"{RETAINED}_nearest": failures.retained_nearest(),
                 f"{RETAINED}_helper": failures.retained_helper(),
                 f"{RETAINED}_other": failures.retained_other(),
+                "attends_nearest": failures.attends_nearest(),
                 "attends_helper": failures.attends_helper(),
             }
         return {

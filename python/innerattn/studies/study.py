@@ -265,8 +265,10 @@ class ActorAttention(Model):
         f"{ACTOR}_lead_after_bystander",
         f"{ACTOR}_{RETAINED}_most_attended",
         f"{ACTOR}_{RETAINED}_least_attended",
+        f"{ACTOR}_{RETAINED}_nearest",
         f"{ACTOR}_{RETAINED}_helper",
         f"{ACTOR}_{RETAINED}_other",
+        f"{ACTOR}_attends_nearest",
         f"{ACTOR}_attends_helper",
     )
     """The measures of a run that they add; see docs/studies.md."""

@@ -22,14 +22,19 @@ def test_what_is_retained_against_plain_loops(seed: int) -> None:
         clean=rng.integers(0, 5, 30),
         faulty=rng.integers(0, 4, (alike, 30)),
         attended=rng.random((30, alike)),
+        distance=rng.random((30, alike)),
         helper=rng.integers(-1, alike, 30),
     )
-    sums = dict.fromkeys(("most", "least", "helper", "other", "clean", "helped"), 0)
-    hits, helped = 0, 0
+    sums = dict.fromkeys(("most", "least", "near", "helper", "other", "clean", "helped"), 0)
+    hits, helped, near = 0, 0, 0
     for episode in range(30):
         weights = found.attended[episode].tolist()
         sums["most"] += found.faulty[weights.index(max(weights)), episode]
         sums["least"] += found.faulty[weights.index(min(weights)), episode]
+        ways = found.distance[episode].tolist()
+        nearest = ways.index(min(ways))
+        sums["near"] += found.faulty[nearest, episode]
+        near += weights.index(max(weights)) == nearest
         sums["clean"] += found.clean[episode]
         helper = found.helper[episode]
         if helper >= 0:
@@ -40,6 +45,8 @@ def test_what_is_retained_against_plain_loops(seed: int) -> None:
             hits += weights.index(max(weights)) == helper
     assert found.retained_most() == pytest.approx(sums["most"] / sums["clean"])
     assert found.retained_least() == pytest.approx(sums["least"] / sums["clean"])
+    assert found.retained_nearest() == pytest.approx(sums["near"] / sums["clean"])
+    assert found.attends_nearest() == pytest.approx(near / 30)
     assert found.retained_helper() == pytest.approx(sums["helper"] / sums["helped"])
     assert found.retained_other() == pytest.approx(sums["other"] / sums["helped"])
     assert found.attends_helper() == pytest.approx(hits / helped)
@@ -47,7 +54,7 @@ def test_what_is_retained_against_plain_loops(seed: int) -> None:
 
 def test_without_rescues_nothing_is_retained() -> None:
     none = np.zeros(3, np.int64)
-    found = Failures(none, np.zeros((2, 3), np.int64), np.ones((3, 2)), none - 1)
+    found = Failures(none, np.zeros((2, 3), np.int64), np.ones((3, 2)), np.ones((3, 2)), none - 1)
     assert found.retained_most() is None
     assert found.retained_other() is None
     assert found.attends_helper() is None
@@ -74,6 +81,9 @@ def test_each_food_robot_fails_in_the_same_worlds() -> None:
         for robot in (0, 1):
             of_others = [weights[episode, ONSET, h, i, robot] for h in (0, 1) for i in (2, 3)]
             assert found.attended[episode, robot] == pytest.approx(np.mean(of_others), rel=1e-6)
+            places = clean.steps["positions"][episode, ONSET].astype(float)
+            ways = [np.hypot(*(places[robot] - places[other])) for other in (2, 3)]
+            assert found.distance[episode, robot] == pytest.approx(np.mean(ways))
     assert (found.faulty.sum(1) < found.clean.sum()).all()
 
 

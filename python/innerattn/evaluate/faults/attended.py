@@ -33,12 +33,14 @@ class Failures:
         clean: (E,) rescues without a failure.
         faulty: (A, E) rescues when each of the robots alike fails.
         attended: (E, A) mean weight on each of them at the onset, over heads and all other robots.
+        distance: (E, A) mean distance of each of them to all other robots at the onset [m].
         helper: (E,) which of them helps first from the onset on where nobody fails; -1: none does.
     """
 
     clean: Counts
     faulty: Counts
     attended: NDArray[np.float64]
+    distance: NDArray[np.float64]
     helper: Robots
 
     def retained_most(self) -> float | None:
@@ -48,6 +50,14 @@ class Failures:
     def retained_least(self) -> float | None:
         """The same when the least attended one fails."""
         return self._retained(self.attended.argmin(1))
+
+    def retained_nearest(self) -> float | None:
+        """The same when the one fails that is nearest to the other robots."""
+        return self._retained(self.distance.argmin(1))
+
+    def attends_nearest(self) -> float:
+        """Share of the episodes in which the nearest one is the most attended one."""
+        return float((self.attended.argmax(1) == self.distance.argmin(1)).mean())
 
     def retained_helper(self) -> float | None:
         """The same when the one fails that would help first; of episodes that have one."""
@@ -99,7 +109,7 @@ def play_failures(
     def played(worlds: Scenario) -> Record:
         record = run_episodes(
             *(policy, worlds, episodes, seed),
-            record=("actor_attention",),
+            record=("actor_attention", "positions"),
             num_threads=num_threads,
         )
         progress(episodes)
@@ -117,10 +127,13 @@ def play_failures(
         for robot in alike
     ]
     weights = clean.steps["actor_attention"][:, onset_step].astype(np.float64)
+    places = clean.steps["positions"][:, onset_step].astype(np.float64)
+    ways = np.linalg.norm(places[:, others, None] - places[:, None, alike], axis=-1)
     return clean, Failures(
         clean=rescues_by_step(clean)[:, onset_step:].sum(1),
         faulty=np.stack([rescues_by_step(one)[:, onset_step:].sum(1) for one in faulty]),
         attended=weights[:, :, others][..., alike].mean((1, 2)),
+        distance=ways.mean(1),
         helper=first_helpers(clean, alike, onset_step),
     )
 
