@@ -205,8 +205,10 @@ _MEANS = (
 _ACTOR = (
     "A lead is a robot's weight on the next partner minus that on the last one, a mean over three "
     "steps up to the first rescue (before) or after it. Retained is the share of the rescues after "
-    "a food robot fails: the one that the other robots attend to most, or least, or that would "
-    "help first, or the other one. Episodes are twice as long as those of the training.\n"
+    "one of the robots with the shared ability fails: the one that the other robots attend to "
+    "most, or least, the one nearest to them, the helper, which would help first, or the other "
+    "one. Attends nearest and attends helper are the shares of episodes in which the most attended "
+    "one is the nearest, and the helper. Episodes are twice as long as those of the training.\n"
 )
 _LEADS_SHOW = "Weight of actors on the next partner less that on the last one, around handoffs"
 _LEADS = (
