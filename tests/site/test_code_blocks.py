@@ -11,17 +11,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tyro
 
 from innerattn.cli.main import COMMANDS, _parse, main
 from innerattn.config import Scenario, load_run_config
-from innerattn.config.instances import read_worlds
+from innerattn.config.instances import read_instances, read_worlds
 from innerattn.envs import BatchEnv
 from innerattn.policies import Exported
 from innerattn.studies.plan import plan_study
 from innerattn.studies.study import study_in
+from innerattn.train.orders import OrderTraining
 from innerattn.zoo import run_path
 
 ROOT = Path(__file__).parents[2]
+ORDERS = ROOT / "python/innerattn/policies/orders/ral.safetensors"
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("*/*.md")])
 FENCE = re.compile(r"(?ms)^(?P<fence>```+)(?P<language>[^\n]*)\n(?P<code>.*?)^(?P=fence)[ \t]*$")
 LANGUAGES = {"sh", "python", "toml", "rust", "text", "mermaid"}
@@ -101,6 +104,9 @@ def place(tmp_path: Path, run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
         for name, code in re.findall(r"(?s)`(\w+\.toml)`[^`]*:\n\n```toml\n(.*?)```", text):
             (tmp_path / name).write_text(code, "utf-8")
     (tmp_path / "mine.toml").write_text('situation = "double"\nepisode_steps = 20\n')
+    few = [one.model_dump(mode="json") for one in read_instances("ral")[:2]]
+    (tmp_path / "mine.json").write_text(json.dumps(few))
+    shutil.copy(ORDERS, tmp_path / "mine.safetensors")
     return tmp_path
 
 
@@ -258,6 +264,8 @@ def test_other_commands_name_what_is_there() -> None:
                     assert ours or f"{name}==" in pinned, line
                     given = set(filter(None, extras.split(",")))
                     assert given <= set(project["optional-dependencies"]), line
+                case ["python", "-m", "innerattn.train.orders", *rest]:
+                    tyro.cli(OrderTraining, args=rest)  # SystemExit if a word is wrong
                 case ["python", "-m", "robot", *_]:
                     assert (ROOT / "examples/robot/robot/__main__.py").is_file()
                 case ["torchrun", *rest]:
