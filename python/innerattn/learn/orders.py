@@ -7,32 +7,19 @@ than their mean (a shared baseline, Kool et al. 2019; Kwon et al. 2020).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from innerattn import _core
 from innerattn.nn.orders import OrderNetwork
 
 STEPS_AT_ONCE = 5
 """Tasks of all orders that are in one piece of a gradient; more take more memory."""
 MOST_NORM = 1.0
 """Of a gradient."""
-
-
-class OrdersInWork(Protocol):
-    """What `_core.Orders` does."""
-
-    def features(self) -> NDArray[np.float32]:
-        """What is known of each task."""
-
-    def take(self, tasks: NDArray[np.int64]) -> None:
-        """Put one task at the end of each order."""
-
-    def makespans(self) -> NDArray[np.float64]:
-        """Of the orders so far."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +42,7 @@ class DrawnOrders:
 @torch.no_grad()
 def draw_orders(
     network: OrderNetwork,
-    orders: OrdersInWork,
+    orders: _core.Orders,
     relations: Tensor,
     is_open: Tensor,
     draws: torch.Generator | None,

@@ -3,7 +3,7 @@
 //! Nothing depends on the number or the name of a robot, a task or a skill. Times are in the instance's own
 //! unit, see [`unit_of`], so that a policy does not depend on the units of a file either.
 
-use crate::instance::Instance;
+use crate::instance::{Instance, MAX_SKILLS};
 use crate::order::Trace;
 
 /// Numbers that are known of a task; see [`Unfinished::features`].
@@ -26,7 +26,7 @@ pub struct Unfinished {
     open: Vec<usize>,
     unit: f64,
     /// For each skill, how many robots have it.
-    able: [f64; 32],
+    able: [f64; MAX_SKILLS],
 }
 
 impl Unfinished {
@@ -135,8 +135,12 @@ impl Unfinished {
 
     /// For each skill, the work of open tasks that waits for each robot that has it, and when these robots are
     /// free on average.
-    fn waiting_work(&self, instance: &Instance, stands: &[(f64, usize)]) -> ([f64; 32], [f64; 32]) {
-        let mut work = [0.0; 32];
+    fn waiting_work(
+        &self,
+        instance: &Instance,
+        stands: &[(f64, usize)],
+    ) -> ([f64; MAX_SKILLS], [f64; MAX_SKILLS]) {
+        let mut work = [0.0; MAX_SKILLS];
         for task in &self.open {
             let it = &instance.tasks[*task];
             let way = mean(self.open.iter().map(|other| instance.travel(instance.place_of(*other), *task)));
