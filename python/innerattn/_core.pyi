@@ -85,12 +85,11 @@ class Instance:
         evaluations: int | None,
         seconds: float | None,
         order: Sequence[int] | None = None,
-    ) -> tuple[list[list[int]], list[int], int]:
-        """The best schedule of a search, an order for it, and how many orders of tasks it tried.
+    ) -> tuple[list[list[int]], int]:
+        """The best schedule of a search, and how many orders of tasks it tried.
 
         It begins with `order`, or with the one of `greedy`, and ends at the first limit. With
-        `evaluations` alone it gives the same bits on every machine. In the order that is returned,
-        tasks come as they begin, as far as that makes no schedule longer.
+        `evaluations` alone it gives the same bits on every machine.
 
         Raises:
             ValueError: there is no limit, `seconds` is not 0 to 1e6, or `order` has not each task

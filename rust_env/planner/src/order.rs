@@ -118,45 +118,6 @@ pub fn schedule_of(instance: &Instance, order: &[usize]) -> Schedule {
     schedule
 }
 
-/// An order whose schedule is no longer, and in which tasks come as they begin, as far as that goes: neighbours
-/// change places where the later one begins sooner and the makespan does not grow.
-#[must_use]
-pub fn as_they_begin(instance: &Instance, order: &[usize]) -> Vec<usize> {
-    let mut order = order.to_vec();
-    let mut starts = vec![0.0; order.len()];
-    let mut most = play(instance, &order, &mut starts);
-    // No more passes than the longest sort needs: starts change as tasks do.
-    for _ in 0..order.len() {
-        let mut changed = false;
-        for first in 1..order.len() {
-            if starts[order[first]] >= starts[order[first - 1]] {
-                continue;
-            }
-            order.swap(first - 1, first);
-            let mut found = vec![0.0; order.len()];
-            let makespan = play(instance, &order, &mut found);
-            if makespan <= most {
-                (most, starts, changed) = (makespan, found, true);
-            } else {
-                order.swap(first - 1, first);
-            }
-        }
-        if !changed {
-            break;
-        }
-    }
-    order
-}
-
-/// Makespan of an order; writes when each task begins.
-fn play(instance: &Instance, order: &[usize], starts: &mut [f64]) -> f64 {
-    let mut trace = Trace::new(instance);
-    for (done, task) in order.iter().enumerate() {
-        starts[*task] = trace.give_out(instance, done, *task).1;
-    }
-    trace.makespan(order.len())
-}
-
 /// Sends the robots of a mask to a task after all others.
 pub fn add(schedule: &mut Schedule, mask: u64, task: usize) {
     for (robot, tasks) in schedule.iter_mut().enumerate() {

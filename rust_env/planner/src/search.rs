@@ -37,8 +37,6 @@ pub struct Limits {
 pub struct Plan {
     /// The best schedule.
     pub schedule: Schedule,
-    /// The order of the tasks that gives it.
-    pub order: Vec<usize>,
     /// Orders that were tried.
     pub evaluations: u64,
 }
@@ -63,8 +61,7 @@ pub fn plan(
         let left = limits.evaluations.map_or(u64::MAX, |most| most - search.evaluations);
         search.go_on(done, per_look.min(left));
     }
-    let order = search.best.0;
-    Ok(Plan { schedule: schedule_of(instance, &order), order, evaluations: search.evaluations })
+    Ok(Plan { schedule: schedule_of(instance, &search.best.0), evaluations: search.evaluations })
 }
 
 /// How much of its limits a search has used.

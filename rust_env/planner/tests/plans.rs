@@ -3,7 +3,7 @@
 use innerattn_planner::coalition::fills;
 use innerattn_planner::error::Error;
 use innerattn_planner::instance::{Instance, Robot, Task};
-use innerattn_planner::order::{add, as_they_begin, schedule_of};
+use innerattn_planner::order::{add, schedule_of};
 use innerattn_planner::schedule::{Schedule, simulate};
 use innerattn_planner::search::{Limits, Plan, plan};
 use innerattn_planner::simple::{greedy_order, random_schedule};
@@ -81,18 +81,6 @@ proptest! {
     #[test]
     fn no_plan_is_shorter_than_the_shortest(instance in instances(5, 3)) {
         prop_assert!(makespan(&instance, &planned(&instance, 1, 200).schedule) >= least(&instance) - 1e-12);
-    }
-
-    #[test]
-    fn an_order_of_tasks_as_they_begin_is_no_longer(instance in instances(5, 6), seed in 0_u64..9) {
-        let order = planned(&instance, seed, 20).order;
-        let settled = as_they_begin(&instance, &order);
-        let mut tasks = settled.clone();
-        tasks.sort_unstable();
-        prop_assert!(tasks.into_iter().eq(0..instance.tasks.len()));
-        let length = |order: &[usize]| makespan(&instance, &schedule_of(&instance, order));
-        prop_assert!(length(&settled) <= length(&order));
-        prop_assert_eq!(schedule_of(&instance, &order), planned(&instance, seed, 20).schedule);
     }
 
     #[test]

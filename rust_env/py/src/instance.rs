@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use innerattn_planner::error::Error;
 use innerattn_planner::instance::{Instance as Valid, MAX_SKILLS, Robot, Task};
-use innerattn_planner::order::{as_they_begin, schedule_of};
+use innerattn_planner::order::schedule_of;
 use innerattn_planner::schedule::{Schedule, simulate};
 use innerattn_planner::search::{Limits, plan};
 use innerattn_planner::simple::{greedy_order, random_schedule};
@@ -63,7 +63,7 @@ impl Instance {
         evaluations: Option<u64>,
         seconds: Option<f64>,
         order: Option<Vec<usize>>,
-    ) -> PyResult<(Schedule, Vec<usize>, u64)> {
+    ) -> PyResult<(Schedule, u64)> {
         let order = order.map_or_else(|| Ok(greedy_order(&self.0)), |order| self.checked(order))?;
         let interruption = Mutex::new(None);
         let poll = || {
@@ -75,8 +75,7 @@ impl Instance {
         let found = py.detach(|| plan(&self.0, order, seed, Limits { evaluations, seconds }, &poll));
         let interruption = interruption.into_inner().unwrap_or_else(PoisonError::into_inner);
         let found = found.map_err(|error| interruption.unwrap_or_else(|| raised(&error)))?;
-        let order = as_they_begin(&self.0, &found.order);
-        Ok((found.schedule, order, found.evaluations))
+        Ok((found.schedule, found.evaluations))
     }
 
     fn schedule(&self, py: Python, order: Vec<usize>) -> PyResult<Schedule> {

@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from attention_record import record_of
 from scipy.stats import t as student
 
 from innerattn.config import Scenario
@@ -12,25 +13,9 @@ from innerattn.measures.sharing import handoff_attention as module
 from innerattn.measures.sharing.handoff import HANDOFF, handoffs
 from innerattn.measures.sharing.handoff_attention import aligned_weights, handoff_attention
 from innerattn.policies import scripted_policy
-from innerattn.records.record import Record, rescue_dtype
+from innerattn.records.record import Record
 
 STEPS, HEADS = 25, 2
-
-
-def record_of(weights: np.ndarray, first_episode: int = 0) -> Record:
-    scenario = Scenario()
-    return Record(
-        policy="p",
-        scenario=scenario,
-        robot_names=tuple(robot.name for robot in scenario.robots),
-        seed=0,
-        first_episode=first_episode,
-        lengths=np.full(len(weights), STEPS),
-        rescues=np.zeros(0, rescue_dtype(scenario)),
-        reward_names=("rescue",),
-        rewards_total=np.zeros((len(weights), 4, 1)),
-        steps={"attention": weights.astype(np.float32)},
-    )
 
 
 def drifting(rng: np.random.Generator, episodes: int) -> np.ndarray:

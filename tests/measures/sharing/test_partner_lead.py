@@ -4,30 +4,14 @@ from itertools import product
 
 import numpy as np
 import pytest
+from attention_record import record_of
 
-from innerattn.config import Scenario
 from innerattn.measures.sharing.handoff import HANDOFF
 from innerattn.measures.sharing.partner_lead import AFTER, BEFORE, mean_lead, partner_leads
-from innerattn.records.record import Record, rescue_dtype
 
 STEPS, HEADS = 25, 2
+FIELD = "actor_attention"
 OFFSETS = np.arange(-7, 9)
-
-
-def record_of(weights: np.ndarray, first_episode: int = 0) -> Record:
-    scenario = Scenario()
-    return Record(
-        policy="p",
-        scenario=scenario,
-        robot_names=tuple(robot.name for robot in scenario.robots),
-        seed=0,
-        first_episode=first_episode,
-        lengths=np.full(len(weights), STEPS),
-        rescues=np.zeros(0, rescue_dtype(scenario)),
-        reward_names=("rescue",),
-        rewards_total=np.zeros((len(weights), 4, 1)),
-        steps={"actor_attention": weights.astype(np.float32)},
-    )
 
 
 def random_weights(rng: np.random.Generator, episodes: int) -> np.ndarray:
@@ -50,7 +34,7 @@ def test_by_hand() -> None:
     weights[0, 11:, :, 0, 1:] = [0.1, 0.7, 0.2]
     weights[0, 12:, 1, 0, 1:] = [0.0, 1.0, 0.0]
     events = np.array([(4, 0, 3, 2, 9, 10, 13)], HANDOFF)
-    leads = partner_leads(record_of(weights, 4), events, OFFSETS, "actor_attention")
+    leads = partner_leads(record_of(weights, 4, FIELD), events, OFFSETS, FIELD)
     inside = np.isfinite(leads[0])
     assert OFFSETS[inside].tolist() == [-1, 0, 1, 2, 3]
     np.testing.assert_allclose(leads[0, inside], [-0.2, -0.2, 0.5, 0.75, 0.75], atol=1e-6)
@@ -62,8 +46,8 @@ def test_by_hand() -> None:
 def test_against_plain_loops(seed: int) -> None:
     rng = np.random.default_rng(seed)
     weights = random_weights(rng, 6)
-    record, events = record_of(weights, 9), random_handoffs(rng, 6, 9)
-    leads = partner_leads(record, events, OFFSETS, "actor_attention")
+    record, events = record_of(weights, 9, FIELD), random_handoffs(rng, 6, 9)
+    leads = partner_leads(record, events, OFFSETS, FIELD)
     for steps in (BEFORE, AFTER, (5, 6)):
         means = []
         for row, event in enumerate(events):
@@ -86,6 +70,6 @@ def test_against_plain_loops(seed: int) -> None:
 def test_without_a_step_there_is_no_lead() -> None:
     rng = np.random.default_rng(0)
     events = np.array([(0, 0, 3, 2, 9, 10, 11)], HANDOFF)
-    leads = partner_leads(record_of(random_weights(rng, 1)), events, OFFSETS, "actor_attention")
+    leads = partner_leads(record_of(random_weights(rng, 1), field=FIELD), events, OFFSETS, FIELD)
     assert mean_lead(leads, OFFSETS, (5, 6)) is None
     assert mean_lead(leads[:0], OFFSETS, BEFORE) is None

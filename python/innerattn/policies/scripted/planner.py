@@ -79,7 +79,7 @@ def plan(
     Raises:
         ValueError: there is no limit, one is out of range, or ``order`` has not each task once.
     """
-    tasks, _, _ = instance.compiled().plan(seed, evaluations, time_limit_s, order)
+    tasks, _ = instance.compiled().plan(seed, evaluations, time_limit_s, order)
     return simulate(instance, tasks)
 
 
