@@ -80,7 +80,7 @@ situation = "single"
     out, err = capsys.readouterr()
     assert err == ""
     lines = out.splitlines()
-    assert lines[0] == f"{folder}: 2 robots, for numpy alone, 0.1 MB"
+    assert lines[0] == f"{folder}: 2 robots, for numpy alone, 0.2 MB"
     assert lines[-1].startswith("largest difference: ")
     assert lines[-1].endswith(" in numpy")
     assert Exported(folder).robot_names == ("a", "b")

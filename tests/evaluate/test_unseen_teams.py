@@ -63,6 +63,10 @@ def test_rescues_are_those_of_the_same_episodes_one_by_one() -> None:
         for number in range(4)
     ]
     assert found.most == pytest.approx(sum(each) / 4)
+    greedy = run_episodes(
+        scripted_policy("greedy", team.scenario, 20_261), team.scenario, 4, 20_261
+    ).rescue_counts()
+    assert found.more.tolist() == [one - other for one, other in zip(greedy, each, strict=True)]
 
 
 def test_progress_counts_teams() -> None:

@@ -35,7 +35,7 @@ def random_tables(size: Size, seed: int) -> TeamTables:
         is_there=torch.ones(worlds, robots, dtype=torch.bool),
         positions=uniform(-0.6, 0.6, worlds, robots, 2),
         velocities=uniform(-0.7, 0.7, worlds, robots, 2),
-        bodies=uniform(0.3, 1.5, worlds, robots, 3),
+        bodies=uniform(0.3, 1.5, worlds, robots, 6),
         abilities=(uniform(0.0, 1.0, worlds, robots, abilities) < 0.6).float(),
         is_victim=is_victim,
         places=uniform(-0.6, 0.6, worlds, victims, 2) * is_victim[..., None],

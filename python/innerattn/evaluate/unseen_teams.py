@@ -9,6 +9,9 @@ from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Literal, NamedTuple, get_args
 
+import numpy as np
+from numpy.typing import NDArray
+
 from innerattn.config import Scenario
 from innerattn.config.family import Family
 from innerattn.evaluate.play import run_episodes
@@ -60,12 +63,15 @@ class TeamScore(NamedTuple):
         score: of the policy: 0 rescues as many as `random`, 1 as many as `hungarian`.
         greedy: score of the script `greedy`.
         most: rescues per episode of `hungarian`.
+        more: (episodes,) rescues of the policy minus those of `hungarian`, which plays the same
+            worlds.
     """
 
     team: UnseenTeam
     score: float
     greedy: float
     most: float
+    more: NDArray[np.int64]
 
 
 @lru_cache(maxsize=1)
@@ -109,23 +115,24 @@ def scores_in_unseen_teams(
         One by one, in the order of `unseen_teams`.
     """
     for number, team in enumerate(unseen_teams()):
-        least, greedy, most = (
-            _scripted(name, number, episodes, num_threads) for name in _REFERENCES
-        )
+        scripted = [_scripted(name, number, episodes, num_threads) for name in _REFERENCES]
         own = _rescues(policy_for(team.scenario), team.scenario, episodes, num_threads)
-        score, other = ((one - least) / (most - least) for one in (own, greedy))
+        least, greedy, most = (float(one.mean()) for one in scripted)
+        score, other = ((one - least) / (most - least) for one in (float(own.mean()), greedy))
         progress(number + 1)
-        yield TeamScore(team, score, other, most)
+        yield TeamScore(team, score, other, most, own - scripted[-1])
 
 
 @lru_cache(maxsize=4 * 24)
-def _scripted(name: str, number: int, episodes: int, num_threads: int | None) -> float:
+def _scripted(name: str, number: int, episodes: int, num_threads: int | None) -> NDArray[np.int64]:
     """Of a script; all policies are measured beside the same."""
     scenario = unseen_teams()[number].scenario
     return _rescues(scripted_policy(name, scenario, _SEED), scenario, episodes, num_threads)
 
 
-def _rescues(policy: Policy, scenario: Scenario, episodes: int, num_threads: int | None) -> float:
-    """Mean rescues per episode."""
+def _rescues(
+    policy: Policy, scenario: Scenario, episodes: int, num_threads: int | None
+) -> NDArray[np.int64]:
+    """Rescues of each episode."""
     record = run_episodes(policy, scenario, episodes, _SEED, num_threads=num_threads)
-    return float(record.rescue_counts().mean())
+    return record.rescue_counts()

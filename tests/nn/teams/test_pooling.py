@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from innerattn.nn.teams.pooling import POOLINGS, InnerPooling, Pooling
+from innerattn.nn.teams.pooling import POOLINGS, InnerPooling, Pooling, as_table
 
 VICTIMS, ROBOTS, WIDTH = 3, 4, 5
 
@@ -37,7 +37,7 @@ def test_it_is_that_of_plain_loops(name: str) -> None:
     there = torch.zeros(VICTIMS * ROBOTS, dtype=torch.bool)
     there[cells] = True
     masks &= there.view(VICTIMS, 1, ROBOTS)
-    found = pool(rows, cells, masks, times)
+    found = pool(rows, as_table(rows, cells, VICTIMS, ROBOTS), cells, masks, times)
     row_of = {int(cell): row for row, cell in enumerate(cells)}
     time = times.view(-1)[cells]
     for row, cell in enumerate(cells.tolist()):

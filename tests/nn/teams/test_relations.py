@@ -103,7 +103,7 @@ def by_hand(tables: TeamTables, world: int, victim: int) -> dict[int, dict[str, 
             "rank": order.index(victim) / 2.0,
             "rival": min(max(rival - times[i], -3.0), 3.0),
             "last": min(last, 4.0),
-            "nearer": sum(times[j] < times[i] for j in alike) / 3.0,
+            "nearer": min(sum(times[j] < times[i] for j in alike), 4) / 3.0,
         }
     return found
 
@@ -189,8 +189,7 @@ def test_arrival_times_are_those_of_scripts() -> None:
     scenario = Scenario.preset("mixed")
     steering = Steering(scenario)
     tables = random_tables(Size(worlds=50, robots=4, victims=3), 1)
-    bodies = np.stack([steering.speed, steering.lag, np.ones(4)], -1)
-    bodies = torch.tensor(bodies, dtype=torch.float32).expand(50, -1, -1)
+    bodies = torch.tensor(steering.bodies(), dtype=torch.float32).expand(50, -1, -1)
     everywhere = torch.ones_like(tables.is_victim)
     needs = torch.ones_like(tables.needs)
     tables = tables._replace(bodies=bodies, is_victim=everywhere, needs=needs)

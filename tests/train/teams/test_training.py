@@ -26,6 +26,7 @@ SMALL = {
     "train.episode_steps": 20,
     "imitation.env_steps": 480,
     "team.teams": 4,
+    "team.new_teams": 2,
     "team.rollout_steps": 5,
     "team.hidden_width": 8,
     "team.key_width": 4,

@@ -7,7 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from innerattn.nn.teams.frames import turn_back_choices
-from innerattn.nn.teams.pooling import POOLINGS
+from innerattn.nn.teams.pooling import POOLINGS, Pooling, as_table
 from innerattn.nn.teams.relations import (
     HOME_WIDTH,
     NEAREST,
@@ -33,10 +33,11 @@ def layer(inputs: int, outputs: int, gain: float = 2.0**0.5) -> nn.Linear:
 class TeamActor(nn.Module):
     """Log-probabilities of the actions of every robot in every world.
 
-    Each pair (robot, victim) is encoded, sees the robot's other pairs (by their maximum), then the
-    pairs of rivals and of partners at its victim (by a pooling), and gives a weight w_v and a
-    distribution p_v over actions in its own frame; so does the robot's way home. The policy is the
-    mixture pi(a) = sum_v softmax(w)_v p_v(a).
+    Each pair (robot, victim) is encoded and sees the robot's other pairs (by their maximum). Twice
+    it sees the pairs of rivals and of partners at its victim (by a pooling) and again the robot's
+    own: the second time these know of their own rivals and partners. Then it gives a weight w_v and
+    a distribution p_v over actions in its own frame; so does the robot's way home. The policy is
+    the mixture pi(a) = sum_v softmax(w)_v p_v(a).
     """
 
     def __init__(self, width: int, pooling: str, key_width: int) -> None:
@@ -50,10 +51,12 @@ class TeamActor(nn.Module):
         super().__init__()
         self.width = width
         self.first, self.second = layer(PAIR_WIDTH, width), layer(2 * width, width)
-        self.rivals = POOLINGS[pooling](width, key_width)
-        self.partners = POOLINGS[pooling](width, key_width)
-        self.third = layer(PAIR_WIDTH + PAIR_TURNING_WIDTH + 4 * width, width)
-        self.fourth, self.out = layer(width, width), layer(width, 1 + NUM_CHOICES, 0.01)
+        self.rivals, self.partners, self.rivals_again, self.partners_again = (
+            POOLINGS[pooling](width, key_width) for _ in range(4)
+        )
+        self.third = layer(4 * width, width)
+        self.fourth = layer(PAIR_WIDTH + PAIR_TURNING_WIDTH + 4 * width, width)
+        self.fifth, self.out = layer(width, width), layer(width, 1 + NUM_CHOICES, 0.01)
         self.home = layer(HOME_WIDTH + width, _HOME_HIDDEN)
         self.home_out = layer(_HOME_HIDDEN, 1 + NUM_CHOICES, 0.01)
 
@@ -62,20 +65,26 @@ class TeamActor(nn.Module):
         robots = len(seen.homes)
 
         def of_robot(rows: Tensor) -> Tensor:
-            table = rows.new_zeros(robots * NEAREST, self.width).index_copy(0, seen.slots, rows)
-            return table.view(robots, NEAREST, self.width).amax(1)
+            return as_table(rows, seen.slots, robots, NEAREST).amax(1)
+
+        def of_own(rows: Tensor) -> Tensor:
+            return of_robot(rows).index_select(0, seen.robots)
+
+        def of_others(rows: Tensor, rivals: Pooling, partners: Pooling) -> list[Tensor]:
+            at_victims = as_table(rows, seen.cells, *seen.times.shape)
+            return [
+                pool(rows, at_victims, seen.cells, masks, seen.times)
+                for pool, masks in ((rivals, seen.rivals), (partners, seen.partners))
+            ]
 
         rows = functional.relu(self.first(seen.pairs))
-        others = of_robot(rows).index_select(0, seen.robots)
-        rows = functional.relu(self.second(torch.cat([rows, others], 1)))
-        own = of_robot(rows)
-        pooled = [
-            pool(rows, seen.cells, masks, seen.times)
-            for pool, masks in ((self.rivals, seen.rivals), (self.partners, seen.partners))
-        ]
-        parts = [seen.pairs, seen.turning, rows, *pooled, own.index_select(0, seen.robots)]
+        rows = functional.relu(self.second(torch.cat([rows, of_own(rows)], 1)))
+        parts = [rows, *of_others(rows, self.rivals, self.partners), of_own(rows)]
         rows = functional.relu(self.third(torch.cat(parts, 1)))
-        out = self.out(functional.relu(self.fourth(rows))) * _SHARPNESS
+        own, others = of_robot(rows), of_others(rows, self.rivals_again, self.partners_again)
+        parts = [seen.pairs, seen.turning, rows, *others, own.index_select(0, seen.robots)]
+        rows = functional.relu(self.fourth(torch.cat(parts, 1)))
+        out = self.out(functional.relu(self.fifth(rows))) * _SHARPNESS
         home = self.home(torch.cat([seen.homes, own], 1))
         home = self.home_out(functional.relu(home)) * _SHARPNESS
 
@@ -83,8 +92,7 @@ class TeamActor(nn.Module):
         weights = weights.index_copy(0, seen.slots, out[:, 0]).view(robots, NEAREST)
         weights = torch.cat([weights, home[:, :1]], 1).log_softmax(1)
         choices = turn_back_choices(out[:, 1:].log_softmax(1), seen.frames)
-        table = choices.new_zeros(robots * NEAREST, NUM_CHOICES)
-        table = table.index_copy(0, seen.slots, choices).view(robots, NEAREST, NUM_CHOICES)
+        table = as_table(choices, seen.slots, robots, NEAREST)
         at_home = turn_back_choices(home[:, 1:].log_softmax(1), seen.home_frames)
         mixed = torch.cat([table, at_home[:, None]], 1) + weights[..., None]
         return mixed.logsumexp(1)

@@ -7,6 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from innerattn.nn.teams.actor import layer
+from innerattn.nn.teams.pooling import as_table
 from innerattn.nn.teams.relations import (
     PAIR_WIDTH,
     ROBOT_WIDTH,
@@ -35,14 +36,12 @@ class TeamCritic(nn.Module):
         victims, size = seen.times.shape
         worlds = len(seen.worlds)
         pairs = functional.relu(self.pair(seen.pairs))
-        table = pairs.new_zeros(victims * size, pairs.shape[1]).index_copy(0, seen.cells, pairs)
-        table = table.view(victims, size, -1)
+        table = as_table(pairs, seen.cells, victims, size)
         parts = [seen.victims, table.amax(1), table.sum(1) / 4.0]
         rows = functional.relu(self.victim(torch.cat(parts, 1)))
         at_victims = rows.new_zeros(worlds, rows.shape[1]).index_add(0, seen.victim_worlds, rows)
         robots = functional.relu(self.robot(seen.team))
-        team = robots.new_zeros(worlds * size, robots.shape[1])
-        team = team.index_copy(0, seen.robot_cells, robots).view(worlds, size, -1)
+        team = as_table(robots, seen.robot_cells, worlds, size)
         parts = [at_victims, team.sum(1) / 4.0, team.amax(1), seen.worlds]
         found: Tensor = self.out(functional.relu(self.world(torch.cat(parts, 1))))
         return found.squeeze(1)

@@ -13,14 +13,17 @@ from torch import Tensor
 
 from innerattn.nn.teams.coalitions import NEVER_S, coalitions
 from innerattn.nn.teams.frames import frame_of, turn
+from innerattn.nn.teams.moves import GAINS_WIDTH, gains
 from innerattn.nn.teams.tables import TeamTables
 
 NEAREST = 3
 """Victims that a robot looks at, by its own arrival time."""
 _LONGEST_S = 8.0
 """Beyond this, arrival times tell no more."""
+_MOST_NEARER, _MOST_OTHERS = 4, 6
+"""Beyond these numbers of rivals and partners, more of them change nothing."""
 PAIR_WIDTH, PAIR_TURNING_WIDTH, HOME_WIDTH, VICTIM_WIDTH, ROBOT_WIDTH, WORLD_WIDTH = (
-    *(23, 10, 16, 8, 12),
+    *(23, 10 + GAINS_WIDTH, 16 + GAINS_WIDTH, 8, 12),
     9,
 )
 
@@ -30,7 +33,8 @@ class Relations(NamedTuple):
 
     Attributes:
         pairs: (P, PAIR_WIDTH) columns that do not turn with the world.
-        turning: (P, PAIR_TURNING_WIDTH) vectors (x, y) in each pair's frame.
+        turning: (P, PAIR_TURNING_WIDTH) vectors (x, y) in each pair's frame, and what actions gain
+            on the way to its victim.
         frames: (P,) int64 frame of each pair, which brings its victim to x >= y >= 0.
         cells: (P,) int64 where each pair stands in a table of (M, R).
         robots: (P,) int64 each pair's robot, of N.
@@ -121,9 +125,9 @@ def relate(tables: TeamTables) -> Relations:
         (teams.without - times).clamp(-3.0, 3.0),
         teams.others.clamp(max=4.0),
         (teams.others - times).clamp(-3.0, 3.0),
-        nearer / 3.0,
-        rivals.sum(-1) / 3.0,
-        partners.sum(-1) / 3.0,
+        nearer.clamp(max=_MOST_NEARER) / 3.0,
+        rivals.sum(-1).clamp(max=_MOST_OTHERS) / 3.0,
+        partners.sum(-1).clamp(max=_MOST_OTHERS) / 3.0,
     ]
     rows = torch.stack([column.expand_as(times).float() for column in columns], -1)
     cells = (useful & (ranks < NEAREST)).view(-1).nonzero().squeeze(1)
@@ -137,7 +141,8 @@ def relate(tables: TeamTables) -> Relations:
     next_way = _next_victim(tables, order, own, of_all, slot[victim])
     vectors = (target, velocity[of_all], mate[of_all], position[of_all], next_way)
     frames = frame_of(target)
-    turning = torch.cat([turn(vector, frames) for vector in vectors], -1)
+    turned = [turn(vector, frames) for vector in vectors]
+    turned.append(gains(turned[0], turned[1], tables.bodies.flatten(0, 1)[of_all]))
 
     robot_cells = tables.is_robot.flatten(0, 1).nonzero().squeeze(1)
     number = torch.full((envs * size,), -1)
@@ -156,7 +161,7 @@ def relate(tables: TeamTables) -> Relations:
     ]
     return Relations(
         pairs=rows.view(-1, PAIR_WIDTH)[cells],
-        turning=turning,
+        turning=torch.cat(turned, -1),
         frames=frames,
         cells=cells,
         robots=number[of_all],
@@ -247,6 +252,7 @@ def _robots(
     way = home.norm(dim=-1)
     towards = (velocity * home).sum(-1) / way.clamp(min=1e-6)
     team = torch.cat([own, torch.stack([way / half, towards], -1)], -1)
+    vectors.append(gains(vectors[0], vectors[1], body))
     return torch.cat([own, *vectors], -1), frames, team
 
 

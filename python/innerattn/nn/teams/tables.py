@@ -18,8 +18,10 @@ class TeamTables(NamedTuple):
         is_there: (B, R) bool, which of them are in the arena.
         positions: (B, R, 2) [m].
         velocities: (B, R, 2) [m/s].
-        bodies: (B, R, 3) final speed at full drive [m/s], the time that a start from rest costs
-            against it [s], and what one control period of full drive adds to the speed [m/s].
+        bodies: (B, R, 6) final speed at full drive [m/s], the time that a start from rest costs
+            against it [s], what one control period of full drive adds to the speed [m/s], the share
+            of its speed that a robot keeps from one period to the next, its speed limit [m/s], and
+            how long it moves on at a speed, if it coasts after one period [s].
         abilities: (B, R, K), 1 where an available robot has the ability, else 0.
         is_victim: (B, V) bool, which rows are victims.
         places: (B, V, 2) [m].
@@ -46,7 +48,7 @@ _SIZES = {
     "is_there": "R",
     "positions": "R2",
     "velocities": "R2",
-    "bodies": "R3",
+    "bodies": "R6",
     "abilities": "RK",
     "is_victim": "V",
     "places": "V2",

@@ -17,9 +17,9 @@ from innerattn.policies.exported.pairs import (
     PAIR_WIDTH,
     TURNING_WIDTH,
     Home,
+    Mask,
     Pairs,
     Relating,
-    nearest_teammate,
 )
 from innerattn.policies.exported.table import TableReader
 
@@ -31,6 +31,8 @@ _ZERO, _SHARPNESS, _LARGEST_LOGIT, _ALMOST_NOTHING = (
     np.array(value, np.float32) for value in (0.0, 10.0, 20.0, 1e-9)
 )
 _NO_BIAS = np.zeros(1, np.float32)
+_ROUNDS = ("", "_again")
+"""How the names of poolings end, which come twice."""
 _MOST_NUMBER = 1e9
 """Largest number of a row that a robot acts on; beyond it, float32 does not suffice."""
 
@@ -68,14 +70,16 @@ class PairLayers:
     def _join_poolings(self, network: Network) -> None:
         """Ask rivals and partners at once: put queries and keys of both side by side."""
         assert network.pairs is not None  # as the shapes need it
-        asked, known = (
-            [self._layers.pop(f"{who}.{part}") for who in ("rivals", "partners")]
-            for part in ("query", "key")
-        )
         scale = np.float32(network.pairs.key_width**-0.5)
-        weights, biases = (np.concatenate(parts, axis=-1) * scale for parts in zip(*asked))
-        self._layers["query"] = (weights, biases)
-        self._layers["key"] = (np.concatenate([one for one, _ in known], axis=1), _NO_BIAS)
+        for time in _ROUNDS:
+            asked, known = (
+                [self._layers.pop(f"{who}{time}.{part}") for who in ("rivals", "partners")]
+                for part in ("query", "key")
+            )
+            weights, biases = (np.concatenate(parts, axis=-1) * scale for parts in zip(*asked))
+            self._layers[f"query{time}"] = (weights, biases)
+            keys = np.concatenate([one for one, _ in known], axis=1)
+            self._layers[f"key{time}"] = (keys, _NO_BIAS)
 
     def linear(self, layer: str, rows: Array) -> Array:
         """A layer of rows (P, in): (P, out)."""
@@ -117,10 +121,7 @@ class PairActor:
     def _log_probabilities(self, row: Array) -> list[float]:
         if not -_MOST_NUMBER < row.min() <= row.max() < _MOST_NUMBER:
             return [nan] * _ACTIONS
-        table = self._reader.table(row)
-        mate = nearest_teammate(table)
-        pairs, soonest, choices = self._relating.pairs(table, mate)
-        home = self._relating.home(table, mate, soonest, choices)
+        pairs, home = self._relating.relate(self._reader.table(row))
         if pairs is None:
             nothing = np.zeros(self._layers.width, np.float32)
             return mixture([self._at_home(home, nothing)], [home.frame])
@@ -132,57 +133,70 @@ class PairActor:
         """Weight and actions (m, 6) of each own pair, and what the robot makes of all (H,)."""
         layers, width = self._layers, self._layers.width
         victims, robots = pairs.times.shape
-        cells = victims * robots
-        flat = pairs.columns.reshape(cells, PAIR_WIDTH)
-        there = pairs.there.reshape(cells, 1)
+        flat = pairs.columns.reshape(victims * robots, PAIR_WIDTH)
         both = np.empty((victims, robots, 2 * width), np.float32)
         rows = both[..., :width]
-        rows[:] = (layers.relu("first", flat) * there).reshape(victims, robots, width)
+        rows[:] = layers.relu("first", flat).reshape(rows.shape)
+        rows *= pairs.there
         both[..., width:] = rows.max(axis=0)
-        rows = layers.relu("second", both.reshape(cells, -1)) * there
-        at = rows.reshape(victims, robots, width).take(pairs.at, axis=0)
+        rows = layers.relu("second", both.reshape(len(flat), -1)).reshape(rows.shape)
+        rows *= pairs.there
+
+        # From here on the robot's own victims count, first for all robots there.
+        count, times = len(pairs.at), pairs.times.take(pairs.at, axis=0)
+        parts = np.empty((count, robots, 4 * width), np.float32)
+        parts[..., 3 * width :] = rows.max(axis=0)
+        at = parts[..., :width]
+        at[:] = rows.take(pairs.at, axis=0)
+        pooled = self._pooled(_ROUNDS[0], at, at, pairs.masks, times)
+        parts[..., width : 3 * width] = pooled.reshape(count, robots, -1)
+        at = layers.relu("third", parts.reshape(count * robots, -1)).reshape(at.shape)
+        at *= pairs.there.take(pairs.at, axis=0)
+
+        begin = PAIR_WIDTH + TURNING_WIDTH
         mine = at[:, 0]
         own: Array = mine.max(axis=0)
-        begin = PAIR_WIDTH + TURNING_WIDTH
-        parts = np.empty((len(mine), begin + 4 * width), np.float32)
+        parts = np.empty((count, begin + 4 * width), np.float32)
         parts[:, :PAIR_WIDTH] = pairs.columns.take(pairs.at, axis=0)[:, 0]
         parts[:, PAIR_WIDTH:begin] = pairs.turning
         parts[:, begin : begin + width] = mine
-        pooled = self._pooled(mine, at, pairs)
-        parts[:, begin + width : begin + 3 * width] = pooled.reshape(len(mine), 2 * width)
+        pooled = self._pooled(_ROUNDS[1], at[:, :1], at, pairs.masks[:, :, :1], times)
+        parts[:, begin + width : begin + 3 * width] = pooled.reshape(count, -1)
         parts[:, begin + 3 * width :] = own
-        rows = layers.relu("third", parts)
-        return layers.linear("out", layers.relu("fourth", rows)) * _SHARPNESS, own
+        rows = layers.relu("fourth", parts)
+        return layers.linear("out", layers.relu("fifth", rows)) * _SHARPNESS, own
 
-    def _pooled(self, mine: Array, at: Array, pairs: Pairs) -> Array:
-        """What own pairs (m, H) make of rivals and of partners at their victims: (m, 2, H).
+    def _pooled(self, time: str, asking: Array, at: Array, masks: Mask, times: Array) -> Array:
+        """What pairs make of rivals and of partners at their victims: (m, Q, 2, H).
 
         Args:
-            mine: own pairs.
-            at: (m, R, H) all pairs at their victims; zeros where there is none.
-            pairs: whose masks count.
+            time: which of `_ROUNDS`.
+            asking: (m, Q, H) the pairs.
+            at: (m, R, H) all pairs at these victims; zeros where there is none.
+            masks: (m, 2, Q, R) whom they look at.
+            times: (m, R) arrival times.
         """
-        pooling, masks = self._layers.pooling, pairs.masks
+        pooling = self._layers.pooling
+        count, robots, width = at.shape
         found: Array
         if pooling == "attention":
-            count, robots, width = at.shape
-            query = self._layers.linear("query", mine).reshape(count, 2, -1, 1)
-            keys = self._layers.linear("key", at.reshape(-1, width)).reshape(count, robots, 2, -1)
-            logits = (keys.transpose(0, 2, 1, 3) @ query)[..., 0]
-            weights = np.exp(np.minimum(logits, _LARGEST_LOGIT)) * masks
-            weights /= weights.sum(axis=2, keepdims=True) + _ALMOST_NOTHING
-            found = weights @ at
+            query = self._layers.linear(f"query{time}", asking.reshape(-1, width))
+            keys = self._layers.linear(f"key{time}", at.reshape(-1, width))
+            query = query.reshape(count, -1, 2, query.shape[1] // 2).transpose(0, 2, 1, 3)
+            keys = keys.reshape(count, robots, 2, -1).transpose(0, 2, 3, 1)
+            weights = np.exp(np.minimum(query @ keys, _LARGEST_LOGIT)) * masks
+            weights /= weights.sum(axis=3, keepdims=True) + _ALMOST_NOTHING
+            found = weights @ at[:, None]
         elif pooling == "mean":
-            number = np.maximum(masks.sum(axis=2, keepdims=True), 1)
-            found = (masks / number).astype(np.float32) @ at
+            number = np.maximum(masks.sum(axis=3, keepdims=True), 1)
+            found = (masks / number).astype(np.float32) @ at[:, None]
         elif pooling == "max":  # what is pooled is at least 0
-            found = (at[:, None] * masks[..., None]).max(axis=2)
+            found = (at[:, None, None] * masks[..., None]).max(axis=3)
         else:
-            times = pairs.times.take(pairs.at, axis=0)[:, None]
-            nearest = np.where(masks, times, np.float32(np.inf)).argmin(axis=2)
-            found = np.take_along_axis(at, nearest[..., None], axis=1)
-            found = found * masks.any(axis=2, keepdims=True)
-        return found
+            soonest = np.where(masks, times[:, None, None], np.float32(np.inf)).argmin(axis=3)
+            found = at[np.arange(count)[:, None, None], soonest]
+            found = found * masks.any(axis=3, keepdims=True)
+        return found.transpose(0, 2, 1, 3)
 
     def _at_home(self, home: Home, own: Array) -> list[float]:
         """Weight and actions (6) of the way to the centre."""
@@ -240,16 +254,18 @@ def pair_shapes(network: Network) -> dict[str, tuple[int, ...]]:
     layers = {
         "first": (width, PAIR_WIDTH),
         "second": (width, 2 * width),
-        "third": (width, PAIR_WIDTH + TURNING_WIDTH + 4 * width),
-        "fourth": (width, width),
+        "third": (width, 4 * width),
+        "fourth": (width, PAIR_WIDTH + TURNING_WIDTH + 4 * width),
+        "fifth": (width, width),
         "out": (1 + _ACTIONS, width),
         "home": (_HOME_HIDDEN, HOME_WIDTH + width),
         "home_out": (1 + _ACTIONS, _HOME_HIDDEN),
     }
     shapes: dict[str, tuple[int, ...]] = {}
     if network.pooling == "attention":
-        layers |= {f"{layer}.query": (keys, width) for layer in ("rivals", "partners")}
-        shapes |= {f"{layer}.key.weight": (keys, width) for layer in ("rivals", "partners")}
+        pools = [f"{who}{time}" for who in ("rivals", "partners") for time in _ROUNDS]
+        layers |= {f"{pool}.query": (keys, width) for pool in pools}
+        shapes |= {f"{pool}.key.weight": (keys, width) for pool in pools}
     for layer, shape in layers.items():
         shapes[f"{layer}.weight"], shapes[f"{layer}.bias"] = shape, shape[:1]
     return shapes

@@ -5,6 +5,7 @@ It is `innerattn.nn.teams.relations` for one robot's view, in numpy.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from innerattn.errors import ReadingError
 from innerattn.policies.exported.contract import MOST_NEEDS, Contract
+from innerattn.policies.exported.moves import GAINS_WIDTH, Moves
 from innerattn.policies.exported.roles import Roles, roles_of
 from innerattn.policies.exported.table import Bodies, Table, bodies_of, demand_of
 
@@ -23,7 +25,7 @@ Vector = tuple[float, float]
 
 NEAREST = 3
 """Victims that a robot looks at, by its own arrival time."""
-PAIR_WIDTH, TURNING_WIDTH, HOME_WIDTH = 23, 10, 16
+PAIR_WIDTH, TURNING_WIDTH, HOME_WIDTH = 23, 10 + GAINS_WIDTH, 16 + GAINS_WIDTH
 NEVER_S = 1e3
 """Arrival time of nobody [s]."""
 _LONGEST_S = 8.0
@@ -68,6 +70,9 @@ _RANGES = {
     _WITHOUT: (-3.0, 3.0),
     _OTHERS: (-np.inf, 4.0),
     _LAST: (-3.0, 3.0),
+    _NEARER: (-np.inf, 4.0),
+    _RIVALS: (-np.inf, 6.0),
+    _PARTNERS: (-np.inf, 6.0),
 }
 """What columns are cut to."""
 _UNITS = {
@@ -101,8 +106,8 @@ class Pairs(NamedTuple):
         there: (M, R, 1) float32, 1 where there is a pair, else 0.
         at: (m,) victims of the robot's pairs.
         frames: the frame of each, which brings its victim to x >= y >= 0.
-        turning: (m, TURNING_WIDTH) vectors (x, y) in each pair's frame.
-        masks: (m, 2, R) bool, whose part the robot could take there, and who completes it there.
+        turning: (m, TURNING_WIDTH) vectors (x, y) in each pair's frame, and what actions gain.
+        masks: (m, 2, R, R) bool, whose part each robot could take there, and who completes it.
         times: (M, R) arrival times of all robots [s].
     """
 
@@ -132,7 +137,7 @@ class _Known(NamedTuple):
         there: (M, R, 1) float32, 1 where a robot can help, else 0.
         starts: (M, 1) where each victim's row begins in an array of (M, R).
         places: (1 + R,) numbers from 0.
-        masks: (M, 2, R) bool, rivals and partners of the robot.
+        masks: (M, 2, R, R) bool, rivals and partners of each robot.
         columns: (M, R, PAIR_WIDTH) float32; zeros where places and velocities decide.
     """
 
@@ -163,24 +168,28 @@ class Relating:
         self._speed = np.maximum(self._bodies.speed, np.float32(1e-6))
         own = (self._bodies.speed[0], self._bodies.lag[0], min(self._bodies.push[0], 3.0))
         self._body = [float(one) for one in own]
+        self._moves = Moves(self._bodies)
         self._demand = demand_of(contract)
         self._known = lru_cache(_KEPT_ROLES)(self._known_of)
         self._asked = lru_cache(_KEPT_ROLES)(self._asked_of)
         self._abilities = len(contract.abilities)
 
-    def pairs(self, table: Table, mate: Vector) -> tuple[Pairs | None, float, int]:
-        """The pairs of a table.
+    def relate(self, table: Table) -> tuple[Pairs | None, Home]:
+        """The pairs of a table, None if the robot can help no victim; and the robot itself.
+
+        Raises:
+            ReadingError: a victim needs more than `MOST_NEEDS` abilities.
+        """
+        mate = nearest_teammate(table)
+        pairs, soonest, choices = self._pairs(table, mate)
+        return pairs, self._home(table, mate, soonest, choices)
+
+    def _pairs(self, table: Table, mate: Vector) -> tuple[Pairs | None, float, int]:
+        """The pairs, when it could be at one first [s], and how many it can help.
 
         Args:
             table: of the robot.
             mate: way to its nearest teammate, as of `nearest_teammate`.
-
-        Returns:
-            The pairs, None if the robot can help no victim; when it could be at one first [s], and
-            how many it can help.
-
-        Raises:
-            ReadingError: a victim needs more than `MOST_NEEDS` abilities.
         """
         if not table.needs.size:
             return None, NEVER_S, 0
@@ -230,8 +239,8 @@ class Relating:
         pairs = Pairs(columns, there, at, frames, turning, masks, times)
         return pairs, float(soonest[0]), known.choices
 
-    def home(self, table: Table, mate: Vector, soonest: float, choices: int) -> Home:
-        """The robot itself, after what `pairs` says of it."""
+    def _home(self, table: Table, mate: Vector, soonest: float, choices: int) -> Home:
+        """The robot itself, after what `_pairs` says of it."""
         x, y = table.places[:, 0].tolist()
         way, velocity = (-x, -y), tuple(table.velocities[:, 0].tolist())
         frame = frame_of(way)
@@ -244,9 +253,7 @@ class Relating:
             min(soonest, 4.0),
             self._half,
             *asked,
-            *turned(way, frame),
-            *turned(velocity, frame),
-            *turned(mate, frame),
+            *self._turned((way, velocity, mate), frame),
         ]
         return Home(columns, frame)
 
@@ -280,8 +287,14 @@ class Relating:
             frame = frame_of(found[victim])
             frames.append(frame)
             vectors = (found[victim], velocity, mate, place, found[other] if helps else nothing)
-            rows.append([part for vector in vectors for part in turned(vector, frame)])
+            rows.append(self._turned(vectors, frame))
         return frames, np.array(rows, np.float32)
+
+    def _turned(self, vectors: Sequence[Vector], frame: int) -> list[float]:
+        """Vectors in a frame, the first a way and the second the velocity, and gains on the way."""
+        in_frame = [turned(vector, frame) for vector in vectors]
+        gains = self._moves.gains(in_frame[0], in_frame[1])
+        return [*[part for vector in in_frame for part in vector], *gains]
 
     def _known_of(self, needs: bytes, abilities: bytes) -> _Known:
         """The bytes are those of (M, K) and (R, K) float32."""
@@ -314,7 +327,7 @@ class Relating:
             there=roles.useful[..., None].astype(np.float32),
             starts=np.arange(0, count * size, size)[:, None],
             places=np.arange(1 + size),
-            masks=np.stack([roles.rivals[:, 0], roles.partners[:, 0]], axis=1),
+            masks=np.stack([roles.rivals, roles.partners], axis=1),
             columns=columns,
         )
 

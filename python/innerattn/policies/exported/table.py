@@ -41,11 +41,17 @@ class Bodies(NamedTuple):
         speed: final speed at full drive [m/s].
         lag: time that a start from rest costs against it [s].
         push: what one control period of full drive adds to the speed [m/s].
+        kept: share of the speed that is kept from one period to the next.
+        limit: of the speed [m/s].
+        reach: how long a robot moves on at a speed, if it coasts after one period [s].
     """
 
     speed: Array
     lag: Array
     push: Array
+    kept: Array
+    limit: Array
+    reach: Array
 
 
 class TableReader:
@@ -103,7 +109,8 @@ def bodies_of(contract: Contract, order: list[int]) -> Bodies:
     limit = np.array([robot.max_speed_mps for robot in robots])
     kept = np.full(len(robots), 1.0 - contract.damping)
     speed, lag = final_speed_and_lag(kept, push, limit, dt)
-    return Bodies(*(one.astype(np.float32) for one in (speed, lag, push)))
+    known = (speed, lag, push, kept, limit, dt * (1.0 + kept))
+    return Bodies(*(one.astype(np.float32) for one in known))
 
 
 def demand_of(contract: Contract) -> Array:

@@ -56,6 +56,18 @@ class Steering:
         """Final speeds [m/s] and lags [s] of robots that gain ``push`` a period up to ``limit``."""
         return final_speed_and_lag(self._keep, push, limit, self._dt)
 
+    def bodies(self) -> Array:
+        """What is known of robots without wheels beforehand, as policies for any team take it.
+
+        Returns:
+            (R, 6) float64: `speed`, `lag`, what one period of full drive adds to the speed [m/s],
+            the share of it that is kept to the next, its limit [m/s], and how long a robot moves on
+            at a speed, if it coasts after one period [s].
+        """
+        reach = self._reach[:, 0]
+        parts = [self.speed, self.lag, self._push, self._keep, self._limit, reach]
+        return np.stack(parts, -1)
+
     def _of_cases(self, cases: Array) -> tuple[Array, Array]:
         """Final speeds and lags (C, R) of drives that are left so much, (C, R * 2).
 

@@ -86,12 +86,10 @@ def _known(scenario: Scenario, columns: Sequence[str]) -> dict[str, Any]:
         way = ["relative_position.x", "relative_position.y"]
         return [place[f"{who}.{quantity}"] for quantity in ("present", *needs, *way)]
 
-    steering, robots = Steering(scenario), scenario.robots
-    push = [robot.drive_force_n / robot.mass_kg * scenario.dt_s for robot in robots]
-    bodies = np.stack([steering.speed, steering.lag, push], -1).astype(np.float32)
+    bodies = Steering(scenario).bodies().astype(np.float32)
     asked = [sum(task.amount(one) for task in scenario.tasks) for one in abilities]
     demand = np.array([total / len(scenario.tasks) for total in asked], np.float32)
-    mates = range(len(robots) - 1)
+    mates = range(len(scenario.robots) - 1)
     return {
         "team": [of_robot("own", ""), *(of_robot(f"teammate_{k}", "relative_") for k in mates)],
         "victims": [of_victim(f"victim_{slot}") for slot in range(scenario.num_victims)],

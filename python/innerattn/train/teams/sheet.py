@@ -55,10 +55,7 @@ class TeamSheet:
         self.num_robots = len(scenario.robots)
         self.each_sees = each_sees or any(fault.kind in SENSES for fault in scenario.faults)
         self._leave = scenario.robots_leave
-        steering = Steering(scenario)
-        push = [robot.drive_force_n / robot.mass_kg * scenario.dt_s for robot in scenario.robots]
-        bodies = np.stack([steering.speed, steering.lag, push], -1)
-        self._bodies = torch.from_numpy(bodies.astype(np.float32))
+        self._bodies = torch.from_numpy(Steering(scenario).bodies().astype(np.float32))
         self._worlds = torch.tensor(
             [scenario.arena_half_width_m, scenario.rescue_radius_m, float(scenario.num_victims)]
         )

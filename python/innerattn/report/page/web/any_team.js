@@ -51,29 +51,44 @@ class AnyTeam extends Team {
 
   /** Weight and actions of each own pair, and what the robot makes of all. */
   proposed({ cells, at, masks, times, turning }) {
-    const size = this.rows.length, [, width] = this.tensors.shape("first.weight"), nothing = Array(width).fill(0);
+    const [, width] = this.tensors.shape("first.weight"), nothing = Array(width).fill(0);
     if (!at.length) return { proposed: [], own: nothing };
     const hidden = (name, values) => rectified(this.layer(name, values));
-    const rows = cells.map((robots) => robots.map((columns) => columns && hidden("first", columns)));
-    const most = Array.from({ length: size }, (_, robot) => (
+    const mostOf = (rows) => this.rows.map((_, robot) => (
       rows.map((robots) => robots[robot]).filter(Boolean).reduce(largest, nothing)
     ));
-    const there = at.map((victim) => rows[victim].map((row, robot) => (
-      row ? hidden("second", [...row, ...most[robot]]) : nothing
-    )));
-    const own = there.map(([mine]) => mine).reduce(largest, nothing);
+    const first = cells.map((robots) => robots.map((columns) => columns && hidden("first", columns)));
+    const most = mostOf(first);
+    const second = first.map((robots) => robots.map((row, robot) => row && hidden("second", [...row, ...most[robot]])));
+    const further = mostOf(second);
+    // From here on the robot's own victims count, first for all robots there.
+    const third = at.map((victim, pair) => {
+      const there = second[victim].map((row) => row || nothing);
+      return second[victim].map((row, robot) => {
+        if (!row) return nothing;
+        const others = this.others("", robot, there, masks[pair], times[victim]);
+        return hidden("third", [...row, ...others, ...further[robot]]);
+      });
+    });
+    const own = third.map(([mine]) => mine).reduce(largest, nothing);
     const proposed = at.map((victim, pair) => {
-      const pooled = ["rivals", "partners"].flatMap((who, part) => (
-        this.pooled(who, there[pair], masks[pair][part], times[victim])
-      ));
-      const parts = [...cells[victim][0], ...turning[pair], ...there[pair][0], ...pooled, ...own];
-      return this.layer("out", hidden("fourth", hidden("third", parts)));
+      const others = this.others("_again", 0, third[pair], masks[pair], times[victim]);
+      const parts = [...cells[victim][0], ...turning[pair], ...third[pair][0], ...others, ...own];
+      return this.layer("out", hidden("fifth", hidden("fourth", parts)));
     });
     return { proposed, own };
   }
 
-  /** What the robot's pair at a victim makes of those of the robots there that a mask shows. */
-  pooled(who, there, mask, times) {
+  /** What a robot's pair at a victim makes of those of its rivals and of its partners there. */
+  others(time, robot, there, [rivals, partners], times) {
+    return [
+      ...this.pooled(`rivals${time}`, there[robot], there, rivals[robot], times),
+      ...this.pooled(`partners${time}`, there[robot], there, partners[robot], times),
+    ];
+  }
+
+  /** What a pair at a victim makes of those of the robots there that a mask shows. */
+  pooled(name, asking, there, mask, times) {
     const robots = mask.flatMap((shown, robot) => (shown ? [robot] : [])), nothing = there[0].map(() => 0);
     const sum = (weights) => nothing.map((_, at) => (
       robots.reduce((all, robot, index) => all + weights[index] * there[robot][at], 0)
@@ -84,9 +99,9 @@ class AnyTeam extends Team {
     if (this.pooling === "nearest") {
       return there[robots.reduce((best, robot) => (times[robot] < times[best] ? robot : best))];
     }
-    const query = this.layer(`${who}.query`, there[0]), scale = 1 / Math.sqrt(query.length);
+    const query = this.layer(`${name}.query`, asking), scale = 1 / Math.sqrt(query.length);
     const powers = robots.map((robot) => {
-      const logit = scale * dot(query, this.tensors.times(`${who}.key.weight`, there[robot]));
+      const logit = scale * dot(query, this.tensors.times(`${name}.key.weight`, there[robot]));
       return Math.exp(Math.min(logit, LARGEST_LOGIT));
     });
     const total = powers.reduce((all, power) => all + power, 0) + ALMOST_NOTHING;

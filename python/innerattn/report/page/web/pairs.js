@@ -6,6 +6,8 @@ const NOBODY_S = 1000; // arrival time of nobody
 const LONGEST_S = 8; // beyond this, arrival times tell no more
 const FARTHEST_M = 2;
 const LEAST = single(1e-6);
+const DIRECTIONS = [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]];
+const MOVE_SHARPNESS = 20;
 
 // The columns of a pair in their order: between which values they lie, and what they are divided by.
 const COLUMNS = Object.entries({
@@ -13,7 +15,8 @@ const COLUMNS = Object.entries({
   fills: { unit: 2 }, spare: { least: -1, most: 4, unit: 3 }, spareMine: { least: -1, most: 4, unit: 3 },
   speed: {}, push: { most: 3 }, arena: {}, waiting: { unit: 4 }, mostWaiting: { unit: 4 }, rank: { unit: 2 },
   later: { least: 0, most: 4 }, choices: { unit: 3 }, without: { least: -3, most: 3 }, others: { most: 4 },
-  last: { least: -3, most: 3 }, nearer: { unit: 3 }, rivals: { unit: 3 }, partners: { unit: 3 },
+  last: { least: -3, most: 3 }, nearer: { most: 4, unit: 3 },
+  rivals: { most: 6, unit: 3 }, partners: { most: 6, unit: 3 },
 });
 
 const cut = (value, least = -Infinity, most = Infinity) => Math.min(Math.max(value, least), most);
@@ -38,7 +41,9 @@ class Relating {
   /** `known` is of innerattn.report.page.any_team; `robot` is its number in the team. */
   constructor(known, robot) {
     const first = ([...all]) => [all[robot], ...all.filter((_, index) => index !== robot)];
-    const bodies = first(known.bodies).map(([speed, lag, push]) => ({ speed, lag, push }));
+    const bodies = first(known.bodies).map(([speed, lag, push, kept, limit, reach]) => (
+      { speed, lag, push, kept, limit, reach }
+    ));
     Object.assign(this, { known, bodies, radius: single(known.radius) });
   }
 
@@ -84,7 +89,7 @@ class Relating {
       }));
     });
     const at = needs.flatMap((_, victim) => (isThere(victim, 0) ? [victim] : []));
-    const masks = at.map((victim) => [roles[victim].rivals[0], roles[victim].partners[0]]);
+    const masks = at.map((victim) => [roles[victim].rivals, roles[victim].partners]);
     return {
       cells, at, masks, times, ...this.turning(table, ways, own[0], at, mate),
       ...this.home(table, mate, soonest[0], choices[0]),
@@ -129,7 +134,8 @@ class Relating {
     const turning = at.map((victim, pair) => {
       const other = victim === first ? second : first, helps = other >= 0 && own[other] < NOBODY_S;
       const next = helps ? ways[other][0].way : [0, 0];
-      return [ways[victim][0].way, velocities[0], mate, places[0], next].flatMap((one) => turnedInto(frames[pair], one));
+      const vectors = [ways[victim][0].way, velocities[0], mate, places[0], next];
+      return this.withGains(vectors.map((one) => turnedInto(frames[pair], one)));
     });
     return { frames, turning };
   }
@@ -144,9 +150,23 @@ class Relating {
     const home = [
       speed, lag, Math.min(push, 3), Number(choices > 0), choices / 3, Math.max(...abilities[0]),
       Math.min(soonest, 4), this.known.half, Math.max(...asked), sumOf(asked),
-      ...[way, velocity, mate].flatMap((one) => turnedInto(homeFrame, one)),
+      ...this.withGains([way, velocity, mate].map((one) => turnedInto(homeFrame, one))),
     ];
     return { home, homeFrame };
+  }
+
+  /** Vectors, the first a way and the second the velocity, and what each action gains on the way. */
+  withGains(vectors) {
+    const [[x, y], [vx, vy]] = vectors, { push, kept, limit, reach } = this.bodies[0];
+    const unit = Math.max(Math.min(push, limit) * reach, LEAST), most = Math.max(limit, LEAST);
+    const left = DIRECTIONS.map(([across, along]) => {
+      const ux = kept * vx + push * across, uy = kept * vy + push * along;
+      const far = reach * most / Math.max(Math.hypot(ux, uy), most);
+      return Math.hypot(x - far * ux, y - far * uy);
+    });
+    const gains = left.map((one) => (left[0] - one) / unit);
+    const powers = gains.map((gain) => Math.exp(gain * MOVE_SHARPNESS));
+    return [...vectors.flat(), ...gains.slice(1), ...powers.map((power) => power / sumOf(powers))];
   }
 }
 
