@@ -29,6 +29,6 @@ def gains(ways: Tensor, velocities: Tensor, bodies: Tensor) -> Tensor:
     limit = limit.clamp(min=1e-6)
     factor = reach * limit / torch.maximum(moving.norm(dim=-1), limit)
     left = (ways[:, None] - factor[..., None] * moving).norm(dim=-1)
-    # Of two points, no speed limit makes them lie further apart: gains lie in -2..=2.
+    # A limit of speeds brings no two moves further apart, so that gains lie in -2..=2.
     found = (left[:, :1] - left) / (torch.minimum(push, limit) * reach).clamp(min=1e-6)
     return torch.cat([found[:, 1:], (_SHARPNESS * found).softmax(1)], 1)
