@@ -2,12 +2,13 @@
 
 `python benches/any_team.py RUN` fills a table in `docs/teams.md`: 24 teams, each with `greedy`,
 `planner`, the policy and `hungarian` in the same worlds. `--episodes` says how many of each.
+`--seed 20262` draws 24 other teams of the same groups, and fills the second table.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from statistics import mean
 
@@ -15,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from page import machine, publish, table
 
+from innerattn.config import Scenario
 from innerattn.evaluate import load_trained
-from innerattn.evaluate.unseen_teams import EPISODE_STEPS, scores_in_unseen_teams
-from innerattn.policies import scripted_policy
+from innerattn.evaluate.unseen_teams import EPISODE_STEPS, SEED, TeamScore, scores_in_unseen_teams
+from innerattn.policies import Policy, scripted_policy
 from innerattn.stats.comparison import holm
 from innerattn.stats.student import difference_p
 
@@ -31,10 +33,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("run")
     parser.add_argument("--episodes", type=int, default=500)
+    parser.add_argument("--seed", type=int, default=SEED)
     given = parser.parse_args()
+
+    def scores_of(policy_for: Callable[[Scenario], Policy]) -> Iterator[TeamScore]:
+        return scores_in_unseen_teams(policy_for, given.episodes, seed=given.seed)
+
     played = zip(
-        scores_in_unseen_teams(lambda one: scripted_policy("planner", one), given.episodes),
-        scores_in_unseen_teams(lambda one: load_trained(given.run, one)[1], given.episodes),
+        scores_of(lambda one: scripted_policy("planner", one)),
+        scores_of(lambda one: load_trained(given.run, one)[1]),
         strict=True,
     )
     found = []
@@ -52,7 +59,8 @@ def main() -> None:
         cells = [f"{of(each):.2f}" for each in zip(*(scores for _, scores in found), strict=True)]
         rows.append([f"**{name}**", "", *cells, "", ""])
     told = f"{machine()}. {given.episodes} episodes of {EPISODE_STEPS} steps for each policy."
-    publish("any_team", f"{table(HEAD, rows)}\n\n{told}", PAGE)
+    part = "any_team" if given.seed == SEED else "other_teams"
+    publish(part, f"{table(HEAD, rows)}\n\n{told}", PAGE)
 
 
 def besides(differences: Sequence[NDArray[np.int64]]) -> list[str]:

@@ -35,6 +35,17 @@ def test_groups_are_what_they_say() -> None:
     assert {one.scenario.episode_steps for one in teams} == {EPISODE_STEPS}
 
 
+def test_another_seed_draws_other_teams_of_the_same_groups() -> None:
+    usual, others = unseen_teams(), unseen_teams(1)
+    assert [one[:2] for one in others] == [one[:2] for one in usual]
+    assert all(one.scenario != other.scenario for one, other in zip(usual, others, strict=True))
+    greedy = [
+        next(scores_in_unseen_teams(lambda one: scripted_policy("greedy", one), 4, seed=seed)).most
+        for seed in (1, 20_261)
+    ]
+    assert greedy[0] != greedy[1]
+
+
 def scores(name: str, teams: int = 4, episodes: int = 4) -> list[TeamScore]:
     """Of a script in the first teams."""
     found = scores_in_unseen_teams(

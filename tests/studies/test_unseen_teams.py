@@ -75,7 +75,7 @@ def done(finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Stu
 
     all_teams = unseen_teams.unseen_teams()
     few = tuple(all_teams[number] for number in (0, 8, 16, 20))
-    monkeypatch.setattr(unseen_teams, "unseen_teams", lambda: few)
+    monkeypatch.setattr(unseen_teams, "unseen_teams", lambda *_: few)
     monkeypatch.setattr(unseen_teams, "_scripted", unseen_teams._scripted.__wrapped__)
     monkeypatch.setattr(trained, "load_trained", scripted)
     shutil.copytree(finished, tmp_path, dirs_exist_ok=True)

@@ -22,8 +22,8 @@ GROUPS: tuple[Group, ...] = get_args(Group)
 """Draws of the family; sizes from 2 to 24; bodies outside its ranges; robots that are there for
 half of the time, or become slow."""
 EPISODE_STEPS = 50
-_SEED = 20_261
-"""Of teams and worlds; a training draws its teams from other streams."""
+SEED = 20_261
+"""Of the 24 teams and their worlds; a training draws its teams from other streams."""
 _SIZES = (2, 3, 5, 7, 10, 14, 18, 24)
 _BODIES = (
     ("max_speed_mps", (2.0, 2.6)),
@@ -74,24 +74,24 @@ class TeamScore(NamedTuple):
     more: NDArray[np.int64]
 
 
-@lru_cache(maxsize=1)
-def unseen_teams() -> tuple[UnseenTeam, ...]:
-    """The 24 teams."""
-    return tuple(_drawn())
+@lru_cache(maxsize=2)
+def unseen_teams(seed: int = SEED) -> tuple[UnseenTeam, ...]:
+    """The 24 teams; another seed draws others of the same groups."""
+    return tuple(_drawn(seed))
 
 
-def _drawn() -> Iterator[UnseenTeam]:
+def _drawn(seed: int) -> Iterator[UnseenTeam]:
     usual, base = Family(unavailable=0.0), Scenario(episode_steps=EPISODE_STEPS)
     for number in range(8):
-        yield UnseenTeam("mixtures", "unseen mixture", usual.draw(_SEED, number, base))
+        yield UnseenTeam("mixtures", "unseen mixture", usual.draw(seed, number, base))
     for number, size in enumerate(_SIZES, start=100):
         family = usual.replace(robots=(size, size), kinds=(min(2, size), min(5, size)))
-        yield UnseenTeam("sizes", "unseen size", family.draw(_SEED, number, base))
+        yield UnseenTeam("sizes", "unseen size", family.draw(seed, number, base))
     for number, (key, limits) in enumerate(_BODIES, start=200):
-        scenario = usual.replace(**{key: limits}).draw(_SEED, number, base)
+        scenario = usual.replace(**{key: limits}).draw(seed, number, base)
         yield UnseenTeam("bodies", "unseen bodies", scenario)
     for number, (told, fault) in enumerate(_CHANGES, start=300):
-        scenario = usual.replace(robots=(5, 8)).draw(_SEED, number, base)
+        scenario = usual.replace(robots=(5, 8)).draw(seed, number, base)
         changed = {"robot": scenario.robots[0].name, "value": 1.0, **fault}
         yield UnseenTeam("changes", told, scenario.replace(faults=[changed]))
 
@@ -100,6 +100,7 @@ def scores_in_unseen_teams(
     policy_for: Callable[[Scenario], Policy],
     episodes: int,
     *,
+    seed: int = SEED,
     num_threads: int | None = None,
     progress: Callable[[int], None] = lambda _: None,
 ) -> Iterator[TeamScore]:
@@ -108,15 +109,16 @@ def scores_in_unseen_teams(
     Args:
         policy_for: the policy for the worlds of a team.
         episodes: of each policy in each team.
+        seed: of the teams and their worlds.
         num_threads: threads that step the worlds; none: all cores.
         progress: called with the number of teams that are done.
 
     Returns:
         One by one, in the order of `unseen_teams`.
     """
-    for number, team in enumerate(unseen_teams()):
-        scripted = [_scripted(name, number, episodes, num_threads) for name in _REFERENCES]
-        own = _rescues(policy_for(team.scenario), team.scenario, episodes, num_threads)
+    for number, team in enumerate(unseen_teams(seed)):
+        scripted = [_scripted(name, seed, number, episodes, num_threads) for name in _REFERENCES]
+        own = _rescues(policy_for(team.scenario), team.scenario, seed, episodes, num_threads)
         least, greedy, most = (float(one.mean()) for one in scripted)
         score, other = ((one - least) / (most - least) for one in (float(own.mean()), greedy))
         progress(number + 1)
@@ -124,15 +126,18 @@ def scores_in_unseen_teams(
 
 
 @lru_cache(maxsize=4 * 24)
-def _scripted(name: str, number: int, episodes: int, num_threads: int | None) -> NDArray[np.int64]:
+def _scripted(
+    name: str, seed: int, number: int, episodes: int, num_threads: int | None
+) -> NDArray[np.int64]:
     """Of a script; all policies are measured beside the same."""
-    scenario = unseen_teams()[number].scenario
-    return _rescues(scripted_policy(name, scenario, _SEED), scenario, episodes, num_threads)
+    scenario = unseen_teams(seed)[number].scenario
+    policy = scripted_policy(name, scenario, seed)
+    return _rescues(policy, scenario, seed, episodes, num_threads)
 
 
 def _rescues(
-    policy: Policy, scenario: Scenario, episodes: int, num_threads: int | None
+    policy: Policy, scenario: Scenario, seed: int, episodes: int, num_threads: int | None
 ) -> NDArray[np.int64]:
     """Rescues of each episode."""
-    record = run_episodes(policy, scenario, episodes, _SEED, num_threads=num_threads)
+    record = run_episodes(policy, scenario, episodes, seed, num_threads=num_threads)
     return record.rescue_counts()

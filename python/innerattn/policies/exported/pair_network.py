@@ -32,7 +32,7 @@ _ZERO, _SHARPNESS, _LARGEST_LOGIT, _ALMOST_NOTHING = (
 )
 _NO_BIAS = np.zeros(1, np.float32)
 _ROUNDS = ("", "_again")
-"""How the names of poolings end, which come twice."""
+"""Suffixes of the poolings' names in the first and the second round."""
 _MOST_NUMBER = 1e9
 """Largest number of a row that a robot acts on; beyond it, float32 does not suffice."""
 
@@ -71,15 +71,15 @@ class PairLayers:
         """Ask rivals and partners at once: put queries and keys of both side by side."""
         assert network.pairs is not None  # as the shapes need it
         scale = np.float32(network.pairs.key_width**-0.5)
-        for time in _ROUNDS:
+        for suffix in _ROUNDS:
             asked, known = (
-                [self._layers.pop(f"{who}{time}.{part}") for who in ("rivals", "partners")]
+                [self._layers.pop(f"{who}{suffix}.{part}") for who in ("rivals", "partners")]
                 for part in ("query", "key")
             )
             weights, biases = (np.concatenate(parts, axis=-1) * scale for parts in zip(*asked))
-            self._layers[f"query{time}"] = (weights, biases)
+            self._layers[f"query{suffix}"] = (weights, biases)
             keys = np.concatenate([one for one, _ in known], axis=1)
-            self._layers[f"key{time}"] = (keys, _NO_BIAS)
+            self._layers[f"key{suffix}"] = (keys, _NO_BIAS)
 
     def linear(self, layer: str, rows: Array) -> Array:
         """A layer of rows (P, in): (P, out)."""
@@ -166,11 +166,11 @@ class PairActor:
         rows = layers.relu("fourth", parts)
         return layers.linear("out", layers.relu("fifth", rows)) * _SHARPNESS, own
 
-    def _pooled(self, time: str, asking: Array, at: Array, masks: Mask, times: Array) -> Array:
+    def _pooled(self, suffix: str, asking: Array, at: Array, masks: Mask, times: Array) -> Array:
         """What pairs make of rivals and of partners at their victims: (m, Q, 2, H).
 
         Args:
-            time: which of `_ROUNDS`.
+            suffix: of the round, one of `_ROUNDS`.
             asking: (m, Q, H) the pairs.
             at: (m, R, H) all pairs at these victims; zeros where there is none.
             masks: (m, 2, Q, R) whom they look at.
@@ -180,8 +180,8 @@ class PairActor:
         count, robots, width = at.shape
         found: Array
         if pooling == "attention":
-            query = self._layers.linear(f"query{time}", asking.reshape(-1, width))
-            keys = self._layers.linear(f"key{time}", at.reshape(-1, width))
+            query = self._layers.linear(f"query{suffix}", asking.reshape(-1, width))
+            keys = self._layers.linear(f"key{suffix}", at.reshape(-1, width))
             query = query.reshape(count, -1, 2, query.shape[1] // 2).transpose(0, 2, 1, 3)
             keys = keys.reshape(count, robots, 2, -1).transpose(0, 2, 3, 1)
             weights = np.exp(np.minimum(query @ keys, _LARGEST_LOGIT)) * masks
@@ -263,7 +263,7 @@ def pair_shapes(network: Network) -> dict[str, tuple[int, ...]]:
     }
     shapes: dict[str, tuple[int, ...]] = {}
     if network.pooling == "attention":
-        pools = [f"{who}{time}" for who in ("rivals", "partners") for time in _ROUNDS]
+        pools = [f"{who}{suffix}" for who in ("rivals", "partners") for suffix in _ROUNDS]
         layers |= {f"{pool}.query": (keys, width) for pool in pools}
         shapes |= {f"{pool}.key.weight": (keys, width) for pool in pools}
     for layer, shape in layers.items():

@@ -80,10 +80,10 @@ class AnyTeam extends Team {
   }
 
   /** What a robot's pair at a victim makes of those of its rivals and of its partners there. */
-  others(time, robot, there, [rivals, partners], times) {
+  others(suffix, robot, there, [rivals, partners], times) {
     return [
-      ...this.pooled(`rivals${time}`, there[robot], there, rivals[robot], times),
-      ...this.pooled(`partners${time}`, there[robot], there, partners[robot], times),
+      ...this.pooled(`rivals${suffix}`, there[robot], there, rivals[robot], times),
+      ...this.pooled(`partners${suffix}`, there[robot], there, partners[robot], times),
     ];
   }
 
