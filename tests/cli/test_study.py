@@ -101,6 +101,20 @@ def test_ctrl_c_saves_and_frees_every_run(file: Path) -> None:
         assert any(run.glob("checkpoints/*/checkpoint.json"))
 
 
+@pytest.mark.long
+def test_a_study_that_has_no_more_time_frees_its_runs_and_reports(file: Path) -> None:
+    file.write_text(TINY.replace("train.env_steps = 192", "train.env_steps = 1_000_000"))
+    words = [sys.executable, "-m", "innerattn", "study", "run", str(file), "--workers", "1"]
+    words += ["--until", "8s", "-q"]
+    said = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    assert said == "studies/tiny: 0 of 6 runs done\n"
+    folder = Path("studies/tiny")
+    (run,) = (folder / "work").glob("*/*")
+    assert json.loads((run / "run.json").read_text())["state"] == "interrupted"
+    assert (folder / "claims" / f"{run.parent.name}.free").exists()
+    assert len(json.loads((folder / "report.json").read_text())["left_out"]) == 6
+
+
 def test_status_and_report_begin_no_study(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for action in ("status", "report"):
         assert main(["study", action, str(file)]) == 1
@@ -138,6 +152,7 @@ def test_slurm_runs_workers(file: Path, tmp_path: Path, capsys: pytest.CaptureFi
         (["run", "tiny.toml", "--workers", "0"], 2, "--workers = 0: must be 1 to 256"),
         (["work", "."], 1, "holds no study"),
         (["work", "tiny.toml", "--until", "soon"], 2, "--until = 'soon': must be a time such as"),
+        (["run", "tiny.toml", "--until", "1d"], 2, "--until = '1d': must be a time such as"),
         (["slurm", "tiny.toml", "--minutes", "3"], 2, "--minutes = 3: must be above 5"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from innerattn.config import RunConfig, Scenario
 from innerattn.errors import ConfigError, RunError
 from innerattn.evaluate import trained
 from innerattn.evaluate.faults.grid import Grid, play_all
+from innerattn.experiments.archive import FILE, write_archive
 from innerattn.policies import Policy, scripted_policy
 from innerattn.report.study.write import write_study
 from innerattn.studies.afterwards import measured, to_measure
@@ -114,6 +116,47 @@ def test_the_command_measures_what_is_missing(
     assert "retained, unavailable" in capsys.readouterr().out
     assert to_measure(begun) == []
     assert measured(begun, missing.run).keys() == {"retained", "retained_unavailable"}
+
+
+@pytest.mark.long
+def test_a_study_goes_on_from_its_archive(
+    done: StudyFolder, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Elsewhere, without the runs and files that were measured."""
+    measure(done)
+    whole = read_results(done)
+    first = [one for one in whole.finished if one.run.seed < 2]
+    pool = tmp_path / "elsewhere"
+    write_archive((one.finished for one in first if one.finished is not None), pool / FILE)
+    file = done.path.parent / "faults.toml"
+    on = begin_study(file, pool)
+    assert [run.seed for run in on.to_do] == [2, 2]
+    assert to_measure(on) == []
+    found = read_results(on)
+    assert [one.measured for one in found.finished] == [one.measured for one in first]
+    assert all(one.measured for one in first)
+
+    two = [one.run.key for one in whole.finished if one.run.seed == 2]
+    shutil.copytree(done.runs / two[0], on.runs / two[0])
+    assert main(["study", "run", str(file), "--out", str(pool), "--until", "0s"]) == 0
+    assert "6 runs, 5 done, 0 failed, 1 to do" in capsys.readouterr().out
+    assert measured(on, next(run for run in on.planned if run.key == two[0]))
+    assert (pool / "claims" / f"{two[1]}.1").exists() is False
+
+    file.write_text(FAULTS.replace("episodes = 4", "episodes = 5"))
+    assert read_results(begin_study(file, pool)).finished[0].measured == {}  # of other faults
+
+
+def test_archived_measurements_of_another_run_are_refused(
+    done: StudyFolder, tmp_path: Path
+) -> None:
+    (job,) = measure(done, 1)
+    run = next(one.finished for one in read_results(done).finished if one.run == job.run)
+    assert run is not None
+    altered = {name: {**document, "run": "other"} for name, document in run.beside.items()}
+    write_archive([replace(run, beside=altered)], tmp_path / "elsewhere" / FILE)
+    on = begin_study(done.path.parent / "faults.toml", tmp_path / "elsewhere")
+    assert "not a measurement under faults" in read_results(on).left_out[0][1]
 
 
 @pytest.mark.long

@@ -61,7 +61,7 @@ class Study(LongCommand):
     gpus: float = 0.0
     """What each worker on Ray has of a GPU (run)."""
     until: str | None = None
-    """Time after which a worker saves its run and ends: 90s, 55m, 2h."""
+    """Time after which workers save their runs and end (run, work): 90s, 55m, 2h."""
     minutes: int = 60
     """Time limit of a job (slurm) [min]."""
     publish: Path | None = None
@@ -86,6 +86,7 @@ class Study(LongCommand):
             raise UsageError(f"--gpus = {self.gpus:g}: must be 0 to 64")
         if self.workers is not None and not 1 <= self.workers <= 256:
             raise UsageError(f"--workers = {self.workers}: must be 1 to 256")
+        most_s = None if self.until is None else _seconds(self.until)
         from innerattn.studies.afterwards import to_measure
 
         study = self._begun()
@@ -93,7 +94,7 @@ class Study(LongCommand):
             from innerattn.report.study.publish import asked_pages
 
             asked_pages(study, self.publish)  # before hours of training, not after
-        do_runs(self, study, workers=self.workers, ray=self.ray, gpus=self.gpus)
+        do_runs(self, study, workers=self.workers, ray=self.ray, gpus=self.gpus, most_s=most_s)
         failed = do_jobs(self, to_measure(study), self.workers)
         return max(self._report(study), int(bool(failed)))
 
@@ -230,6 +231,7 @@ def do_runs(
     workers: int | None = None,
     ray: str | None = None,
     gpus: float = 0.0,
+    most_s: float | None = None,
 ) -> None:
     """Do what is left of a study, and show how far it is; see `innerattn study run`.
 
@@ -267,9 +269,9 @@ def do_runs(
             return progress(watched.now())
 
         if ray is None:
-            run_workers(study.path, count, left=now_left)
+            run_workers(study.path, count, left=now_left, most_s=most_s)
         else:
-            run_workers_on_ray(study.path, workers, ray, gpus=gpus, left=now_left)
+            run_workers_on_ray(*(study.path, workers, ray), gpus=gpus, left=now_left, most_s=most_s)
 
 
 def do_jobs(command: LongCommand, jobs: Sequence[Job], workers: int | None = None) -> list[Job]:

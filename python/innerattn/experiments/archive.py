@@ -2,7 +2,8 @@
 
 A row is a run: its case, configuration, ``run.json`` and summary as JSON, and of its own episodes
 of the standard length the lengths, rescues and reward sums. Weights, metrics, what was recorded
-step by step and the episodes of other policies are left out. The file holds a digest of its
+step by step and the episodes of other policies are left out. What a study measured a run in beside
+its own evaluation, such as faults, stands there as JSON, too. The file holds a digest of its
 contents. A study takes an archived run for the run itself; what needs the rest, such as Fig. 4 and
 Fig. 5, refuses it.
 """
@@ -39,6 +40,8 @@ FILE = "archive.parquet"
 
 _SHA256 = "sha256"
 _TEXTS = ("situation", "method", "variant", "name", "config", "info", "summary")
+_BESIDE = "beside"
+"""A column of archives whose runs were measured in more than their own evaluation."""
 _COMPRESSION_LEVEL = 19
 _MOST_RUNS = 10_000
 
@@ -57,7 +60,10 @@ def write_archive(runs: Iterable[FinishedRun], path: Path) -> None:
     if len(names) > 1:
         raise RunError(f"{path}: runs have the reward components {sorted(names)}: must be the same")
     # Victims of some worlds have more helpers than those of others.
-    columns = {key: pa.array([row.get(key, ()) for row in rows], _type(key)) for key in _keys(rows)}
+    columns = {
+        key: pa.array([row.get(key, _nothing(key)) for row in rows], _type(key))
+        for key in _keys(rows)
+    }
     head = {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
@@ -157,7 +163,8 @@ def read_archive(path: Path) -> list[FinishedRun]:
         raise RunError(f"{path}: has {len(table):,} runs: must be at most {_MOST_RUNS:,}")
     try:
         reward_names = tuple(head["reward_names"])
-        texts = table.select([*_TEXTS, "seed"]).to_pylist()
+        there = [_BESIDE] if _BESIDE in table.column_names else []
+        texts = table.select([*_TEXTS, "seed", *there]).to_pylist()
         configs: dict[str, RunConfig] = {}
         return [_run(path, table, i, row, reward_names, configs) for i, row in enumerate(texts)]
     except (LookupError, ValueError, TypeError, AttributeError, pa.ArrowException) as error:
@@ -169,8 +176,13 @@ def _keys(rows: Sequence[dict[str, Any]]) -> list[str]:
     return list(dict.fromkeys(key for row in rows for key in row))
 
 
+def _nothing(key: str) -> str | tuple[()]:
+    """What a run that lacks a column has in it."""
+    return "{}" if key == _BESIDE else ()
+
+
 def _type(key: str) -> pa.DataType:
-    if key in _TEXTS:
+    if key in (*_TEXTS, _BESIDE):
         return pa.string()
     if key == "seed":
         return pa.int64()
@@ -198,6 +210,8 @@ def _row(run: FinishedRun) -> dict[str, Any]:
         row[f"reward_{name}"] = rewards[:, :, index].ravel()
     for name in rescues.dtype.names or ():
         row[f"rescue_{name}"] = np.ascontiguousarray(rescues[name])
+    if run.beside:
+        row[_BESIDE] = json.dumps(run.beside, sort_keys=True)
     return row
 
 
@@ -223,6 +237,7 @@ def _run(
         summary=check_summary(where, parse_json(row["summary"]), config),
         read=lambda: _records(path, case, config, table, index, reward_names),
         archived=True,
+        beside=dict(parse_json(row.get(_BESIDE, "{}"))),
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -55,6 +55,8 @@ class FinishedRun(Shown):
         summary: its ``evaluation/summary.json``.
         read: gives the records of its own episodes, each time anew.
         archived: whether it comes from an archive, which holds neither metrics nor steps.
+        beside: what a study measured it in beside its own evaluation: JSON documents by the name
+            of their file in the folder of the study.
     """
 
     case: Case
@@ -64,6 +66,7 @@ class FinishedRun(Shown):
     summary: dict[str, Any]
     read: Callable[[], Sequence[Record]]
     archived: bool = False
+    beside: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def situation(self) -> str:

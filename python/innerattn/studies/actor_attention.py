@@ -8,14 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.config.untrusted import MOST_JSON_BYTES, parse_json, read_plain
-from innerattn.errors import RunError
 from innerattn.measures.sharing.handoff import (
     REACH,
     all_handoffs,
@@ -96,6 +93,15 @@ class RunAttention(Measurement):
             },
         }
 
+    def checked(self, document: Any) -> dict[str, Any]:
+        """A document of this measurement, with leads of all offsets."""
+        float(document["values"][f"{ACTOR}_handoffs"])
+        for who in ("robot", "bystander"):
+            leads = _leads_in(document, who)
+            if len(leads) != len(OFFSETS):
+                raise ValueError(f"{len(leads)} offsets")
+        return super().checked(document)
+
     @classmethod
     def of(cls, study: StudyFolder, run: PlannedRun) -> Self | None:
         """That of a run; None where the study does not ask for it, or its actors do not attend."""
@@ -131,6 +137,11 @@ def _means(leads: NDArray[np.float64]) -> list[float | None]:
     return [float(x / n) if n else None for x, n in zip(sums, counts, strict=True)]
 
 
+def _leads_in(document: Mapping[str, Any], who: str) -> list[float]:
+    """The leads in a document by offset; NaN where there is no step."""
+    return [math.nan if one is None else float(one) for one in document["leads"][who]]
+
+
 @dataclass(frozen=True)
 class LeadCurves:
     """Leads of the next partner by offset, over the runs of one place in the grid.
@@ -161,33 +172,16 @@ def lead_curves(study: StudyFolder, runs: Iterable[PlannedRun]) -> LeadCurves | 
     """
     found = [(run, RunAttention.of(study, run)) for run in runs]
     documents = [
-        (run, _document(one.path)) for run, one in found if one is not None and one.path.exists()
+        (run, document)
+        for run, one in found
+        if one is not None and (document := one.document(study)) is not None
     ]
     if not documents:
         return None
     courses = {
-        who: seed_curve(np.array([one["leads"][who] for _, one in documents], np.float64))
+        who: seed_curve(np.array([_leads_in(one, who) for _, one in documents], np.float64))
         for who in ("robot", "bystander")
     }
     handoffs = sum(int(one["values"][f"{ACTOR}_handoffs"]) for _, one in documents)
     step_s = documents[0][0].config.scenario.dt_s
     return LeadCurves(OFFSETS, step_s, **courses, handoffs=handoffs, runs=len(documents))
-
-
-def _document(path: Path) -> Mapping[str, Any]:
-    """A file with leads of all offsets.
-
-    Raises:
-        RunError: it is damaged.
-    """
-    try:
-        document: dict[str, Any] = parse_json(read_plain(path, MOST_JSON_BYTES))
-        float(document["values"][f"{ACTOR}_handoffs"])
-        for who in ("robot", "bystander"):
-            leads = document["leads"][who]
-            if len(leads) != len(OFFSETS):
-                raise ValueError(f"{len(leads)} offsets")
-            document["leads"][who] = [math.nan if one is None else float(one) for one in leads]
-        return document
-    except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise RunError(f"{path}: not {RunAttention.damaged}; remove it") from error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from typing import Any
 
 from innerattn.studies.actor_attention import RunAttention
 from innerattn.studies.faults import RunUnderFaults
@@ -24,13 +24,29 @@ def to_measure(study: StudyFolder) -> list[Measurement]:
     return [one for one in found if one is not None and not one.path.exists()]
 
 
-def measured(study: StudyFolder, run: PlannedRun) -> Mapping[str, float | None]:
+def measured(study: StudyFolder, run: PlannedRun) -> dict[str, float | None]:
     """What was found of a run, by measure; empty where it has not been measured.
 
     Raises:
-        RunError: a file is damaged.
+        RunError: a document is damaged.
         OSError: a file cannot be read.
     """
-    found = [kind.of(study, run) for kind in _KINDS]
-    there = [one for one in found if one is not None and one.path.exists()]
-    return {name: value for one in there for name, value in one.read()}
+    there = _there(study, run)
+    return {
+        name: value for one, document in there for name, value in one.values_in(document).items()
+    }
+
+
+def documents(study: StudyFolder, run: PlannedRun) -> dict[str, Any]:
+    """All that was found of a run, by the name of its file in the study's folder.
+
+    Raises:
+        RunError: a document is damaged.
+        OSError: a file cannot be read.
+    """
+    return {one.name: document for one, document in _there(study, run)}
+
+
+def _there(study: StudyFolder, run: PlannedRun) -> list[tuple[Measurement, dict[str, Any]]]:
+    found = [one for kind in _KINDS if (one := kind.of(study, run)) is not None]
+    return [(one, document) for one in found if (document := one.document(study)) is not None]

@@ -1,13 +1,13 @@
 """What finished runs of a study are measured in beside their own evaluation.
 
-Each run is measured once, in a file beside the runs.
+Each run is measured once, in a file beside the runs, whose content the archive of a study keeps.
 """
 
 from __future__ import annotations
 
 import json
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -66,18 +66,42 @@ class Measurement(Job):
         """Where the result is that follows from some rules."""
         return study.path / cls.section / f"{run.key}-{digest_of(dict(rules))[:8]}.json"
 
-    def read(self) -> Iterator[tuple[str, float | None]]:
-        """The measures in the file.
+    @property
+    def name(self) -> str:
+        """Its file, in the folder of the study."""
+        return f"{self.section}/{self.path.name}"
+
+    def document(self, study: StudyFolder) -> dict[str, Any] | None:
+        """What was found, from its file or else from the study's archive; None: nothing yet.
 
         Raises:
             RunError: it is damaged.
-            OSError: it cannot be read.
+            OSError: the file cannot be read.
         """
+        archived = study.archived.get(self.run.key)
         try:
-            document = parse_json(read_plain(self.path, MOST_JSON_BYTES))
-            if document["run"] != self.run.key:
-                raise ValueError("of another run")
-            for name, value in document[self.values_key].items():
-                yield str(name), None if value is None else float(value)
+            if self.path.exists():
+                document = parse_json(read_plain(self.path, MOST_JSON_BYTES))
+            elif archived is not None and self.name in archived.beside:
+                document = archived.beside[self.name]
+            else:
+                return None
+            return self.checked(document)
         except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise RunError(f"{self.path}: not {self.damaged}; remove it") from error
+
+    def checked(self, document: Any) -> dict[str, Any]:
+        """A document of this measurement.
+
+        Raises:
+            ValueError: it is none; or any error of taking it for one.
+        """
+        if document["run"] != self.run.key:
+            raise ValueError("of another run")
+        self.values_in(document)
+        return dict(document)
+
+    def values_in(self, document: Mapping[str, Any]) -> dict[str, float | None]:
+        """The measures in a document."""
+        found = document[self.values_key].items()
+        return {str(name): None if value is None else float(value) for name, value in found}

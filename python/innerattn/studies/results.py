@@ -15,7 +15,7 @@ from innerattn.stats import Estimate
 from innerattn.stats.aggregate import improvement_interval
 from innerattn.stats.comparison import ALPHA, Contrast, contrast, holm
 from innerattn.stats.seeds import seed_estimate
-from innerattn.studies.afterwards import measured
+from innerattn.studies.afterwards import documents, measured
 from innerattn.studies.folder import StudyFolder
 from innerattn.studies.ledger import Ledger, State
 from innerattn.studies.plan import (
@@ -213,6 +213,7 @@ def read_results(study: StudyFolder, *, steps: bool = False, archived: bool = Tr
             else:
                 left_out.append((run, _why_left_out(run.key, states[run.key], ledger)))
                 continue
+            found = replace(found, beside=documents(study, run))
             finished.append(Result(run, found.summary, found, measured(study, run)))
         except (InnerattnError, OSError) as error:
             left_out.append((run, f"unreadable: {one_line(error)}"))

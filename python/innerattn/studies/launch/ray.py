@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import socket
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,13 @@ _CONNECT_S = 10.0
 
 
 def run_workers_on_ray(
-    folder: Path, count: int | None, address: str, *, gpus: float, left: Callable[[], int]
+    folder: Path,
+    count: int | None,
+    address: str,
+    *,
+    gpus: float,
+    left: Callable[[], int],
+    most_s: float | None = None,
 ) -> None:
     """Let workers of a Ray cluster do what is left of a study.
 
@@ -35,6 +42,7 @@ def run_workers_on_ray(
         address: of the cluster, ``HOST:PORT``; ``"local"``: one is started here, bound to loopback.
         gpus: what each worker has of a GPU.
         left: gives the number of runs that are neither done nor failed; called often.
+        most_s: time after which each worker saves its run and ends [s]; None: there is no limit.
 
     Raises:
         MissingLibraryError: Ray is not installed.
@@ -64,7 +72,7 @@ def run_workers_on_ray(
         raise RunError(f"--ray {address}: cannot be reached ({one_line(error)})") from error
     try:
         cores = max(1, int(ray.cluster_resources().get("CPU", 1)))
-        _wait_for(ray, folder.resolve(), count or cores, gpus, left)
+        _wait_for(ray, folder.resolve(), count or cores, gpus, left, most_s)
     finally:
         ray.shutdown()
 
@@ -80,10 +88,12 @@ def _refuse_unreachable(address: str) -> None:
         socket.create_connection((host.strip("[]"), int(port)), _CONNECT_S).close()
 
 
-def _wait_for(ray: Any, folder: Path, count: int, gpus: float, left: Callable[[], int]) -> None:
+def _wait_for(
+    ray: Any, folder: Path, count: int, gpus: float, left: Callable[[], int], most_s: float | None
+) -> None:
     # Only what Ray does is tried again: a worker that raises says what is wrong with the folder.
     task = ray.remote(num_cpus=1, num_gpus=gpus, max_retries=-1)(_work)
-    waiting = [task.remote(str(folder)) for _ in range(min(count, left()))]
+    waiting = [task.remote(str(folder), most_s) for _ in range(min(count, left()))]
     try:
         while waiting:
             done, waiting = ray.wait(waiting, timeout=_LOOK_EVERY_S)
@@ -102,11 +112,12 @@ def _wait_for(ray: Any, folder: Path, count: int, gpus: float, left: Callable[[]
         raise
 
 
-def _work(folder: str) -> None:
+def _work(folder: str, most_s: float | None) -> None:
     """Be a worker, in a process of the cluster."""
     from innerattn.studies.folder import open_study
     from innerattn.studies.search.state import Watched
     from innerattn.studies.work import work
 
+    until = None if most_s is None else time.monotonic() + most_s
     study = open_study(Path(folder))
-    work(study.ledger(), Watched(study).to_do())
+    work(study.ledger(), Watched(study).to_do(), until=until)
