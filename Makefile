@@ -99,6 +99,7 @@ bench: setup ## speed of worlds, learner and planner on this machine, beside the
 	python benches/key_cost.py
 	python benches/ray_speed.py
 	python benches/copy_cost.py
+	python benches/mixed_cost.py
 	python benches/view_cost.py
 	python benches/frame_time.py
 	python benches/checkpoint_cost.py

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from innerattn.config.algorithm import Algorithm, AlgorithmConfig
     from innerattn.config.battery import Battery, Depot, Station
     from innerattn.config.communication import Communication
+    from innerattn.config.family import Family
     from innerattn.config.load import load_run_config, read_toml, write_toml
     from innerattn.config.map import Map
     from innerattn.config.ppo import PPOConfig
@@ -38,6 +39,7 @@ __all__ = [
     "Communication",
     "Depot",
     "EvaluateConfig",
+    "Family",
     "Fault",
     "ImitationConfig",
     "Map",
@@ -71,6 +73,7 @@ __getattr__ = lazy_names(
         "Communication": "communication",
         "Depot": "battery",
         "EvaluateConfig": "sections",
+        "Family": "family",
         "Fault": "scenario",
         "ImitationConfig": "sections",
         "NetworkConfig": "sections",

@@ -11,6 +11,8 @@ from innerattn.lazy import lazy_names
 if TYPE_CHECKING:
     from innerattn.envs.aec import env
     from innerattn.envs.batch import BatchEnv, Step
+    from innerattn.envs.entities import Entities, EntityLayout
+    from innerattn.envs.mixed import MixedBatchEnv, MixedStep
     from innerattn.envs.parallel import RescueParallelEnv, parallel_env
     from innerattn.envs.single import RescueEnv
     from innerattn.envs.torchrl import RescueTorchRLEnv
@@ -18,6 +20,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BatchEnv",
+    "Entities",
+    "EntityLayout",
+    "MixedBatchEnv",
+    "MixedStep",
     "RescueEnv",
     "RescueParallelEnv",
     "RescueTorchRLEnv",
@@ -31,6 +37,10 @@ __getattr__ = lazy_names(
     __name__,
     {
         "BatchEnv": "batch",
+        "Entities": "entities",
+        "EntityLayout": "entities",
+        "MixedBatchEnv": "mixed",
+        "MixedStep": "mixed",
         "RescueEnv": "single",
         "RescueParallelEnv": "parallel",
         "RescueTorchRLEnv": "torchrl",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from types import TracebackType
 from typing import Any, Literal, NamedTuple, Self, TypeVar, get_args
 
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from innerattn import _core
 from innerattn.config.scenario import Scenario
+from innerattn.envs.entities import Entities, EntityLayout
 from innerattn.envs.state import state_names, world_states
 from innerattn.envs.victims import victim_columns, victim_table
 from innerattn.shown import Shown
@@ -170,6 +172,20 @@ class BatchEnv(Shown):
     def observe(self) -> NDArray[np.float32]:
         """Present observations, (E, R, D) float32 (after `restore`, say)."""
         return self._core.observe()
+
+    @cached_property
+    def entity_layout(self) -> EntityLayout:
+        """Which columns of an observation tell of the robot itself, of teammates and of victims."""
+        return EntityLayout.of(self.observation_names())
+
+    def entities(self, obs: NDArray[np.float32] | None = None) -> Entities:
+        """What each robot sees, by entity: tables with leading dimensions (E, R), and masks.
+
+        Args:
+            obs: (E, R, D) observations, such as those of a step; None: the present ones. Tables
+                are views of them.
+        """
+        return self.entity_layout.entities(self.observe() if obs is None else obs)
 
     def reward_components(self) -> NDArray[np.float32]:
         """Rewards of the last step, (E, R, C) float32, columns `reward_component_names`."""

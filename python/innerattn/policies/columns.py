@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from innerattn.envs.entities import EntityLayout
 from innerattn.policies.exported.contract import Entities, FrameColumns
 
 HANDED = (".fault.heading_bias", ".turn_rate", ".left")
 """Ends of names of columns that change their sign in a mirrored world."""
-_PLACE = ("relative_position.x", "relative_position.y")
 
 
 def able_columns(names: Sequence[str]) -> tuple[int, ...]:
@@ -21,28 +21,7 @@ def able_columns(names: Sequence[str]) -> tuple[int, ...]:
 
 def entity_columns(names: Sequence[str]) -> Entities:
     """How many columns the robot itself, each teammate and each victim have."""
-    owners = [name.partition(".")[0] for name in names]
-
-    def of(owner: str) -> list[str]:
-        return [name.partition(".")[2] for name in names if name.startswith(f"{owner}.")]
-
-    def place(quantities: list[str]) -> tuple[int, int] | None:
-        if not set(_PLACE) <= set(quantities):
-            return None
-        return quantities.index(_PLACE[0]), quantities.index(_PLACE[1])
-
-    teammate, victim = of("teammate_0"), of("victim_0")
-    return Entities(
-        own=owners.count("own"),
-        teammates=len({owner for owner in owners if owner.startswith("teammate_")}),
-        teammate=len(teammate),
-        victims=len({owner for owner in owners if owner.startswith("victim_")}),
-        victim=len(victim),
-        present=victim.index("present"),
-        seen=teammate.index("seen") if "seen" in teammate else None,
-        teammate_place=place(teammate),
-        victim_place=place(victim),
-    )
+    return Entities(**EntityLayout.of(names).numbers())
 
 
 def frame_columns(

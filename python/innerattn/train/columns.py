@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import zip_longest
 
+from innerattn.envs.entities import EntityLayout
 from innerattn.errors import ConfigError
 from innerattn.nn import EntityColumns, Hearing, PartnerColumns, VectorColumns
 from innerattn.policies.columns import HANDED, frame_columns
@@ -21,34 +21,10 @@ def entity_columns(names: Sequence[str]) -> EntityColumns:
     Raises:
         ConfigError: The names are not of that form; the message names the first column that is not.
     """
-    quantities: dict[str, list[str]] = {"own": [], "teammate_0": [], "victim_0": []}
-    for name in names:
-        owner, _, quantity = name.partition(".")
-        quantities.setdefault(owner, []).append(quantity)
-    own, teammate, victim = (quantities[first] for first in ("own", "teammate_0", "victim_0"))
-    teammates = _count(quantities, "teammate_") if teammate else 0
-    victims = _count(quantities, "victim_") if victim else 0
-    expected = [f"own.{quantity}" for quantity in own]
-    expected += [f"teammate_{k}.{quantity}" for k in range(teammates) for quantity in teammate]
-    expected += [f"victim_{k}.{quantity}" for k in range(victims) for quantity in victim]
-    for place, (found, wanted) in enumerate(zip_longest(names, expected)):
-        if found != wanted:
-            raise _unsuitable(f"column {place} of an observation is {found!r}, not {wanted!r}")
-    if not own:
-        raise _unsuitable("an observation has no column own.*")
-    if "present" not in victim:
-        raise _unsuitable("an observation has no column victim_0.present")
-    return EntityColumns(
-        own=len(own),
-        teammates=teammates,
-        teammate=len(teammate),
-        victims=victims,
-        victim=len(victim),
-        present=victim.index("present"),
-        seen=teammate.index("seen") if "seen" in teammate else None,
-        teammate_place=_place(teammate),
-        victim_place=_place(victim),
-    )
+    try:
+        return EntityColumns(**EntityLayout.of(names).numbers())
+    except ValueError as error:
+        raise ConfigError(f"network.encoder = 'entities': {error}; must be 'flat' here") from error
 
 
 def vector_columns(
@@ -170,19 +146,3 @@ def hearing(names: Sequence[str], delay: int) -> Hearing:
 def _teammates(names: Sequence[str]) -> list[str]:
     owners = (name.partition(".")[0] for name in names)
     return list(dict.fromkeys(owner for owner in owners if owner.startswith("teammate_")))
-
-
-def _place(quantities: list[str]) -> tuple[int, int] | None:
-    """Indices of the place of an entity with these columns, relative to the robot."""
-    axes = ("relative_position.x", "relative_position.y")
-    if not set(axes) <= set(quantities):
-        return None
-    return quantities.index(axes[0]), quantities.index(axes[1])
-
-
-def _count(owners: dict[str, list[str]], prefix: str) -> int:
-    return sum(owner.startswith(prefix) for owner in owners)
-
-
-def _unsuitable(reason: str) -> ConfigError:
-    return ConfigError(f"network.encoder = 'entities': {reason}; must be 'flat' here")

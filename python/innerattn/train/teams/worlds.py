@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from innerattn.config import Scenario
-from innerattn.envs import BatchEnv
+from innerattn.envs import BatchEnv, MixedBatchEnv
 from innerattn.learn.resume import State, take, take_within
 from innerattn.nn.teams import Relations, joined_tables, relate
 from innerattn.policies import Policy, PolicyInput, WorldState, scripted_policy
@@ -92,14 +92,15 @@ class TeamWorlds:
         self._counts = np.zeros(5, np.int64)  # as `Tally`
         self._progress = BatchEnv.reward_component_names.index("progress")
         self._worlds = [self._draw() for _ in range(groups)]
+        self._env = MixedBatchEnv([one.env for one in self._worlds], num_threads=1)
 
     def redraw(self, count: int) -> None:
         """Replace ``count`` teams, chosen at random, by new ones."""
         choice = np.random.default_rng([self._seed, 1, self._redrawn])
         self._redrawn += 1
         for index in choice.choice(self.groups, count, replace=False):
-            self._worlds[index].env.close()
-            self._worlds[index] = self._draw()
+            self._worlds[index] = new = self._draw()
+            self._env.replace(int(index), new.env)
 
     def relations(self) -> Relations:
         """What is to be seen now."""
@@ -120,12 +121,9 @@ class TeamWorlds:
             actions: (N,) int64, world by world.
             progress_weight: of the reward for coming nearer.
         """
-        parts, at, last = [], 0, []
-        for one in self._worlds:
-            size = self._count * one.env.num_robots
-            taken = actions[at : at + size].view(self._count, -1).numpy()
-            at += size
-            step = one.env.step(taken)
+        parts, last = [], []
+        steps = self._env.step_batches(actions.numpy())
+        for one, step in zip(self._worlds, steps, strict=True):
             one.obs = step.obs
             reward = one.env.reward_components().mean(1)
             whole_reward = reward.sum(1) + (progress_weight - 1.0) * reward[:, self._progress]
@@ -180,7 +178,7 @@ class TeamWorlds:
         images = take(state, "worlds", torch.uint8, None).numpy()
         if sum(lengths) != len(images):
             raise ValueError(f"'worlds' has {len(images)} bytes: must have {sum(lengths)}")
-        self.close()
+        self._env.close()
         ends = np.cumsum(lengths)
         self._worlds = []
         for number, length, end, rescues in zip(teams, lengths, ends, open_rescues, strict=True):
@@ -188,12 +186,12 @@ class TeamWorlds:
             self._worlds[-1].env.restore(images[end - length : end].tobytes())
             self._worlds[-1].obs = self._worlds[-1].env.observe()
             self._worlds[-1].open_rescues = rescues.copy()
+        self._env = MixedBatchEnv([one.env for one in self._worlds], num_threads=1)
         self._drawn, self._redrawn = drawn
 
     def close(self) -> None:
         """Free all worlds."""
-        for one in self._worlds:
-            one.env.close()
+        self._env.close()
 
     def _draw(self) -> _Group:
         self._drawn += 1
