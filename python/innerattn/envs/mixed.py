@@ -122,7 +122,7 @@ class MixedBatchEnv(Shown):
         self._kept: list[Entities] = []
         self._columns = [
             tuple(
-                _places(getattr(one, who), getattr(self.layout, who))
+                _runs(getattr(one, who), getattr(self.layout, who))
                 for who in ("own", "teammate", "victim")
             )
             for one in layouts
@@ -226,13 +226,14 @@ class MixedBatchEnv(Shown):
         for own_layout, columns, part in zip(self._layouts, self._columns, rows, strict=True):
             seen = own_layout.entities(part.reshape(-1, part.shape[-1]))
             here = slice(begin, begin + len(seen.own))
-            own, teammate, victim = columns
-            mates, victims = own_layout.teammates, own_layout.victims
-            found.own[here, own] = seen.own
-            found.teammates[here, :mates, teammate] = seen.teammates
-            found.teammate_mask[here, :mates] = seen.teammate_mask
-            found.victims[here, :victims, victim] = seen.victims
-            found.victim_mask[here, :victims] = seen.victim_mask
+            mates, victims = slice(own_layout.teammates), slice(own_layout.victims)
+            tables = (found.own[here], found.teammates[here, mates], found.victims[here, victims])
+            given = seen.own, seen.teammates, seen.victims
+            for table, known, runs in zip(tables, given, columns, strict=True):
+                for begins, at, width in runs:
+                    table[..., at : at + width] = known[..., begins : begins + width]
+            found.teammate_mask[here, mates] = seen.teammate_mask
+            found.victim_mask[here, victims] = seen.victim_mask
             begin = here.stop
         return Entities(*found)  # not the kept tuple, or nobody knew who still uses its arrays
 
@@ -280,8 +281,17 @@ def _step_or_error(batch: BatchEnv, actions: NDArray[np.generic]) -> Step | Exce
         return error
 
 
-def _places(names: tuple[str, ...], of: tuple[str, ...]) -> slice | NDArray[np.intp]:
-    """Where some names stand among others."""
-    if names == of[: len(names)]:
-        return slice(0, len(names))
-    return np.array([of.index(name) for name in names], np.intp)
+def _runs(names: tuple[str, ...], of: tuple[str, ...]) -> list[tuple[int, int, int]]:
+    """Where some names stand among others: runs of them, each (begin, begin among others, width).
+
+    Runs are copied several times as fast as single columns.
+    """
+    found: list[tuple[int, int, int]] = []
+    for number, name in enumerate(names):
+        at = of.index(name)
+        if found and at == sum(found[-1][1:]):
+            begin, first, width = found[-1]
+            found[-1] = (begin, first, width + 1)
+        else:
+            found.append((number, at, 1))
+    return found
