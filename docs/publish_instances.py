@@ -1,7 +1,7 @@
 """Makes the worlds of the set `standard` and lists them in `docs/instances.md`.
 
-`python docs/publish_instances.py` draws 300 worlds if their file is not there, and lets the scripts
-play them. It takes some twenty minutes of one core. `SEED` fixes the worlds; one that no script
+`python docs/publish_instances.py` draws 300 worlds if their file is not there, and lets scripts and
+the policy for any team play them. It takes some twenty minutes of one core. `SEED` fixes the worlds; one that no script
 does well enough in is drawn anew.
 """
 
@@ -208,11 +208,11 @@ def frozen(feature: str, robots: int, number: int) -> WorldInstance:
 
 
 def main() -> None:
-    """Make the set if it is not there, then let the scripts play it and fill the page."""
+    """Make the set if it is not there, then let policies play it and fill the page."""
     if not WORLDS_FILE.exists():
         make()
     worlds = read_worlds("standard")
-    results = [evaluate_worlds(script, worlds) for script in REFERENCES]
+    results = [evaluate_worlds(policy, worlds) for policy in (*REFERENCES, "zoo:any")]
     fill(PAGE, "standard", worlds_markdown(results))
 
 

@@ -38,6 +38,24 @@ def test_a_team_lies_in_the_ranges(seed: int, number: int) -> None:
         assert fault.onset_step < 50
 
 
+@given(seed=st.integers(0, 2**31), number=st.integers(0, 1_000))
+def test_tasks_take_time_without_changing_the_team(seed: int, number: int) -> None:
+    never = Family(service=0.0, deadline=0.0, order=0.0).draw(seed, number)
+    always = Family(service=1.0, deadline=1.0, order=1.0, service_s=(1.0, 2.0)).draw(seed, number)
+    plain = [{"service_s": 0.0, "service": "keep", "deadline_s": None, "after": ()}] * 3
+    timeless = [
+        task.model_copy(update=values) for task, values in zip(always.tasks, plain, strict=False)
+    ]
+    assert always.replace(tasks=[task.model_dump() for task in timeless]) == never
+    names = [task.name for task in always.tasks]
+    for index, task in enumerate(always.tasks):
+        assert 1.0 <= task.service_s <= 2.0
+        assert isinstance(task.deadline_s, float)
+        assert 2.0 <= round(task.deadline_s - task.service_s, 9) <= 10.0
+        assert len(task.after) == (index > 0)
+        assert set(task.after) <= set(names[:index])
+
+
 def test_seed_and_number_fix_a_team() -> None:
     assert FAMILY.draw(3, 5) == FAMILY.draw(3, 5)
     teams = [FAMILY.draw(seed, number) for seed in range(3) for number in range(3)]
@@ -48,6 +66,13 @@ def test_shares_are_about_what_is_asked_for() -> None:
     teams = [FAMILY.draw(0, number) for number in range(400)]
     assert sum(bool(team.faults) for team in teams) / 400 == pytest.approx(0.25, abs=0.08)
     assert sum(team.situation == "mixed" for team in teams) / 400 == pytest.approx(0.6, abs=0.08)
+    timed = {"service": "has_services", "deadline": "has_deadlines"}
+    for share, told in {"service": 0.2, "deadline": 0.1}.items():
+        found = sum(getattr(team, timed[share]) for team in teams) / 400
+        assert found == pytest.approx(told, abs=0.06)
+    several = [team for team in teams if len(team.tasks) > 1]
+    found = sum(team.has_order for team in several) / len(several)
+    assert found == pytest.approx(0.2, abs=0.08)
     usual = sum(team.arena_half_width_m == 1.0 for team in teams) / 400
     assert usual == pytest.approx(0.4, abs=0.1)
 

@@ -50,6 +50,17 @@ def weights_of(one: TeamLearner) -> Tensor:
     return torch.cat([p.detach().flatten() for net in networks for p in net.parameters()])
 
 
+def test_some_worlds_take_the_likeliest_actions() -> None:
+    """The four worlds of a team of three come first; then those of a team of five."""
+    seen, in_these = worlds(3), torch.arange(WORLDS) % 3 == 0
+    drawn, likely, both = (
+        learner(1).act(seen, greedy=greedy)[0] for greedy in (False, True, in_these)
+    )
+    of_robots = torch.cat([in_these[:4].repeat_interleave(3), in_these[4:].repeat_interleave(5)])
+    assert torch.equal(both, torch.where(of_robots, likely, drawn))
+    assert not torch.equal(drawn, likely)
+
+
 def test_imitation_comes_to_agree() -> None:
     one = learner()
     agreement = [one.learn(*rollout(one, k % 3), GROUPS, IMITATION)["agreement"] for k in range(25)]

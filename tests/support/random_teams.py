@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from innerattn.nn.teams import TeamTables
+from innerattn.nn.teams.tables import ENDLESS_S
 
 
 class Size(NamedTuple):
@@ -17,6 +19,20 @@ class Size(NamedTuple):
     robots: int = 4
     victims: int = 3
     abilities: int = 3
+
+
+def _waits(uniform: Callable[..., Tensor], *sizes: int) -> Tensor:
+    """Of half of the victims each: a service, a deadline, and that they are blocked."""
+    has = uniform(0.0, 1.0, *sizes, 3) < 0.5
+    service, left, blocked = has.unbind(-1)
+    return torch.stack(
+        [
+            service * uniform(0.1, 5.0, *sizes),
+            torch.where(left, uniform(0.0, 9.0, *sizes), ENDLESS_S),
+            blocked.float(),
+        ],
+        -1,
+    )
 
 
 def random_tables(size: Size, seed: int) -> TeamTables:
@@ -40,6 +56,7 @@ def random_tables(size: Size, seed: int) -> TeamTables:
         is_victim=is_victim,
         places=uniform(-0.6, 0.6, worlds, victims, 2) * is_victim[..., None],
         needs=needs * is_victim[..., None],
+        waits=_waits(uniform, worlds, victims) * is_victim[..., None],
         demand=uniform(0.1, 1.5, worlds, abilities),
         worlds=torch.tensor([[1.0, 0.15, float(victims)]]).expand(worlds, -1),
     )

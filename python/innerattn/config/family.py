@@ -56,6 +56,13 @@ class Family(Model):
         0.1, ge=0.0, description="what each robot beyond four adds to the high end of that [m]"
     )
     usual_arena: Share = Field(0.4, description="share of teams in an arena as the scenario says")
+    service: Share = Field(0.2, description="share of teams whose tasks have services")
+    service_s: _Range = Field((0.3, 3.0), description="service of such a task [s]")
+    deadline: Share = Field(0.1, description="share of teams whose tasks have deadlines")
+    deadline_s: _Range = Field((2.0, 10.0), description="deadline of such a task [s]")
+    order: Share = Field(
+        0.2, description="share of teams in which each task but the first comes after another one"
+    )
     unavailable: Share = Field(
         0.25, description="share of teams in which one or two robots are unavailable for a while"
     )
@@ -90,16 +97,19 @@ class Family(Model):
         """
         rng = np.random.default_rng([seed, number])
         base = Scenario() if base is None else base
-        for _ in range(_TRIES):
+        for attempt in range(_TRIES):
             try:
-                return base.replace(**self._values(rng, base))
+                return base.replace(**self._values(rng, base, (seed, number, attempt)))
             except ConfigError as error:
                 reason = error
         raise ConfigError(
             f"{self.place}: none of {_TRIES} teams drawn can be used, the last because: {reason}"
         )
 
-    def _values(self, rng: np.random.Generator, base: Scenario) -> dict[str, Any]:
+    def _values(
+        self, rng: np.random.Generator, base: Scenario, entropy: tuple[int, ...]
+    ) -> dict[str, Any]:
+        """What is drawn; ``entropy`` is for what has a random stream of its own."""
         count = _whole(rng, self.robots)
         abilities = [f"ability_{index}" for index in range(_whole(rng, self.abilities))]
         team = self._team(rng, count, abilities)
@@ -107,13 +117,16 @@ class Family(Model):
             {"name": f"robot_{index}", **team[kind]}
             for index, kind in enumerate(_who(rng, count, len(team)))
         ]
+        situation = str(rng.choice(self.situations))
+        tasks = self._tasks(rng, count, abilities)
         values = {
-            "situation": str(rng.choice(self.situations)),
+            "situation": situation,
             "robots": robots,
-            "tasks": self._tasks(rng, count, abilities),
+            "tasks": tasks,
             "max_victims": min(_whole(rng, self.max_victims), max(2, count)),
             "faults": self._faults(rng, count, base.episode_steps),
         }
+        self._let_tasks_take_time(np.random.default_rng([*entropy, 1]), tasks)
         if rng.random() >= self.usual_arena:
             low, high = self.arena_half_width_m
             high += self.arena_growth_m * max(0, count - 4)
@@ -151,6 +164,19 @@ class Family(Model):
             chosen = [str(one) for one in rng.choice(abilities, needs)]
             tasks.append({"name": f"task_{index}", "needs": chosen})
         return tasks
+
+    def _let_tasks_take_time(self, rng: np.random.Generator, tasks: list[dict[str, Any]]) -> None:
+        """Give tasks services, deadlines and an order."""
+        served, mortal, ordered = rng.random(3) < (self.service, self.deadline, self.order)
+        for index, task in enumerate(tasks):
+            if served:
+                task["service_s"] = round(float(rng.uniform(*self.service_s)), 2)
+                task["service"] = str(rng.choice(["keep", "restart"]))
+            if mortal:
+                least = float(rng.uniform(*self.deadline_s))
+                task["deadline_s"] = round(least + task.get("service_s", 0.0), 2)
+            if ordered and index:
+                task["after"] = [f"task_{int(rng.integers(index))}"]
 
     def _faults(self, rng: np.random.Generator, count: int, steps: int) -> list[dict[str, Any]]:
         """Robots that are unavailable for a while: from the start or from a random step on."""

@@ -483,6 +483,11 @@ class Scenario(Model, Shown):
         return any(task.service_s > 0.0 for task in self.tasks)
 
     @property
+    def longest_deadline_s(self) -> float:
+        """The longest deadline of all tasks [s]; 0 where none has one."""
+        return max((task.deadlines_s[1] for task in self.tasks if task.deadlines_s), default=0.0)
+
+    @property
     def has_deadlines(self) -> bool:
         """Whether some victims can be lost."""
         return any(task.deadline_s is not None for task in self.tasks)

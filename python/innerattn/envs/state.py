@@ -105,7 +105,6 @@ def shares_left(
         victims: (E, V) structured, the fields of `BatchEnv.victims`.
         step_counts: (E,) steps done in the episodes.
     """
-    longest_s = max(task.deadlines_s[1] for task in scenario.tasks if task.deadlines_s)
-    longest = math.ceil(longest_s / scenario.dt_s * (1.0 - 1e-12))
+    longest = math.ceil(scenario.longest_deadline_s / scenario.dt_s * (1.0 - 1e-12))
     left = np.clip((victims["deadline_step"] - step_counts[:, None]) / longest, 0.0, 1.0)
     return np.where(victims["deadline_step"] < 0, 1.0, left).astype(np.float32)

@@ -81,7 +81,8 @@ def unseen_teams(seed: int = SEED) -> tuple[UnseenTeam, ...]:
 
 
 def _drawn(seed: int) -> Iterator[UnseenTeam]:
-    usual, base = Family(unavailable=0.0), Scenario(episode_steps=EPISODE_STEPS)
+    usual = Family(unavailable=0.0, service=0.0, deadline=0.0, order=0.0)
+    base = Scenario(episode_steps=EPISODE_STEPS)
     for number in range(8):
         yield UnseenTeam("mixtures", "unseen mixture", usual.draw(seed, number, base))
     for number, size in enumerate(_SIZES, start=100):

@@ -153,13 +153,22 @@ class TeamLearner:
         ]
 
     @torch.no_grad()
-    def act(self, seen: Relations, *, greedy: bool = False) -> tuple[Tensor, Tensor]:
-        """Draw actions (N,) int64, or take the likeliest; and their log-probabilities (N,)."""
+    def act(self, seen: Relations, *, greedy: bool | Tensor = False) -> tuple[Tensor, Tensor]:
+        """Choose actions (N,) int64; and their log-probabilities (N,).
+
+        Args:
+            seen: what there is to be seen.
+            greedy: whether to take the likeliest actions instead of drawn ones; or (B,) bool, in
+                which worlds.
+        """
         log_probs = self.actor(seen)
-        chances = log_probs.exp()
-        if not greedy:
-            chances /= torch.empty_like(chances).exponential_(generator=self._generator)
-        actions = chances.argmax(1)
+        likely = chosen = log_probs.exp()
+        if greedy is not True:
+            chosen = likely / torch.empty_like(likely).exponential_(generator=self._generator)
+        if isinstance(greedy, Tensor):
+            world = seen.robot_cells // seen.rivals.shape[1]
+            chosen = torch.where(greedy[world, None], likely, chosen)
+        actions = chosen.argmax(1)
         return actions, log_probs.gather(1, actions[:, None]).squeeze(1)
 
     @torch.no_grad()

@@ -217,8 +217,19 @@ def pair_network(team: TeamConfig, scenario: Scenario) -> Network:
         entities=None,
         frame=None,
         pooling=_POOLINGS[team.pooling],
-        pairs=PairRules(scenario.rescue_radius_m, scenario.robots_leave, team.key_width),
+        pairs=PairRules(
+            scenario.rescue_radius_m,
+            scenario.robots_leave,
+            team.key_width,
+            services_of(scenario),
+            scenario.longest_deadline_s,
+        ),
     )
+
+
+def services_of(scenario: Scenario) -> tuple[float, ...]:
+    """The service of each task [s]; none where no task has one."""
+    return tuple(task.service_s for task in scenario.tasks) if scenario.has_services else ()
 
 
 def beyond_numpy(config: RunConfig) -> str | None:

@@ -57,6 +57,7 @@ def test_orders_of_robots_victims_and_abilities_do_not_matter(pooling: str) -> N
         is_victim=tables.is_victim[:, victims],
         places=tables.places[:, victims],
         needs=tables.needs[:, victims][..., abilities],
+        waits=tables.waits[:, victims],
         demand=tables.demand[:, abilities],
         worlds=tables.worlds,
     )

@@ -16,6 +16,7 @@ from innerattn.nn.teams import TeamTables, relate
 from innerattn.nn.teams.coalitions import NEVER_S
 from innerattn.nn.teams.frames import frame_of, turn, turn_back_choices
 from innerattn.nn.teams.relations import NEAREST
+from innerattn.nn.teams.tables import ENDLESS_S
 from innerattn.policies.scripted.steering import Steering
 
 SIZES = st.builds(
@@ -34,6 +35,10 @@ COLUMN = {
     "rival": 17,
     "last": 18,
     "nearer": 20,
+    "wait": 23,
+    "left": 24,
+    "blocked": 25,
+    "to_spare": 26,
 }
 
 
@@ -83,6 +88,8 @@ def by_hand(tables: TeamTables, world: int, victim: int) -> dict[int, dict[str, 
     wanted = [k for k, count in enumerate(needs) if count]
     sets = [one for size in range(len(wanted)) for one in combinations(wanted, size + 1)]
     found = {}
+    wait, left, blocked = tables.waits[world, victim].tolist()
+    complete = first(lambda t: filled(t) == sum(needs))
     for i in robots:
         if not mine[i]:
             continue
@@ -93,7 +100,10 @@ def by_hand(tables: TeamTables, world: int, victim: int) -> dict[int, dict[str, 
             for v in waiting
             if any(n and a for n, a in zip(tables.needs[world, v], able[i], strict=True))
         ]
-        order = sorted(useful, key=lambda v: (arrival_time(tables, world, i, v), v))
+        order = sorted(
+            useful,
+            key=lambda v: (float(tables.waits[world, v, 2]), arrival_time(tables, world, i, v), v),
+        )
         alike = [j for j in robots if j != i and mine[i] & mine[j]]
         found[i] = {
             "time": times[i] / 2.0,
@@ -104,6 +114,10 @@ def by_hand(tables: TeamTables, world: int, victim: int) -> dict[int, dict[str, 
             "rival": min(max(rival - times[i], -3.0), 3.0),
             "last": min(last, 4.0),
             "nearer": min(sum(times[j] < times[i] for j in alike), 4) / 3.0,
+            "wait": min(wait, 4.0) / 2.0,
+            "left": min(left, 8.0) / 4.0,
+            "blocked": blocked,
+            "to_spare": min(max(left - complete - wait, -3.0), 3.0) if left < ENDLESS_S else 3.0,
         }
     return found
 
@@ -165,6 +179,9 @@ def test_columns_of_victims_are_those_of_plain_loops(size: Size, seed: int) -> N
             )
             found = float(seen.victims[number, column])
             assert found == pytest.approx(min(expected, 5.0), abs=2e-5)
+        of_pairs = seen.pairs[torch.div(seen.cells, size.robots, rounding_mode="floor") == number]
+        for row in of_pairs:
+            assert torch.equal(row[23:], seen.victims[number, 8:])
 
 
 @given(size=SIZES, seed=st.integers(0, 10_000))

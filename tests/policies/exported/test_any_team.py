@@ -30,6 +30,7 @@ from innerattn.train.export.check import MOST_OF_PAIRS, at_edge
 from innerattn.train.teams.sheet import TeamSheet, as_tensor
 
 POOLINGS = ("inner", "uniform", "max", "nearest")
+SORTS = Family(robots=(2, 9), unavailable=0.5, service=0.5, deadline=0.4, order=0.5)
 SENSES = (
     (),
     (Fault(robot="robot_0", kind="lost_communication", value=0.3),),
@@ -48,7 +49,7 @@ def test_any_team_acts_as_the_learner_does(
     number: int, pooling: str, faults: tuple[Fault, ...], leave: bool
 ) -> None:
     """Random teams of the family, whose robots drive at random; some are unavailable."""
-    scenario = Family(robots=(2, 9), unavailable=0.5).draw(5, number)
+    scenario = SORTS.draw(5, number)
     scenario = scenario.replace(faults=(*scenario.faults, *faults))
     if leave:
         scenario = scenario.replace(unavailable_robots="leave")

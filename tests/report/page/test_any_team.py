@@ -92,7 +92,8 @@ def drawn_teams() -> dict[str, tuple[str, Scenario]]:
     """Random teams and others, with the pooling that is tried in them."""
     found = {}
     for number in range(12):
-        team = Family(robots=(2, 9), unavailable=0.5).draw(5, number)
+        timed = {"service": 0.5, "deadline": 0.4, "order": 0.5}
+        team = Family(robots=(2, 9), unavailable=0.5, **timed).draw(5, number)
         faults = [*team.faults, Fault(robot="robot_0", kind="lost_communication", value=0.3)]
         faults += [Fault(robot="robot_1", kind="position_noise", value=0.1)]
         team = team.replace(faults=faults) if number % 3 == 0 else team

@@ -11,7 +11,7 @@ from innerattn.config.family import Family
 from innerattn.config.scenario import Fault
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError
-from innerattn.nn.teams import TeamActor, relate
+from innerattn.nn.teams import TeamActor, TeamTables, relate
 from innerattn.train.teams.sheet import TeamSheet, as_tensor
 
 NOISE = Fault(robot="robot_0", kind="position_noise", value=0.0)
@@ -20,7 +20,8 @@ NOISE = Fault(robot="robot_0", kind="position_noise", value=0.0)
 @pytest.mark.parametrize("number", range(6))
 @pytest.mark.parametrize("each", [False, True])
 def test_tables_are_the_true_state(number: int, each: bool) -> None:
-    scenario = Family(unavailable=0.5).draw(8, number)
+    family = Family(unavailable=0.5, service=0.6, deadline=0.5, order=0.6, tasks=(2, 3))
+    scenario = family.draw(8, number)
     if each:  # senses may fail, though they do not
         scenario = scenario.replace(faults=(*scenario.faults, NOISE))
     with closing(BatchEnv(scenario, 7, seed=number)) as env:
@@ -40,26 +41,40 @@ def test_tables_are_the_true_state(number: int, each: bool) -> None:
         available = env.fault_state()["unavailable"] < 0.5
         expected = np.repeat(able & available[..., None], copies, 0)
         np.testing.assert_array_equal(tables.abilities, expected)
-        _same_victims(tables.is_victim, tables.places, tables.needs, env, abilities, copies)
+        _same_victims(tables, env, abilities, copies)
 
 
-def _same_victims(
-    is_victim: torch.Tensor,
-    places: torch.Tensor,
-    needs: torch.Tensor,
-    env: BatchEnv,
-    abilities: list[str],
-    copies: int,
-) -> None:
-    """Victims are those that are present, in any order."""
-    tasks = [[task.needs.count(one) for one in abilities] for task in env.scenario.tasks]
+def _same_victims(tables: TeamTables, env: BatchEnv, abilities: list[str], copies: int) -> None:
+    """Victims are those that are present, in any order, and wait for as long as they do."""
+    scenario = env.scenario
+    needs = [[task.needs.count(one) for one in abilities] for task in scenario.tasks]
+    services = [
+        max(one.service_s for one, its in zip(scenario.tasks, needs, strict=True) if its == own)
+        for own in needs
+    ]
+    counts = np.repeat(env.step_counts(), copies)
+
+    def waits(victim: np.void, steps: int) -> tuple[float, float, float]:
+        fields = victim.dtype.names or ()
+        left = 1e3
+        if "deadline_step" in fields and victim["deadline_step"] >= 0:
+            left = (victim["deadline_step"] - steps) * scenario.dt_s
+        served = victim["served"] if "served" in fields else 1.0
+        blocked = victim["blocked"] if "blocked" in fields else False
+        return (1.0 - served) * services[victim["task"]], left, float(blocked)
+
     for row, victims in enumerate(np.repeat(env.victims(), copies, 0)):
         true = sorted(
-            (*(float(v[axis]) for axis in "xy"), *tasks[v["task"]]) for v in victims if v["present"]
+            (*(float(v[axis]) for axis in "xy"), *needs[v["task"]], *waits(v, counts[row]))
+            for v in victims
+            if v["present"]
         )
-        there = is_victim[row]
-        found = sorted(torch.cat([places[row], needs[row]], -1)[there].tolist())
-        np.testing.assert_allclose(found, true, atol=1e-5)
+        columns = torch.cat([tables.places[row], tables.needs[row], tables.waits[row]], -1)
+        found = sorted(columns[tables.is_victim[row]].tolist())
+        # The longest deadline, which times are shares of, ends with a step.
+        close = np.array([*[1e-5] * (2 + len(abilities)), 1e-5, scenario.dt_s, 0.0])
+        assert len(found) == len(true)
+        assert not found or np.all(np.abs(np.subtract(found, true)) <= close)
 
 
 def test_who_sees_for_himself_acts_as_all_do_while_senses_are_well() -> None:
@@ -125,7 +140,7 @@ def test_victims_are_known_when_the_first_robot_has_left() -> None:
         np.testing.assert_array_equal(tables.is_there, present)
         assert not tables.abilities[0, :2].any()
         abilities = sorted({one for robot in scenario.robots for one in robot.abilities})
-        _same_victims(tables.is_victim, tables.places, tables.needs, env, abilities, 1)
+        _same_victims(tables, env, abilities, 1)
 
 
 def test_who_is_not_heard_is_not_there() -> None:

@@ -1,7 +1,8 @@
 """Who can help whom, when, and what it means to the others: from tables to rows of pairs.
 
 A row is a pair of a robot and a victim that it can help; a robot has rows for its `NEAREST` victims
-at most. Times are those of `innerattn.policies.scripted.steering.Steering.arrival_times`.
+at most, blocked ones after all others. Times are those of
+`innerattn.policies.scripted.steering.Steering.arrival_times`.
 """
 
 from __future__ import annotations
@@ -14,16 +15,18 @@ from torch import Tensor
 from innerattn.nn.teams.coalitions import NEVER_S, coalitions
 from innerattn.nn.teams.frames import frame_of, turn
 from innerattn.nn.teams.moves import GAINS_WIDTH, gains
-from innerattn.nn.teams.tables import TeamTables
+from innerattn.nn.teams.tables import ENDLESS_S, TeamTables
 
 NEAREST = 3
 """Victims that a robot looks at, by its own arrival time."""
 _LONGEST_S = 8.0
 """Beyond this, arrival times tell no more."""
+BLOCKED_S = 100.0
+"""What the arrival time at a blocked victim is longer, where victims are put in order [s]."""
 _MOST_NEARER, _MOST_OTHERS = 4, 6
 """Beyond these numbers of rivals and partners, more of them change nothing."""
 PAIR_WIDTH, PAIR_TURNING_WIDTH, HOME_WIDTH, VICTIM_WIDTH, ROBOT_WIDTH, WORLD_WIDTH = (
-    *(23, 10 + GAINS_WIDTH, 16 + GAINS_WIDTH, 8, 12),
+    *(27, 10 + GAINS_WIDTH, 16 + GAINS_WIDTH, 12, 12),
     9,
 )
 
@@ -94,7 +97,8 @@ def relate(tables: TeamTables) -> Relations:
     # Each robot's victims, by its own arrival time.
     place = (world[:, None] * size + torch.arange(size)) * slots + slot[:, None]  # (M, R)
     own = torch.full((envs * size * slots,), NEVER_S)
-    own[place] = torch.where(useful, times, NEVER_S)
+    wait, left, blocked = (column[:, None] for column in tables.waits[world, slot].unbind(-1))
+    own[place] = torch.where(useful, times + BLOCKED_S * blocked, NEVER_S)
     own = own.view(envs * size, slots)
     order = own.argsort(stable=True, dim=1)
     rank = torch.empty_like(order).scatter_(1, order, torch.arange(slots).expand_as(order))
@@ -128,6 +132,7 @@ def relate(tables: TeamTables) -> Relations:
         nearer.clamp(max=_MOST_NEARER) / 3.0,
         rivals.sum(-1).clamp(max=_MOST_OTHERS) / 3.0,
         partners.sum(-1).clamp(max=_MOST_OTHERS) / 3.0,
+        *(at_victim := _waits(wait, left, blocked, teams.complete[:, None])),
     ]
     rows = torch.stack([column.expand_as(times).float() for column in columns], -1)
     cells = (useful & (ranks < NEAREST)).view(-1).nonzero().squeeze(1)
@@ -158,6 +163,7 @@ def relate(tables: TeamTables) -> Relations:
         teams.spare.clamp(-1.0, 4.0) / 3.0,
         waiting.squeeze(1) / 4.0,
         half.squeeze(1),
+        *(column.squeeze(1) for column in at_victim),
     ]
     return Relations(
         pairs=rows.view(-1, PAIR_WIDTH)[cells],
@@ -177,6 +183,12 @@ def relate(tables: TeamTables) -> Relations:
         robot_cells=robot_cells,
         worlds=_worlds(tables),
     )
+
+
+def _waits(wait: Tensor, left: Tensor, blocked: Tensor, complete: Tensor) -> tuple[Tensor, ...]:
+    """Four columns (M, 1) of victims: service, deadline, order, and how much time is to spare."""
+    spare = torch.where(left < ENDLESS_S, left - complete - wait, 3.0)
+    return wait.clamp(max=4.0) / 2.0, left.clamp(max=_LONGEST_S) / 4.0, blocked, spare.clamp(-3, 3)
 
 
 def _rivals_and_partners(fills: Tensor, useful: Tensor, needed: Tensor) -> tuple[Tensor, Tensor]:

@@ -9,6 +9,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+ENDLESS_S = 1e3
+"""Time until a victim without a deadline is lost [s]."""
+
 
 class TeamTables(NamedTuple):
     """B worlds with up to R robots, V victims and K abilities each; zeros where there is none.
@@ -26,6 +29,8 @@ class TeamTables(NamedTuple):
         is_victim: (B, V) bool, which rows are victims.
         places: (B, V, 2) [m].
         needs: (B, V, K), how many robots with each ability a victim needs.
+        waits: (B, V, 3) service that a victim still needs [s], time until it is lost [s], or
+            `ENDLESS_S`, and 1 if it is blocked, else 0.
         demand: (B, K), how many a victim needs on average over the tasks.
         worlds: (B, 3) half the side of the arena [m], rescue radius [m], most victims at a time.
     """
@@ -39,6 +44,7 @@ class TeamTables(NamedTuple):
     is_victim: Tensor
     places: Tensor
     needs: Tensor
+    waits: Tensor
     demand: Tensor
     worlds: Tensor
 
@@ -53,6 +59,7 @@ _SIZES = {
     "is_victim": "V",
     "places": "V2",
     "needs": "VK",
+    "waits": "V3",
     "demand": "K",
     "worlds": "3",
 }

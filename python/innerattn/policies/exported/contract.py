@@ -184,11 +184,16 @@ class PairRules:
         rescue_radius_m: how near a robot must be to help.
         robots_leave: whether robots that are not available are not in the arena.
         key_width: width of queries and keys, where the pooling is attention.
+        services_s: how long helpers stay at a victim of each task [s]; none where all are rescued
+            at touch.
+        longest_deadline_s: what shares of time left are shares of [s]; 0 without deadlines.
     """
 
     rescue_radius_m: float
     robots_leave: bool
     key_width: int
+    services_s: tuple[float, ...] = ()
+    longest_deadline_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -374,7 +379,12 @@ _NETWORK = record(
     pooling=one_of("attention", "mean", "max", "nearest"),
     pairs=optional(
         record(
-            PairRules, rescue_radius_m=number(least=0), robots_leave=flag, key_width=whole(1, 4097)
+            PairRules,
+            rescue_radius_m=number(least=0),
+            robots_leave=flag,
+            key_width=whole(1, 4097),
+            services_s=many(number(least=0)),
+            longest_deadline_s=number(least=0),
         )
     ),
 )
@@ -486,6 +496,8 @@ def _check_pairs(contract: Contract) -> None:
         return
     if network.entities is not None or network.frame is not None or not contract.actions:
         raise ValueError("network: the encoder 'pairs' needs actions, no entities and no frame")
+    if len(network.pairs.services_s) not in (0, len(contract.tasks)):
+        raise ValueError("network.pairs.services_s: must have an entry for each task, or none")
     if not contract.tasks:
         raise ValueError("tasks: has 0 entries: must have at least 1 for the encoder 'pairs'")
     for task in contract.tasks:

@@ -16,7 +16,7 @@ from innerattn.errors import ReadingError
 from innerattn.policies.exported.contract import MOST_NEEDS, Contract
 from innerattn.policies.exported.moves import GAINS_WIDTH, Moves
 from innerattn.policies.exported.roles import Roles, roles_of
-from innerattn.policies.exported.table import Bodies, Table, bodies_of, demand_of
+from innerattn.policies.exported.table import ENDLESS_S, Bodies, Table, bodies_of, demand_of
 
 Array = NDArray[np.float32]
 Numbers = NDArray[np.int64]
@@ -24,8 +24,9 @@ Mask = NDArray[np.bool_]
 Vector = tuple[float, float]
 
 NEAREST = 3
-"""Victims that a robot looks at, by its own arrival time."""
-PAIR_WIDTH, TURNING_WIDTH, HOME_WIDTH = 23, 10 + GAINS_WIDTH, 16 + GAINS_WIDTH
+"""Victims that a robot looks at, by its own arrival time; blocked ones come after all others."""
+_BLOCKED_S = np.float32(100.0)
+PAIR_WIDTH, TURNING_WIDTH, HOME_WIDTH = 27, 10 + GAINS_WIDTH, 16 + GAINS_WIDTH
 NEVER_S = 1e3
 """Arrival time of nobody [s]."""
 _LONGEST_S = 8.0
@@ -60,6 +61,10 @@ _ZERO, _ONE, _SHORTEST, _LONGEST, _NEVER = (
     _NEARER,
     _RIVALS,
     _PARTNERS,
+    _WAIT,
+    _LEFT,
+    _BLOCKED,
+    _TO_SPARE,
 ) = range(PAIR_WIDTH)
 """Columns of a pair."""
 _RANGES = {
@@ -73,6 +78,9 @@ _RANGES = {
     _NEARER: (-np.inf, 4.0),
     _RIVALS: (-np.inf, 6.0),
     _PARTNERS: (-np.inf, 6.0),
+    _WAIT: (-np.inf, 4.0),
+    _LEFT: (-np.inf, 8.0),
+    _TO_SPARE: (-3.0, 3.0),
 }
 """What columns are cut to."""
 _UNITS = {
@@ -89,6 +97,8 @@ _UNITS = {
     _NEARER: 3,
     _RIVALS: 3,
     _PARTNERS: 3,
+    _WAIT: 2,
+    _LEFT: 4,
 }
 """What they are divided by then."""
 _LOW, _HIGH = (
@@ -206,6 +216,8 @@ class Relating:
         late = np.maximum(self._bodies.lag * (_ONE - towards / self._speed), _ZERO)
         times = np.minimum(gap / self._speed + late * (gap > _ZERO), _LONGEST)
         own = times + known.never
+        if table.waits is not None:
+            own += _BLOCKED_S * table.waits[:, 2:]
         order = own.argsort(axis=0, kind="stable")
         ranks = order.argsort(axis=0)
         soonest = own.min(axis=0)
@@ -226,6 +238,8 @@ class Relating:
         columns[..., _OTHERS] = others
         columns[..., _LAST] = others - times
         columns[..., _NEARER] = nearer.sum(axis=2)
+        if table.waits is not None:
+            _add_waits(columns, table.waits, np.maximum(times, others) + known.never)
         np.maximum(columns, _LOW, out=columns)
         np.minimum(columns, _HIGH, out=columns)
         columns *= _SCALE
@@ -319,6 +333,8 @@ class Relating:
         columns[..., _CHOICES] = roles.useful.sum(axis=0)
         columns[..., _RIVALS] = roles.rivals.sum(axis=2)
         columns[..., _PARTNERS] = roles.partners.sum(axis=2)
+        columns[..., _LEFT] = ENDLESS_S
+        columns[..., _TO_SPARE] = ENDLESS_S
         count, size = roles.useful.shape
         return _Known(
             roles=roles,
@@ -339,6 +355,23 @@ class Relating:
         have = np.frombuffer(abilities, np.float32).reshape(-1, self._abilities)
         share = have[0] * (self._demand / np.maximum(have.sum(axis=0), np.float32(1.0)))
         return float(have[0].max()), float(share.max()), float(share.sum())
+
+
+def _add_waits(columns: Array, waits: Array, ready: Array) -> None:
+    """Columns of service, deadline and order.
+
+    Args:
+        columns: (M, R, PAIR_WIDTH), to be filled.
+        waits: (M, 3), as of `Table`.
+        ready: (M, R) when a robot and enough others could be there; `NEVER_S` or more where it
+            cannot help [s].
+    """
+    wait, left, blocked = waits[:, :1], waits[:, 1:2], waits[:, 2:]
+    complete = np.minimum(ready.min(axis=1, keepdims=True), _NEVER)
+    columns[..., _WAIT] = wait
+    columns[..., _LEFT] = left
+    columns[..., _BLOCKED] = blocked
+    columns[..., _TO_SPARE] = np.where(left < ENDLESS_S, left - complete - wait, ENDLESS_S)
 
 
 def _when_filled(times: Array, known: _Known) -> Array:

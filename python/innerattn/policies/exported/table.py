@@ -14,6 +14,10 @@ from innerattn.policies.exported.motion import final_speed_and_lag
 Array = NDArray[np.float32]
 
 
+ENDLESS_S = 1e3
+"""Time until a victim without a deadline is lost [s]."""
+
+
 class Table(NamedTuple):
     """What one robot sees of R robots, itself first, and of the M victims that wait.
 
@@ -24,6 +28,9 @@ class Table(NamedTuple):
         there: R flags, which robots are in the arena and heard.
         victims: (2, M) float32, x and y of victims [m].
         needs: (M, K) float32, how many robots or how much of each ability a victim needs.
+        waits: (M, 3) float32, service that a victim still needs [s], time until it is lost [s],
+            `ENDLESS_S` where it never is, and 1 if it is blocked, else 0; None where no victim of
+            this team ever has any of it.
     """
 
     places: Array
@@ -32,6 +39,7 @@ class Table(NamedTuple):
     there: list[bool]
     victims: Array
     needs: Array
+    waits: Array | None = None
 
 
 class Bodies(NamedTuple):
@@ -77,8 +85,20 @@ class TableReader:
         self._team = np.add.outer(blocks, np.arange(layout.available + 1))
         slots = begin + np.arange(contract.victim_slots) * layout.victim
         self._victims = np.add.outer(slots, np.arange(layout.place + 2))
-        assert contract.network.pairs is not None  # as such a policy has them
-        self._leave = contract.network.pairs.robots_leave
+        rules = contract.network.pairs
+        assert rules is not None  # as such a policy has them
+        self._leave = rules.robots_leave
+        first = layout.place + 2
+        self._times = {name: first + number for number, name in enumerate(layout.times)}
+        if self._times:
+            slots = begin + np.arange(contract.victim_slots) * layout.victim
+            self._victims = np.add.outer(slots, np.arange(first + len(self._times)))
+        self._place = layout.place
+        self._deadline = np.float32(rules.longest_deadline_s)
+        self._services: dict[bytes, float] = {}
+        for task, service in zip(contract.tasks, rules.services_s):
+            needs = np.array([task.amount(one) for one in contract.abilities], np.float32).tobytes()
+            self._services[needs] = max(service, self._services.get(needs, 0.0))
 
     def table(self, row: Array) -> Table:
         """The table of a row (D,)."""
@@ -96,9 +116,27 @@ class TableReader:
             velocities=team[:, 2:4].T,
             abilities=team[:, 4:-1] * available[:, None],
             there=there,
-            victims=(victims[:, -2:] + team[0, :2]).T,
-            needs=victims[:, 1:-2],
+            victims=(victims[:, self._place : self._place + 2] + team[0, :2]).T,
+            needs=victims[:, 1 : self._place],
+            waits=self._waits(victims) if self._times else None,
         )
+
+    def _waits(self, victims: Array) -> Array:
+        """As `Table.waits`, from the columns of victims."""
+        found = np.zeros((len(victims), 3), np.float32)
+        found[:, 1] = ENDLESS_S
+        times = self._times
+        if "served" in times:
+            left = np.float32(1.0) - victims[:, times["served"]]
+            needs = (one.tobytes() for one in victims[:, 1 : self._place])
+            services = [self._services.get(one, 0.0) for one in needs]
+            found[:, 0] = left * np.array(services, np.float32)
+        if "time_left" in times:
+            share = victims[:, times["time_left"]]
+            found[:, 1] = np.where(share < 1.0, share * self._deadline, np.float32(ENDLESS_S))
+        if "blocked" in times:
+            found[:, 2] = victims[:, times["blocked"]]
+        return found
 
 
 def bodies_of(contract: Contract, order: list[int]) -> Bodies:

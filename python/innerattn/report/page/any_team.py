@@ -86,6 +86,11 @@ def _known(scenario: Scenario, columns: Sequence[str]) -> dict[str, Any]:
         way = ["relative_position.x", "relative_position.y"]
         return [place[f"{who}.{quantity}"] for quantity in ("present", *needs, *way)]
 
+    def of_victims(what: str) -> list[int]:
+        """That column of each victim; nothing where there is none."""
+        names = (f"victim_{slot}.{what}" for slot in range(scenario.num_victims))
+        return [place[name] for name in names if name in place]
+
     bodies = Steering(scenario).bodies().astype(np.float32)
     asked = [sum(task.amount(one) for task in scenario.tasks) for one in abilities]
     demand = np.array([total / len(scenario.tasks) for total in asked], np.float32)
@@ -93,6 +98,14 @@ def _known(scenario: Scenario, columns: Sequence[str]) -> dict[str, Any]:
     return {
         "team": [of_robot("own", ""), *(of_robot(f"teammate_{k}", "relative_") for k in mates)],
         "victims": [of_victim(f"victim_{slot}") for slot in range(scenario.num_victims)],
+        "served": of_victims("served"),
+        "timeLeft": of_victims("time_left"),
+        "blocked": of_victims("blocked"),
+        "services": [
+            {"needs": [task.amount(one) for one in abilities], "seconds": task.service_s}
+            for task in scenario.tasks
+        ],
+        "longestDeadline": scenario.longest_deadline_s,
         "bodies": bodies.tolist(),
         "demand": demand.tolist(),
         "half": scenario.arena_half_width_m,

@@ -13,6 +13,7 @@ from innerattn.config import Scenario
 from innerattn.config.refusals import refuse_stores_drives_and_senses
 from innerattn.errors import ConfigError
 from innerattn.nn.teams import TeamTables
+from innerattn.nn.teams.tables import ENDLESS_S
 from innerattn.policies.scripted.steering import Steering
 
 SENSES = {
@@ -88,6 +89,16 @@ class TeamSheet:
         self._present = [place[f"{victim}.present"] for victim in victims]
         self._needs = [columns(one, [f"need.{a}" for a in abilities]) for one in victims]
         self._places = [columns(victim, relative) for victim in victims]
+        self._served, self._time_left, self._blocked = (
+            [place[f"{victim}.{what}"] for victim in victims if f"{victim}.{what}" in place]
+            for what in ("served", "time_left", "blocked")
+        )
+        self._services = torch.tensor([task.service_s for task in scenario.tasks])
+        self._wanted = torch.tensor(
+            [[task.amount(ability) for ability in abilities] for task in scenario.tasks],
+            dtype=torch.float32,
+        )
+        self._longest_deadline_s = scenario.longest_deadline_s
         # For each robot, which teammates come before it in the team.
         robots = range(self.num_robots)
         self._order = torch.tensor(
@@ -165,10 +176,29 @@ class TeamSheet:
             abilities=abilities * available[..., None],
             is_victim=present,
             places=places,
-            needs=seen[:, self._needs] * present[..., None],
+            needs=(needs := seen[:, self._needs] * present[..., None]),
+            waits=self._waits(seen, needs) * present[..., None],
             demand=self._demand.expand(count, -1),
             worlds=self._worlds.expand(count, -1),
         )
+
+    def _waits(self, seen: Tensor, needs: Tensor) -> Tensor:
+        """(B, V, 3), as of `TeamTables`, from rows and needs of victims.
+
+        Of tasks with the same needs, the longest service counts.
+        """
+        found = torch.zeros(*needs.shape[:2], 3)
+        found[..., 1] = ENDLESS_S
+        if self._served:
+            alike = (needs.unsqueeze(2) == self._wanted).all(-1)  # (B, V, tasks)
+            service = (alike * self._services).amax(-1)
+            found[..., 0] = (1.0 - seen[:, self._served]) * service
+        if self._time_left:
+            share = seen[:, self._time_left]
+            found[..., 1] = torch.where(share < 1.0, share * self._longest_deadline_s, ENDLESS_S)
+        if self._blocked:
+            found[..., 2] = seen[:, self._blocked]
+        return found
 
     def own_rows(self, rows: Tensor) -> Tensor:
         """Of rows for all robots of all tables, (B * R, ...), those of who acts: (E * R, ...)."""

@@ -1,7 +1,9 @@
 // What a robot for any team makes of its row: one list of numbers for each pair of a robot and a victim. See
 // innerattn.policies.exported.table and innerattn.policies.exported.pairs; numbers are rounded as there.
 
-const NEAREST = 3; // victims that a robot looks at, by its own arrival time
+const NEAREST = 3; // victims that a robot looks at, by its own arrival time; blocked ones come after all others
+const BLOCKED_S = 100;
+const ENDLESS_S = 1000; // time until a victim without a deadline is lost
 const NOBODY_S = 1000; // arrival time of nobody
 const LONGEST_S = 8; // beyond this, arrival times tell no more
 const FARTHEST_M = 2;
@@ -17,6 +19,7 @@ const COLUMNS = Object.entries({
   later: { least: 0, most: 4 }, choices: { unit: 3 }, without: { least: -3, most: 3 }, others: { most: 4 },
   last: { least: -3, most: 3 }, nearer: { most: 4, unit: 3 },
   rivals: { most: 6, unit: 3 }, partners: { most: 6, unit: 3 },
+  wait: { most: 4, unit: 2 }, left: { most: LONGEST_S, unit: 4 }, blocked: {}, toSpare: { least: -3, most: 3 },
 });
 
 const cut = (value, least = -Infinity, most = Infinity) => Math.min(Math.max(value, least), most);
@@ -53,7 +56,9 @@ class Relating {
     const ready = rows.map((one) => one.at(-1) > 0.5), heard = rows.slice(1).map((one) => one.some(Boolean));
     const [x, y, vx, vy] = rows[0], isOwn = (index) => index === 0;
     const from = (index, start, value) => (isOwn(index) ? value : single(value + start));
-    const waiting = victims.map((columns) => columns.map((one) => row[one])).filter(([present]) => present > 0.5);
+    const found = victims.map((columns) => columns.map((one) => row[one]));
+    const slots = found.flatMap(([present], slot) => (present > 0.5 ? [slot] : []));
+    const waiting = slots.map((slot) => found[slot]);
     return {
       places: rows.map((one, index) => [from(index, x, one[0]), from(index, y, one[1])]),
       velocities: rows.map((one, index) => [from(index, vx, one[2]), from(index, vy, one[3])]),
@@ -61,6 +66,20 @@ class Relating {
       there: leave ? ready : [true, ...heard], // nothing is known of who is not heard
       victims: waiting.map((one) => one.slice(-2).map((way, axis) => single(way + [x, y][axis]))),
       needs: waiting.map((one) => one.slice(1, -2)),
+      waits: slots.map((slot) => this.waits(row, slot, found[slot].slice(1, -2))),
+    };
+  }
+
+  /** Of a victim: the service that it still needs [s], the time until it is lost [s], and whether it is blocked. */
+  waits(row, slot, needs) {
+    const { served, timeLeft, blocked, services, longestDeadline } = this.known;
+    const alike = services.filter((one) => one.needs.every((need, sort) => need === needs[sort]));
+    const service = single(Math.max(0, ...alike.map(({ seconds }) => seconds)));
+    const share = timeLeft.length ? row[timeLeft[slot]] : 1;
+    return {
+      wait: served.length ? single(single(1 - row[served[slot]]) * service) : 0,
+      left: share < 1 ? single(share * single(longestDeadline)) : ENDLESS_S,
+      blocked: blocked.length ? row[blocked[slot]] : 0,
     };
   }
 
@@ -77,13 +96,13 @@ class Relating {
     )));
     const times = ways.map((robots) => robots.map(({ time }) => time));
     const own = places.map((_, robot) => times.map((all, victim) => (
-      roles[victim].useful[robot] ? all[robot] : single(all[robot] + NOBODY_S)
+      single(all[robot] + (roles[victim].useful[robot] ? 0 : NOBODY_S) + BLOCKED_S * table.waits[victim].blocked)
     )));
     const choices = places.map((_, robot) => roles.filter(({ useful }) => useful[robot]).length);
     const soonest = own.map((all) => Math.min(NOBODY_S, ...all)), ranks = own.map(ranksOf);
     const isThere = (victim, robot) => roles[victim].useful[robot] && ranks[robot][victim] < NEAREST;
     const cells = ways.map((robots, victim) => {
-      const shared = this.atVictim(roles[victim], robots, times[victim], needs.length);
+      const shared = this.atVictim(roles[victim], robots, times[victim], needs.length, table.waits[victim]);
       return robots.map((way, robot) => isThere(victim, robot) && columnsOf({
         ...shared(robot), rank: ranks[robot][victim], choices: choices[robot], later: way.time - soonest[robot],
       }));
@@ -106,19 +125,22 @@ class Relating {
     return { way, distance, towards, time: Math.min(single(single(gap / speed) + late), LONGEST_S) };
   }
 
-  /** What can be told of a robot at one victim, by the robot's number. */
-  atVictim(roles, ways, times, waiting) {
+  /** What can be told of a robot at one victim, which `waits`, by the robot's number. */
+  atVictim(roles, ways, times, waiting, { wait, left, blocked }) {
     const { half, victims } = this.known, { needed, useful, sets, spare } = roles;
     const inside = ways.map(({ distance }, robot) => distance <= this.radius && useful[robot]);
     const met = Math.min(...sets.map(({ helps, elsewhere }) => (
       single(helps.filter((help, robot) => help && inside[robot]).length + elsewhere)
     )));
-    const filled = fillingTimes(roles, times), count = (flags) => flags.filter(Boolean).length;
+    const fill = fillingTimes(roles, times), filled = times.map((_, robot) => fill(robot));
+    const ready = filled.map(({ others }, robot) => (useful[robot] ? Math.max(others, times[robot]) : NOBODY_S));
+    const complete = Math.min(...ready), count = (flags) => flags.filter(Boolean).length;
+    const toSpare = left < ENDLESS_S ? single(single(left - complete) - wait) : ENDLESS_S;
     return (robot) => {
       const { distance, towards, time } = ways[robot], { speed, push } = this.bodies[robot];
-      const { without, others } = filled(robot), rivals = roles.rivals[robot];
+      const { without, others } = filled[robot], rivals = roles.rivals[robot];
       return {
-        distance, towards, time, needed, met, spare, others, push, waiting,
+        distance, towards, time, needed, met, spare, others, push, waiting, wait, left, blocked, toSpare,
         inside: Number(inside[robot]), fills: roles.filledBy[robot], spareMine: roles.spareMine[robot],
         speed: Math.max(speed, LEAST), arena: half, mostWaiting: victims.length,
         without: single(without - time), last: single(others - time),
