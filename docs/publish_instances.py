@@ -1,8 +1,8 @@
 """Makes the worlds of the set `standard` and lists them in `docs/instances.md`.
 
 `python docs/publish_instances.py` draws 300 worlds if their file is not there, and lets scripts and
-the policy for any team play them. It takes some twenty minutes of one core. `SEED` fixes the worlds; one that no script
-does well enough in is drawn anew.
+the policy for any team play them. It takes some twenty minutes of one core. `SEED` fixes the
+worlds; one that no script does well enough in is drawn anew.
 """
 
 from __future__ import annotations

@@ -54,6 +54,15 @@ class MixedBatchEnv(Shown):
         num_threads: how many batches step at a time, 1 to 256; None: one for each core. Where it
             is above 1, let each batch step with one thread.
 
+    Attributes:
+        batches: as they were given.
+        layout: names of the columns of `Entities`, and how many teammates and victims it has.
+        num_envs: worlds B of all batches.
+        num_robots: robots N of all worlds.
+        world_of_robot: (N,) int64, in which world each robot is.
+        batch_of_world: (B,) int64, of which batch each world is.
+        num_threads: how many batches step at a time.
+
     Raises:
         TypeError: what is no `BatchEnv`.
         ValueError: no batch, one that is there twice, both kinds of actions, or a number of threads

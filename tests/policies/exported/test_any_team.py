@@ -249,6 +249,14 @@ def put(place: str, value: object) -> Change:
         ),
         (put("tasks", []), "tasks: has 0 entries: must have at least 1 for the encoder 'pairs'"),
         (put("network.pairs.rescue_radius_m", -0.1), r"network\.pairs\.rescue_radius_m: is -0\.1"),
+        (
+            put("network.pairs.services_s", [1.0]),
+            "network.pairs.services_s: must have an entry for each task, or none",
+        ),
+        (
+            put("network.pairs.longest_deadline_s", -1.0),
+            r"network\.pairs\.longest_deadline_s: is -1\.0",
+        ),
         (put("network.hidden_width", 47), r": has shape \(.*48\), must have \(.*47\)"),
         (put("network.pairs.key_width", 8), r"rivals\.key\.weight: has shape \(16, 48\), must"),
         (put("network.pooling", "max"), r"partners\.key\.weight: is missing or unknown"),
