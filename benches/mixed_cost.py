@@ -8,20 +8,17 @@ its place in `docs/performance.md`.
 from __future__ import annotations
 
 import statistics
-import time
 from collections.abc import Callable
 from itertools import cycle
 
 import numpy as np
+from in_turns import rates
 from page import machine, publish, table
 
-from innerattn.config import Scenario
-from innerattn.config.family import Family
+from innerattn.config import Family, Scenario
 from innerattn.envs import BatchEnv, MixedBatchEnv
 
 TEAMS, WORLDS = 16, 64
-ROUNDS = 15
-ROUND_S = 0.3
 Act = Callable[[], object]
 
 
@@ -67,20 +64,6 @@ def of_unlike_teams(base: Scenario) -> dict[str, Act]:
     }
 
 
-def rates(acts: dict[str, Act]) -> dict[str, list[float]]:
-    """Env-steps a second, one number a round; all take turns in every round."""
-    found: dict[str, list[float]] = {name: [] for name in acts}
-    for round_index in range(ROUNDS + 1):
-        for name, act in acts.items():
-            count, start = 0, time.perf_counter()
-            while time.perf_counter() - start < ROUND_S:
-                act()
-                count += 1
-            if round_index:
-                found[name].append(count * TEAMS * WORLDS / (time.perf_counter() - start))
-    return found
-
-
 def main() -> None:
     """Measure and publish."""
     head = ["env-steps/s", *(cell for engine in ("rapier", "discs") for cell in (engine, "share"))]
@@ -88,7 +71,7 @@ def main() -> None:
     for engine in ("rapier", "discs"):
         scenario = Scenario.preset("mixed").replace(engine=engine)
         for acts in (of_one_team(scenario), of_unlike_teams(Scenario().replace(engine=engine))):
-            found = rates(acts)
+            found = rates(acts, TEAMS * WORLDS)
             base = next(iter(found.values()))
             for name, speeds in found.items():
                 share = statistics.median(a / b for a, b in zip(speeds, base, strict=True))

@@ -8,7 +8,6 @@ VMAS are left out where they are not installed.
 from __future__ import annotations
 
 import statistics
-import time
 from collections.abc import Callable
 from importlib.util import find_spec
 from itertools import cycle
@@ -16,14 +15,13 @@ from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
+from in_turns import rates
 from page import machine, publish, table
 
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv, RescueVectorEnv
 
 NUM_ENVS = 1_024
-ROUNDS = 15
-ROUND_S = 0.3
 Step = Callable[[], Any]
 
 
@@ -70,26 +68,12 @@ def contestants(engine: str) -> dict[str, Step]:
     return steps
 
 
-def rates(steps: dict[str, Step]) -> dict[str, list[float]]:
-    """Env-steps a second, one number a round; all take turns in every round."""
-    found: dict[str, list[float]] = {name: [] for name in steps}
-    for round_index in range(ROUNDS + 1):
-        for name, step in steps.items():
-            count, start = 0, time.perf_counter()
-            while time.perf_counter() - start < ROUND_S:
-                step()
-                count += 1
-            if round_index:
-                found[name].append(count * NUM_ENVS / (time.perf_counter() - start))
-    return found
-
-
 def main() -> None:
     """Measure and publish."""
     head = ["env-steps/s", *(cell for engine in ("rapier", "discs") for cell in (engine, "share"))]
     rows: dict[str, list[str]] = {}
     for engine in ("rapier", "discs"):
-        found = rates(contestants(engine))
+        found = rates(contestants(engine), NUM_ENVS)
         base = found["BatchEnv, copy=False"]
         for name, speeds in found.items():
             share = statistics.median(a / b for a, b in zip(speeds, base, strict=True))
