@@ -99,7 +99,8 @@ class Family(Model):
         base = Scenario() if base is None else base
         for attempt in range(_TRIES):
             try:
-                return base.replace(**self._values(rng, base, (seed, number, attempt)))
+                timing = np.random.default_rng([seed, number, attempt, 1])
+                return base.replace(**self._values(rng, timing, base))
             except ConfigError as error:
                 reason = error
         raise ConfigError(
@@ -107,9 +108,9 @@ class Family(Model):
         )
 
     def _values(
-        self, rng: np.random.Generator, base: Scenario, entropy: tuple[int, ...]
+        self, rng: np.random.Generator, timing: np.random.Generator, base: Scenario
     ) -> dict[str, Any]:
-        """What is drawn; ``entropy`` is for what has a random stream of its own."""
+        """What is drawn; ``timing`` draws how long tasks take, and changes nothing else."""
         count = _whole(rng, self.robots)
         abilities = [f"ability_{index}" for index in range(_whole(rng, self.abilities))]
         team = self._team(rng, count, abilities)
@@ -126,7 +127,7 @@ class Family(Model):
             "max_victims": min(_whole(rng, self.max_victims), max(2, count)),
             "faults": self._faults(rng, count, base.episode_steps),
         }
-        self._let_tasks_take_time(np.random.default_rng([*entropy, 1]), tasks)
+        self._let_tasks_take_time(timing, tasks)
         if rng.random() >= self.usual_arena:
             low, high = self.arena_half_width_m
             high += self.arena_growth_m * max(0, count - 4)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from sys import getrefcount
-from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -214,12 +213,7 @@ class MixedBatchEnv(Shown):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _by_batch(self, of_robots: NDArray[np.generic]) -> Iterator[NDArray[np.generic]]:

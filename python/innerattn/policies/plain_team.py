@@ -210,6 +210,7 @@ def newest_tensors(files: RunFiles) -> Mapping[str, NDArray[np.float32]]:
 
 def pair_network(team: TeamConfig, scenario: Scenario) -> Network:
     """That of a policy for any team in the worlds of ``scenario``."""
+    services = tuple(task.service_s for task in scenario.tasks) if scenario.has_services else ()
     return Network(
         encoder="pairs",
         hidden_width=team.hidden_width,
@@ -221,15 +222,10 @@ def pair_network(team: TeamConfig, scenario: Scenario) -> Network:
             scenario.rescue_radius_m,
             scenario.robots_leave,
             team.key_width,
-            services_of(scenario),
+            services,
             scenario.longest_deadline_s,
         ),
     )
-
-
-def services_of(scenario: Scenario) -> tuple[float, ...]:
-    """The service of each task [s]; none where no task has one."""
-    return tuple(task.service_s for task in scenario.tasks) if scenario.has_services else ()
 
 
 def beyond_numpy(config: RunConfig) -> str | None:

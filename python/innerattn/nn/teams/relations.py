@@ -21,7 +21,7 @@ NEAREST = 3
 """Victims that a robot looks at, by its own arrival time."""
 _LONGEST_S = 8.0
 """Beyond this, arrival times tell no more."""
-BLOCKED_S = 100.0
+_BLOCKED_S = 100.0
 """What the arrival time at a blocked victim is longer, where victims are put in order [s]."""
 _MOST_NEARER, _MOST_OTHERS = 4, 6
 """Beyond these numbers of rivals and partners, more of them change nothing."""
@@ -98,7 +98,7 @@ def relate(tables: TeamTables) -> Relations:
     place = (world[:, None] * size + torch.arange(size)) * slots + slot[:, None]  # (M, R)
     own = torch.full((envs * size * slots,), NEVER_S)
     wait, left, blocked = (column[:, None] for column in tables.waits[world, slot].unbind(-1))
-    own[place] = torch.where(useful, times + BLOCKED_S * blocked, NEVER_S)
+    own[place] = torch.where(useful, times + _BLOCKED_S * blocked, NEVER_S)
     own = own.view(envs * size, slots)
     order = own.argsort(stable=True, dim=1)
     rank = torch.empty_like(order).scatter_(1, order, torch.arange(slots).expand_as(order))
@@ -132,8 +132,9 @@ def relate(tables: TeamTables) -> Relations:
         nearer.clamp(max=_MOST_NEARER) / 3.0,
         rivals.sum(-1).clamp(max=_MOST_OTHERS) / 3.0,
         partners.sum(-1).clamp(max=_MOST_OTHERS) / 3.0,
-        *(at_victim := _waits(wait, left, blocked, teams.complete[:, None])),
     ]
+    at_victim = _waits(wait, left, blocked, teams.complete[:, None])
+    columns += at_victim
     rows = torch.stack([column.expand_as(times).float() for column in columns], -1)
     cells = (useful & (ranks < NEAREST)).view(-1).nonzero().squeeze(1)
     victim, robot = cells // size, cells % size

@@ -167,6 +167,7 @@ class TeamSheet:
         count, robots = positions.shape[:2]
         present = seen[:, self._present] > 0.5
         places = (seen[:, self._places] + own[:, None]) * present[..., None]
+        needs = seen[:, self._needs] * present[..., None]
         return TeamTables(
             is_robot=torch.ones(count, robots, dtype=torch.bool),
             is_there=available if self._leave else heard,
@@ -176,7 +177,7 @@ class TeamSheet:
             abilities=abilities * available[..., None],
             is_victim=present,
             places=places,
-            needs=(needs := seen[:, self._needs] * present[..., None]),
+            needs=needs,
             waits=self._waits(seen, needs) * present[..., None],
             demand=self._demand.expand(count, -1),
             worlds=self._worlds.expand(count, -1),
