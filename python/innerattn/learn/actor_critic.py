@@ -33,6 +33,7 @@ from innerattn.nn import (
     ListeningActor,
     RememberingCritic,
     action_noise,
+    batch_last_in_memory,
     robots_of_each_kind,
 )
 
@@ -108,6 +109,7 @@ class ActorCritic:
             )
         self._availability_column = column if network.mask_unavailable else None
         self._device, self._dtype = device, dtype
+        self._by_entity = network.encoder == "entities"
         self._bfloat16 = network.precision == "bfloat16"
         self._first_rate, self._final_share = learning_rate, final_learning_rate_share
         self._rate = learning_rate
@@ -459,7 +461,11 @@ class ActorCritic:
 
     def _robots_first(self, obs: Tensor) -> Tensor:
         """Bring (B, R, D) to (R, B, D), as the networks take it, on their device and dtype."""
-        return obs.to(self._device, self._dtype).transpose(0, 1)
+        return self._laid_out(obs.to(self._device, self._dtype).transpose(0, 1))
+
+    def _laid_out(self, obs: Tensor) -> Tensor:
+        """Observations (R, B, D) in the order in memory that the networks read fastest."""
+        return batch_last_in_memory(obs) if self._by_entity else obs
 
     def _turned_by(self, elements: Tensor | None) -> Tensor | None:
         """Bring elements (B, R), if there are any, to (R, B) on the networks' device."""

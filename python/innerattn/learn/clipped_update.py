@@ -49,6 +49,7 @@ class ClippedUpdate(ActorCritic):
         Returns:
             (8,) the metrics that `learn` names, in that order.
         """
+        rows = rows._replace(obs=self._laid_out(rows.obs))
         return self._update(*rows.tensors(), self._number(self._entropy_weight))
 
     def _update_networks(

@@ -39,8 +39,8 @@ from innerattn.learn.rollout import (
 )
 from innerattn.learn.types import Scheduled, Team, Transitions
 
-_CHUNK = 1024
-"""Rows whose values are computed at a time."""
+_CHUNK = 4096
+"""Rows of single robots whose values are computed at a time."""
 
 
 @dataclass
@@ -266,9 +266,10 @@ class PPO(ClippedUpdate):
             log_probs: (R, A, B) of all discrete actions, if they are known.
         """
         parts = []
-        for first in range(0, obs.shape[1], _CHUNK):
-            chunk = slice(first, first + _CHUNK)
-            some_obs, some_actions = obs[:, chunk], actions[:, chunk]
+        rows = max(1, _CHUNK // len(obs))
+        for first in range(0, obs.shape[1], rows):
+            chunk = slice(first, first + rows)
+            some_obs, some_actions = self._laid_out(obs[:, chunk]), actions[:, chunk]
             of_actor, of_critic = recalls(None if recall is None else recall.steps(chunk))
             seen, available = self._seen_in(some_obs), self._available(some_obs)
             q = self.critic(seen, some_actions, available, *of_critic).q

@@ -16,7 +16,7 @@ from innerattn.nn.attention import (
     UniformAttention,
 )
 from innerattn.nn.critic import Critic, CriticOutput, VectorCritic
-from innerattn.nn.encoder import EntityColumns, EntityEncoder
+from innerattn.nn.encoder import EntityColumns, EntityEncoder, batch_last_in_memory
 from innerattn.nn.joint_critic import CentralCritic, JointCritic
 from innerattn.nn.linear import PerRobotLinear, swap_robots
 from innerattn.nn.memory import Memory, Remembering, RememberingActor, RememberingCritic
@@ -59,6 +59,7 @@ __all__ = [
     "VectorColumns",
     "VectorCritic",
     "action_noise",
+    "batch_last_in_memory",
     "is_shared_by_kind",
     "robots_of_each_kind",
     "sample_actions",

@@ -136,14 +136,16 @@ class EntityEncoder(nn.Module):
         if self.query is not None:
             queries = self.query.batch_last(own.transpose(1, 2)) * _HEAD_WIDTH**-0.5
         blocks = _blocks(victims, columns.victims)
-        there = blocks[..., columns.present] > _YES
+        encoded = _encoded(self.victim, blocks)
+        there = blocks[:, columns.present] > _YES
         asked = None if queries is None else queries[:, :width]
-        parts = [own, self._pool(self.victim, blocks, there, columns.victim_place, asked)]
+        parts = [own, self._pool(encoded, blocks, there, columns.victim_place, asked)]
         if self.teammate is not None:
             blocks = _blocks(teammates, columns.teammates)
+            encoded = _encoded(self.teammate, blocks)
             known, place = self._known(blocks), columns.teammate_place
             asked = None if queries is None else queries[:, width:]
-            parts.append(self._pool(self.teammate, blocks, known, place, asked))
+            parts.append(self._pool(encoded, blocks, known, place, asked))
         hidden: Tensor = self.output(torch.cat(parts, dim=1).transpose(1, 2))
         return hidden
 
@@ -165,33 +167,36 @@ class EntityEncoder(nn.Module):
         own = functional.leaky_relu_(self.own.batch_last(own))
         queries = self.query.batch_last(own.transpose(1, 2)) * _HEAD_WIDTH**-0.5
         blocks = _blocks(obs[..., columns.own : mates], columns.teammates)
-        encoded = functional.leaky_relu_(self.teammate.batch_last(blocks.flatten(1, 2)))
-        robots, entities, batch, _ = blocks.shape
-        encoded = encoded.view(robots, self._heads, _HEAD_WIDTH, entities, batch)
-        asked = queries[:, own.shape[1] :].view(robots, self._heads, _HEAD_WIDTH, 1, batch)
-        return _weights(encoded, asked, self._known(blocks))
+        encoded = _encoded(self.teammate, blocks)
+        return _weights(*self._by_head(encoded, queries[:, own.shape[1] :]), self._known(blocks))
 
     def _known(self, teammates: Tensor) -> Tensor | None:
-        """(R, K, B) bool: which teammates (R, K, B, columns) are there; None: all are."""
+        """(R, K, B) bool: which teammates (R, columns, K, B) are there; None: all are."""
         if self._columns.seen is not None:
-            return teammates[..., self._columns.seen] > _YES
+            return teammates[:, self._columns.seen] > _YES
         if self._pooling == "attention":
             return None
-        return (teammates != 0.0).any(dim=3)
+        return (teammates != 0.0).any(dim=1)
+
+    def _by_head(self, encoded: Tensor, queries: Tensor) -> tuple[Tensor, Tensor]:
+        """Encodings (R, W, K, B) as (R, H, d, K, B), and queries (R, W, B) as (R, H, d, 1, B)."""
+        robots, _, entities, batch = encoded.shape
+        shape = (robots, self._heads, _HEAD_WIDTH)
+        return encoded.view(*shape, entities, batch), queries.view(*shape, 1, batch)
 
     def _pool(
         self,
-        layer: PerRobotLinear,
+        encoded: Tensor,
         blocks: Tensor,
         there: Tensor | None,
         place: tuple[int, int] | None,
         queries: Tensor | None,
     ) -> Tensor:
-        """Encode entities and sum them up.
+        """Sum up the encodings of entities.
 
         Args:
-            layer: Encodes an entity.
-            blocks: (R, K, B, columns), K entities.
+            encoded: (R, W, K, B), K entities.
+            blocks: (R, columns, K, B), of what.
             there: (R, K, B) bool, the entities that are there; None: all are.
             place: Columns x and y of an entity's place.
             queries: (R, W, B), divided by sqrt(d), if the pooling is "attention".
@@ -199,23 +204,25 @@ class EntityEncoder(nn.Module):
         Returns:
             (R, W, B).
         """
-        robots, entities, batch, _ = blocks.shape
-        encoded = functional.leaky_relu_(layer.batch_last(blocks.flatten(1, 2)))
         if queries is not None:
-            encoded = encoded.view(robots, self._heads, _HEAD_WIDTH, entities, batch)
-            asked = queries.view(robots, self._heads, _HEAD_WIDTH, 1, batch)
-            return _attend(encoded, asked, there).view(robots, -1, batch)
+            return _attend(*self._by_head(encoded, queries), there).flatten(1, 2)
         assert there is not None  # as only "attention" takes all
-        encoded = encoded.view(robots, -1, entities, batch)
         if self._pooling == "max":
             return largest(encoded, there.unsqueeze(1), dim=2)
         if self._pooling == "nearest":
             assert place is not None  # as checked where it was made
-            x, y = (blocks[..., axis] for axis in place)
+            x, y = (blocks[:, axis] for axis in place)
             weights = nearest_one(there, x.square() + y.square()).to(encoded.dtype)
         else:
             weights = equal_weights(there, 1, encoded.dtype)
         return (weights.unsqueeze(1) * encoded).sum(dim=2)
+
+
+def _encoded(layer: PerRobotLinear, blocks: Tensor) -> Tensor:
+    """Encodings (R, W, K, B) of K entities (R, columns, K, B)."""
+    encoded = torch.bmm(layer.weight, blocks.flatten(2)).to(layer.weight.dtype)
+    encoded = functional.leaky_relu_(encoded.add_(layer.bias.unsqueeze(2)))
+    return encoded.view(len(blocks), -1, *blocks.shape[2:])
 
 
 def _attend(encoded: Tensor, asked: Tensor, there: Tensor | None) -> Tensor:
@@ -250,10 +257,21 @@ def _weights(encoded: Tensor, asked: Tensor, there: Tensor | None) -> Tensor:
     return scores.softmax(dim=2) * seen
 
 
+def batch_last_in_memory(obs: Tensor) -> Tensor:
+    """The observations (R, B, D), in memory (R, D, B).
+
+    An `EntityEncoder` reads them several times faster so, above all in a compiled update.
+    """
+    return obs.transpose(1, 2).contiguous().transpose(1, 2)
+
+
 def _blocks(columns: Tensor, count: int) -> Tensor:
-    """Bring the columns of ``count`` entities (R, B, count * n) to (R, count, B, n)."""
+    """Bring the columns of ``count`` entities (R, B, count * n) to (R, n, count, B), a copy.
+
+    Whatever reads one column of all entities, such as which are there, then reads along memory.
+    """
     robots, batch, width = columns.shape
-    return columns.view(robots, batch, count, width // count).transpose(1, 2)
+    return columns.view(robots, batch, count, width // count).permute(0, 3, 2, 1).contiguous()
 
 
 def observation_encoder(
