@@ -206,6 +206,8 @@ BRIEF: Mapping[str, Brief] = {
             ("--seed N", "seed of the worlds to play in, or of the planner"),
             ("--episode N", "which episode a moving picture shows"),
             ("--robot NAME", "robot whose attention a moving picture shows"),
+            ("--attention WHO", "of the critic or the actor, in a moving picture"),
+            ("--moments FILE", "TOML file with moments that the page lists"),
             ("--instance FILE", "show an instance: ral:ral_03, standard:sums_8_3"),
             ("--time-limit-ms N", "how long planner searches for it (1000)"),
         ),

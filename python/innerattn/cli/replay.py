@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from innerattn.records import Record
 
 SUFFIXES = (".html", ".gif", ".mp4")
-_OF_WORLDS = ("episodes", "scenario", "episode", "robot")
+_OF_WORLDS = ("episodes", "scenario", "episode", "robot", "attention", "moments")
 """Options that have no meaning for an instance."""
 
 
@@ -54,6 +54,10 @@ class Replay(Command):
     """Number of the episode in a moving picture; None: that with most handoffs and rescues."""
     robot: str | None = None
     """Robot whose attention a moving picture shows, or all; None: the first that hands over."""
+    attention: Literal["critic", "actor"] | None = None
+    """Whose attention a moving picture shows; None: of the critic, if it has any."""
+    moments: Path | None = None
+    """TOML file with moments that the page lists, with a text and a link for each."""
     instance: str | None = None
     """Show this instance instead: a JSON file, or ral or standard, and a name, as in ral:ral_03;
     without a name the first. Points are shown with a schedule, worlds with an episode."""
@@ -91,14 +95,21 @@ class Replay(Command):
         anew = world is not None or self._plays_anew()
         records = self._played(world) if anew else self._recorded()
         if self.output.suffix == ".html":
-            from innerattn.report.replay import replay_page
+            from innerattn.report.replay import read_moments, replay_page
 
-            write_whole(self.output, replay_page(records, names).encode(errors="backslashreplace"))
+            moments = read_moments(self.moments, records, names) if self.moments else []
+            page = replay_page(records, names, moments)
+            write_whole(self.output, page.encode(errors="backslashreplace"))
         else:
             from innerattn.report.replay.picture import moving_picture
 
             data = moving_picture(
-                records, names, self.output.suffix, episode=self.episode, robot=self.robot
+                records,
+                names,
+                self.output.suffix,
+                episode=self.episode,
+                robot=self.robot,
+                attention=self.attention,
             )
             write_whole(self.output, data)
         size = self.output.stat().st_size / 1e6
@@ -152,8 +163,13 @@ class Replay(Command):
             raise UsageError(f"{len(self.policies)} policies: must be 1 to 4 of RUN|POLICY|FILE")
         if self.output.suffix not in SUFFIXES:
             raise UsageError(f"-o {self.output}: must end in one of {', '.join(SUFFIXES)}")
-        if self.output.suffix == ".html" and (self.episode, self.robot) != (None, None):
-            raise UsageError("--episode, --robot: are for .gif and .mp4; a page has all of them")
+        chosen = self.episode, self.robot, self.attention
+        if self.output.suffix == ".html" and chosen != (None, None, None):
+            raise UsageError(
+                "--episode, --robot, --attention: are for .gif and .mp4; a page has all of them"
+            )
+        if self.output.suffix != ".html" and self.moments is not None:
+            raise UsageError(f"--moments: needs a page, not {self.output}")
         check_seed(self.seed)
         check_target(self.output)
 

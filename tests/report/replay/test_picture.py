@@ -2,6 +2,7 @@
 
 import io
 import sys
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ from watched import watched
 
 from innerattn.config import RangeSensor, Scenario
 from innerattn.errors import MissingLibraryError, RunError
+from innerattn.report.replay.moments import Whose
 from innerattn.report.replay.picture import _paint, moving_picture
 
 SHORT = Scenario.preset("mixed").replace(episode_steps=4)
@@ -43,7 +45,7 @@ def test_rays_of_the_chosen_robot_end_where_they_meet_something() -> None:
     record = watched(scenario)
     axes = Figure().add_subplot()
     places = np.zeros((0, 2), np.float32)
-    _paint(axes, record, "a", 0, 1.0, places, ("food_0",))
+    _paint(axes, record, "a", 0, 1.0, places, ("food_0",), "attention")
     lines = [one.get_xydata() for one in axes.lines if len(one.get_xydata()) == 2]
     readings, at = record.steps["rays"][0, 1, 0], record.steps["positions"][0, 1, 0]
     assert len(lines) == 8
@@ -55,7 +57,7 @@ def test_rays_of_the_chosen_robot_end_where_they_meet_something() -> None:
             line[1] - at, far * np.array([np.cos(angle), np.sin(angle)]), atol=1e-5
         )
     axes = Figure().add_subplot()
-    _paint(axes, record, "a", 0, 1.0, places, ("food_1",))
+    _paint(axes, record, "a", 0, 1.0, places, ("food_1",), "attention")
     assert not [one for one in axes.lines if len(one.get_xydata()) == 2]
 
 
@@ -69,7 +71,7 @@ def test_services_and_deadlines_of_victims_are_drawn() -> None:
     victim = victims[episode, step, slot]
     axes = Figure().add_subplot()
     places = np.zeros((0, 2), np.float32)
-    _paint(axes, record, "a", episode, step + 0.5, places, ("food_0",))
+    _paint(axes, record, "a", episode, step + 0.5, places, ("food_0",), "attention")
     arcs = [one for one in axes.patches if isinstance(one, Arc) and one.center[0] == victim["x"]]
     assert [one.theta2 - one.theta1 for one in arcs] == [pytest.approx(360 * victim["served"])]
     left = (victim["deadline_step"] - step - 0.5) * SHORT.dt_s
@@ -94,6 +96,22 @@ def test_arrows_are_of_the_robots_that_were_asked_for() -> None:
 
 
 @pytest.mark.long
+def test_arrows_of_the_actor_are_drawn_where_they_are_asked_for() -> None:
+    record = watched(SHORT, actor_heads=2)
+    given: list[Whose | None] = [None, "critic", "actor"]
+    default, critic, actor = (
+        frames(moving_picture([record], ["a"], ".gif", episode=0, robot="all", attention=whose))[0]
+        for whose in given
+    )
+    assert (default == critic).all()
+    inside = (slice(60, 360), slice(60, 340))
+    assert (np.abs(actor[inside] - critic[inside]).sum(-1) > 60).sum() > 100
+    alone = replace(record, steps={k: v for k, v in record.steps.items() if k != "attention"})
+    only = frames(moving_picture([alone], ["a"], ".gif", episode=0, robot="all"))[0]
+    assert (only == actor).all()
+
+
+@pytest.mark.long
 def test_a_video() -> None:
     data = moving_picture([watched(SHORT, episodes=1)], ["a"], ".mp4")
     assert data[4:8] == b"ftyp"
@@ -103,6 +121,7 @@ def test_a_video() -> None:
     ("options", "message"),
     [
         ({"episode": 9}, "--episode 9: must be 0 to 5"),
+        ({"attention": "actor"}, "--attention actor: no policy has any that was recorded"),
         ({"robot": "nobody"}, "--robot nobody: must be all, or one of food_0, food_1"),
     ],
 )

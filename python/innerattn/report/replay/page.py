@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from typing import Any
@@ -19,12 +19,15 @@ _SHARED = (
 _SCRIPTS = ("data.js", "app.js")
 
 
-def replay_page(records: Sequence[Record], names: Sequence[str]) -> str:
+def replay_page(
+    records: Sequence[Record], names: Sequence[str], moments: Sequence[Mapping[str, str]] = ()
+) -> str:
     """A page that replays recorded episodes in a browser.
 
     Args:
         records: of one to four policies, in the same worlds, recorded step by step.
         names: what each is called; any text.
+        moments: what `read_moments` gave; the page lists them, and opens with the first.
 
     Returns:
         The page; it loads nothing from elsewhere.
@@ -32,7 +35,8 @@ def replay_page(records: Sequence[Record], names: Sequence[str]) -> str:
     Raises:
         RunError: none or too many records, steps were not recorded, or worlds differ.
     """
-    return page_of(replay_document(records, names), names)
+    document = replay_document(records, names) | {"moments": list(moments)}
+    return page_of(document, names)
 
 
 def page_of(document: dict[str, Any], names: Sequence[str]) -> str:

@@ -17,6 +17,7 @@ from innerattn.errors import MissingLibraryError, RunError
 from innerattn.measures.moments import handoffs_of_all_robots, obstacle_places
 from innerattn.records.record import Record
 from innerattn.report.replay.data import refuse_what_cannot_replay
+from innerattn.report.replay.moments import ATTENTION_OF, Whose
 from innerattn.report.replay.sight import in_sight, sees_all
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ def moving_picture(
     *,
     episode: int | None = None,
     robot: str | None = None,
+    attention: Whose | None = None,
 ) -> bytes:
     """An episode of each policy side by side, two frames for each control step.
 
@@ -54,19 +56,21 @@ def moving_picture(
             hands over and rescues most.
         robot: name of the robot whose attention is drawn, or "all"; None: the first that hands
             over, or the first of the team.
+        attention: of the "critic" or the "actor"; None: of the critic, if one was recorded.
 
     Returns:
         The contents of the file.
 
     Raises:
-        RunError: records cannot be replayed, or there is no such episode or robot.
+        RunError: records cannot be replayed, or there is no such episode, robot or attention.
         MissingLibraryError: Matplotlib, or for a video imageio-ffmpeg, is not installed.
     """
     refuse_what_cannot_replay(records, names)
-    index = _chosen_episode(records, episode)
-    drawn = _drawn_robots(records, index, robot)
+    field = _drawn_attention(records, attention)
+    index = _chosen_episode(records, episode, field)
+    drawn = _drawn_robots(records, index, robot, field)
     try:
-        frames = list(_frames(records, names, index, drawn))
+        frames = list(_frames(records, names, index, drawn, field))
     except ImportError as error:
         raise _missing("a moving picture", "matplotlib") from error
     return _video(frames) if suffix == ".mp4" else _gif(frames)
@@ -76,7 +80,17 @@ def _missing(what: str, library: str) -> MissingLibraryError:
     return MissingLibraryError(f"{what} needs {library}: pip install 'innerattn[report]'")
 
 
-def _chosen_episode(records: Sequence[Record], number: int | None) -> int:
+def _drawn_attention(records: Sequence[Record], whose: Whose | None) -> str:
+    """The recorded field that has the attention to draw; that of the critic, if there is none."""
+    recorded = [f for f in ATTENTION_OF.values() if any(f in record.steps for record in records)]
+    if whose is None:
+        return recorded[0] if recorded else ATTENTION_OF["critic"]
+    if ATTENTION_OF[whose] not in recorded:
+        raise RunError(f"--attention {whose}: no policy has any that was recorded")
+    return ATTENTION_OF[whose]
+
+
+def _chosen_episode(records: Sequence[Record], number: int | None, attention: str) -> int:
     """Position of the episode in the records."""
     first, count = records[0].first_episode, records[0].num_episodes
     if number is not None:
@@ -85,21 +99,23 @@ def _chosen_episode(records: Sequence[Record], number: int | None) -> int:
                 f"--episode {number}: must be {first} to {first + count - 1}, which were recorded"
             )
         return number - first
-    record = _told_first(records)
+    record = _told_first(records, attention)
     handed = np.bincount(handoffs_of_all_robots(record)["episode"] - first, minlength=count)
     return int(np.argmax(10 * handed + record.rescue_counts()))
 
 
-def _told_first(records: Sequence[Record]) -> Record:
+def _told_first(records: Sequence[Record], attention: str) -> Record:
     """The first with attention, or the first."""
-    return next((record for record in records if "attention" in record.steps), records[0])
+    return next((record for record in records if attention in record.steps), records[0])
 
 
-def _drawn_robots(records: Sequence[Record], episode: int, robot: str | None) -> tuple[str, ...]:
+def _drawn_robots(
+    records: Sequence[Record], episode: int, robot: str | None, attention: str
+) -> tuple[str, ...]:
     """Names of the robots whose attention is drawn."""
     names = records[0].robot_names
     if robot is None:
-        record = _told_first(records)
+        record = _told_first(records, attention)
         handed = handoffs_of_all_robots(record)
         handed = handed[handed["episode"] == record.first_episode + episode]
         return (names[int(handed["robot"][0]) if len(handed) else 0],)
@@ -111,7 +127,11 @@ def _drawn_robots(records: Sequence[Record], episode: int, robot: str | None) ->
 
 
 def _frames(
-    records: Sequence[Record], names: Sequence[str], episode: int, robots: Sequence[str]
+    records: Sequence[Record],
+    names: Sequence[str],
+    episode: int,
+    robots: Sequence[str],
+    attention: str,
 ) -> Iterator[NDArray[np.uint8]]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -124,7 +144,7 @@ def _frames(
         canvas = FigureCanvasAgg(figure)
         for number, (record, name) in enumerate(zip(records, names, strict=True)):
             axes = figure.add_axes(((number + 0.02) * share, 0.02, 0.96 * share, 0.9))
-            legend = _paint(axes, record, name, episode, float(moment), places, robots)
+            legend = _paint(axes, record, name, episode, float(moment), places, robots, attention)
         figure.legend(
             legend.values(),
             legend.keys(),
@@ -134,13 +154,14 @@ def _frames(
             frameon=False,
             labelspacing=0.9,
         )
-        if any("attention" in record.steps for record in records):
+        if any(attention in record.steps for record in records):
             whose = robots[0] if len(robots) == 1 else "all robots"
+            of_actors = attention == ATTENTION_OF["actor"]
             where = (len(records) + 0.03) * share
             figure.text(
                 where,
                 0.05,
-                f"wide arrows: attention\nof {_plain(whose)}",
+                f"wide arrows: attention\n{'in the actor ' * of_actors}of {_plain(whose)}",
                 va="bottom",
             )
         canvas.draw()  # type: ignore[no-untyped-call]
@@ -157,6 +178,7 @@ def _paint(
     moment: float,
     obstacles: NDArray[np.float32],
     robots: Sequence[str],
+    attention: str,
 ) -> dict[str, Artist]:
     last = int(record.lengths[episode]) - 1
     now = min(int(moment), last)
@@ -191,10 +213,10 @@ def _paint(
             ahead = 0.0 if headings is None else float(headings[index])
             at, rays, colour = positions[index], kept["rays"][index], discs[index].get_facecolor()
             _paint_rays(axes, record.scenario.robots[index], at, ahead, rays, colour)
-    if "attention" in kept and record.scenario.num_robots > 1:
+    if attention in kept and record.scenario.num_robots > 1:
         for one in robots:
             index = record.robot_names.index(one)
-            weights = kept["attention"].mean(0)[index]
+            weights = kept[attention].mean(0)[index]
             _paint_attention(axes, positions, index, weights, discs[index])
     return legend
 

@@ -28,6 +28,7 @@ class App {
     this.choose(this.run.handoffs[this.episode][0]?.robot ?? 0);
     const seconds = this.runs[0].steps * this.worlds.dt_s;
     this.setSpeed(seconds < 5 ? 0.25 : 1);
+    this.fillMoments(described.moments ?? []);
   }
 
   get run() {
@@ -83,6 +84,51 @@ class App {
       $("which").append(button);
     });
     fillLegend($("legend"), this.worlds);
+  }
+
+  /** Lists moments that somebody chose, and opens the one in the address, or else the first. */
+  fillMoments(moments) {
+    $("moments-box").hidden = moments.length === 0;
+    $("moments").append(...moments.map(({ text, address }) => (
+      element("li", {}, element("a", { href: `#${address}` }, text))
+    )));
+    const open = () => this.open(location.hash.slice(1));
+    window.addEventListener("hashchange", open);
+    if (location.hash.length > 1) open();
+    else if (moments.length) this.open(moments[0].address);
+  }
+
+  /** Shows the moment that the part of an address behind # names; what is unknown is left out. */
+  open(address) {
+    const asked = new URLSearchParams(address), number = (key) => Number.parseInt(asked.get(key), 10);
+    const policy = this.runs.findIndex((run) => run.name === asked.get("policy"));
+    if (policy >= 0) this.choosePolicy(policy);
+    const episode = number("episode") - this.worlds.first_episode;
+    if (this.order.includes(episode)) this.setEpisode(episode);
+    if (this.run.attentions[asked.get("attention")]) this.setWhose(asked.get("attention"));
+    const look = { head: (number("head") || 0) - 1 };
+    const robot = this.worlds.robots.findIndex(({ name }) => name === asked.get("robot"));
+    if (robot >= 0) look.robot = robot;
+    const arrows = asked.get("arrows");
+    this.setLook({ ...look, received: arrows === "to", all: arrows === "all" });
+    if (number("step") >= 1) this.goTo(number("step") - 1);
+    [...$("moments").children].forEach(({ firstChild: link }) => {
+      link.setAttribute("aria-current", String(link.getAttribute("href") === `#${address}`));
+    });
+  }
+
+  /** The part of an address behind # that `open` takes for what is shown. */
+  address() {
+    const { look, run } = this, robot = this.worlds.robots[look.robot];
+    const named = {
+      ...(this.runs.length > 1 ? { policy: run.name } : {}),
+      episode: this.worlds.first_episode + this.episode, step: Math.floor(this.step) + 1,
+      ...(robot ? { robot: robot.name } : {}),
+      ...(run.attention ? { attention: this.whose } : {}),
+      ...(look.head >= 0 ? { head: look.head + 1 } : {}),
+      ...(look.all ? { arrows: "all" } : look.received ? { arrows: "to" } : {}),
+    };
+    return new URLSearchParams(named).toString();
   }
 
   fillHeads() {
@@ -305,13 +351,14 @@ class App {
   /** The texts, only when the step, the robot or the policy is another one. */
   showTexts(look) {
     const { run, episode } = this, step = Math.min(Math.floor(this.step), run.lengths[episode] - 1);
-    const key = [this.chosen, this.whose, episode, step, look.robot, look.received, look.head, document.documentElement.dataset.theme].join();
+    const key = [this.chosen, this.whose, episode, step, ...Object.values(look), document.documentElement.dataset.theme].join();
     $("scrubber").value = Math.floor(this.step);
     if (key === this.shown) return;
     this.shown = key;
     const { dt_s: dt } = this.worlds, seconds = (step * dt).toFixed(1);
     $("clock").textContent = `step ${step + 1} of ${run.lengths[episode]} · ${seconds} s`;
     $("scrubber").setAttribute("aria-valuetext", `step ${step + 1}, ${seconds} seconds`);
+    $("here").setAttribute("href", `#${this.address()}`);
     this.robots.show(run, episode, step, look);
     this.events.showStep(step);
     const happens = this.events.events.filter((one) => one.step === step).map((one) => `${one.text}.`);
