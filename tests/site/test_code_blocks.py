@@ -14,10 +14,12 @@ import pytest
 import tyro
 
 from innerattn.cli.main import COMMANDS, _parse, main
+from innerattn.cli.replay import recorded
 from innerattn.config import Scenario, load_run_config
 from innerattn.config.instances import read_instances, read_worlds
 from innerattn.envs import BatchEnv
 from innerattn.policies import Exported
+from innerattn.report.replay import read_moments
 from innerattn.studies.plan import plan_study
 from innerattn.studies.study import study_in
 from innerattn.train.orders import OrderTraining
@@ -124,7 +126,7 @@ def test_python_blocks(place: Path, plain_team: Path) -> None:
                     exec(compile(code, name_of(page), "exec"), known)
 
 
-def test_toml_blocks(tmp_path: Path) -> None:
+def test_toml_blocks(tmp_path: Path, run_dir: Path) -> None:
     """Each is a file that the command takes: a scenario, or a run's configuration."""
     file = tmp_path / "block.toml"
     for page in of_language("toml"):
@@ -135,6 +137,8 @@ def test_toml_blocks(tmp_path: Path) -> None:
             keys = set(tomllib.loads(code))
             if keys <= set(Scenario.model_fields):
                 Scenario.from_toml(file)
+            elif keys == {"moments"}:
+                assert read_moments(file, [recorded(str(run_dir))], ["a"])
             elif keys == {"family"}:
                 load_run_config(method="team-inner", family=file)
             elif keys & {"grid", "report"}:

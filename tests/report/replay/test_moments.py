@@ -1,5 +1,6 @@
 """Moments that somebody chose: what files may say, and what the page makes of it."""
 
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from innerattn.errors import ConfigError
 from innerattn.records.record import Record
 from innerattn.report.replay import read_moments, replay_page
 
+ROOT = Path(__file__).parents[3]
 FILE = """
 [[moments]]
 text = "medical_0 turns to the <other> robot"
@@ -149,6 +151,14 @@ def test_a_moment_that_is_not_there_is_refused(
     file.write_text(FILE.replace(old, new, 1), "utf-8")
     with pytest.raises(ConfigError, match=f"^{file}: .*{message}"):
         read_moments(file, records, ["a", "b"])
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "docs" / "moments").glob("*.toml")))
+def test_published_pages_list_their_moments(browser: Browser, file: Path) -> None:
+    given = [one["text"] for one in tomllib.loads(file.read_text("utf-8"))["moments"]]
+    with visit(browser, file.with_suffix(".html")) as seen:
+        until(seen.page, "Boolean(window.replay)")
+        assert seen.page.locator("#moments a").all_inner_texts() == given
 
 
 def test_a_head_needs_attention(tmp_path: Path) -> None:
