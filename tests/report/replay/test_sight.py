@@ -103,7 +103,7 @@ def test_a_picture_paints_faintly_what_the_chosen_robot_does_not_see() -> None:
     pale = 0
     for step in (0, 8, 16):
         axes = Figure().add_subplot()
-        legend = _paint(axes, record, "a", 1, float(step), places, ("food_0",))
+        legend = _paint(axes, record, "a", 1, float(step), places, ("food_0",), "attention")
         robots, victims = hidden(record, 1, step, 0)
         discs = axes.patches[-4:]
         assert [one for one in range(4) if discs[one].get_alpha() == PALE] == robots
@@ -117,7 +117,7 @@ def test_a_picture_paints_faintly_what_the_chosen_robot_does_not_see() -> None:
     assert pale > 3
     for robots_shown in (("medical_0", "food_0"), record.robot_names):
         axes = Figure().add_subplot()
-        legend = _paint(axes, record, "a", 1, 8.0, places, robots_shown)
+        legend = _paint(axes, record, "a", 1, 8.0, places, robots_shown, "attention")
         assert all(one.get_alpha() == 1.0 for one in axes.patches[-4:])
         assert not any(label.startswith("out of sight") for label in legend)
 
