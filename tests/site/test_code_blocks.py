@@ -99,6 +99,7 @@ def place(tmp_path: Path, run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
     """A folder in which a user would type the commands, with what the pages name."""
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples" / "scenarios", tmp_path / "examples" / "scenarios")
+    shutil.copytree(ROOT / "docs" / "moments", tmp_path / "docs" / "moments")
     for name in ("NAME", "OTHER", "mine", "first", "hardened", "harbour", "mixed-s0"):
         shutil.copytree(run_dir, tmp_path / "runs" / name)
     for page in PAGES:

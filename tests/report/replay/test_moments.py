@@ -1,5 +1,6 @@
 """Moments that somebody chose: what files may say, and what the page makes of it."""
 
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,6 +10,7 @@ from browser import opened_browser, until, visit
 from playwright.sync_api import Browser, Page
 from watched import watched
 
+from innerattn.cli.replay import recorded
 from innerattn.errors import ConfigError
 from innerattn.records.record import Record
 from innerattn.report.replay import read_moments, replay_page
@@ -153,12 +155,22 @@ def test_a_moment_that_is_not_there_is_refused(
         read_moments(file, records, ["a", "b"])
 
 
-@pytest.mark.parametrize("file", sorted((ROOT / "docs" / "moments").glob("*.toml")))
-def test_published_pages_list_their_moments(browser: Browser, file: Path) -> None:
-    given = [one["text"] for one in tomllib.loads(file.read_text("utf-8"))["moments"]]
-    with visit(browser, file.with_suffix(".html")) as seen:
-        until(seen.page, "Boolean(window.replay)")
-        assert seen.page.locator("#moments a").all_inner_texts() == given
+PUBLISHED = sorted((ROOT / "docs" / "moments").glob("*/moments.toml"))
+
+
+@pytest.mark.parametrize("file", PUBLISHED, ids=lambda file: file.parent.name)
+def test_published_moments_say_how_large_weights_are(file: Path) -> None:
+    """A robot's largest weight is the largest share that the text names."""
+    record = recorded(str(file.parent))
+    moments = tomllib.loads(file.read_text("utf-8"))["moments"]
+    assert len(read_moments(file, [record], ["a"])) == len(moments) == 10
+    for one in moments:
+        episode = one["episode"] - record.first_episode
+        weights = record.steps["actor_attention"][episode, one["step"] - 1].mean(0)
+        shares = [round(100 * float(w)) for w in weights[record.robot_names.index(one["robot"])]]
+        named = [int(share) for share in re.findall(r"(\d+) %", one["text"])]
+        assert set(named) <= set(shares), one["text"]
+        assert max(named, default=100) == max(shares), one["text"]
 
 
 def test_a_head_needs_attention(tmp_path: Path) -> None:
