@@ -39,8 +39,10 @@ from innerattn.learn.rollout import (
 )
 from innerattn.learn.types import Scheduled, Team, Transitions
 
-_CHUNK = 4096
-"""Rows of single robots whose values are computed at a time."""
+_CHUNK = 1024
+"""Rows whose values are computed at a time."""
+_CHUNK_BY_ENTITY = 4096
+"""The same, in rows of single robots, where encoders go by entity and take far more memory."""
 
 
 @dataclass
@@ -266,7 +268,7 @@ class PPO(ClippedUpdate):
             log_probs: (R, A, B) of all discrete actions, if they are known.
         """
         parts = []
-        rows = max(1, _CHUNK // len(obs))
+        rows = max(1, _CHUNK_BY_ENTITY // len(obs)) if self._by_entity else _CHUNK
         for first in range(0, obs.shape[1], rows):
             chunk = slice(first, first + rows)
             some_obs, some_actions = self._laid_out(obs[:, chunk]), actions[:, chunk]
