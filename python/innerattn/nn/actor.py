@@ -50,7 +50,7 @@ class Actor(nn.Module):
 
     def forward(self, obs: Tensor) -> Tensor:
         """Map observations (R, B, D) to action logits (R, A, B)."""
-        hidden = functional.leaky_relu_(self.first(obs))
+        hidden = functional.leaky_relu(self.first(obs))
         hidden = functional.leaky_relu_(self.second(hidden))
         return self.output.batch_last(hidden)
 

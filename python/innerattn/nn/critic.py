@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from innerattn.nn.attention import Attended, TeammateAttention
-from innerattn.nn.encoder import EntityColumns, observation_encoder
+from innerattn.nn.encoder import EntityColumns, encoded_beside, observation_encoder
 from innerattn.nn.linear import PerRobotLinear
 from innerattn.nn.partner import OracleAttention, right_partners
 
@@ -99,8 +99,8 @@ class Critic(nn.Module):
             Both (R, B, W).
         """
         chosen = self.action_inputs(obs, actions)
-        own = functional.leaky_relu_(self.state_encoder(obs))
-        others = functional.leaky_relu_(self.action_encoder(torch.cat([obs, chosen], dim=2)))
+        own = functional.leaky_relu(self.state_encoder(obs))
+        others = functional.leaky_relu(encoded_beside(self.action_encoder, obs, chosen))
         return own, others
 
     def action_inputs(self, obs: Tensor, actions: Tensor) -> Tensor:

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from innerattn.nn.linear import PerRobotLinear
-from innerattn.nn.pooling import equal_weights, largest, nearest_one
+from innerattn.nn.pooling import largest, nearest_one
 
 _HEAD_WIDTH = 8
 _YES = 0.5
@@ -121,8 +121,16 @@ class EntityEncoder(nn.Module):
             self.query = PerRobotLinear(num_robots, width, pools * width, generator)
         self.output = PerRobotLinear(num_robots, (1 + pools) * width, out_width, generator)
 
-    def forward(self, obs: Tensor) -> Tensor:
-        """Map observations, with extra columns behind them, (R, B, D + extra) to (R, B, out)."""
+    def forward(self, obs: Tensor, *beside: Tensor) -> Tensor:
+        """Encode observations.
+
+        Args:
+            obs: (R, B, D), or more columns, of which those behind an observation are extra ones.
+            beside: (R, B, n), the last n of the extra columns, where they are not in ``obs``.
+
+        Returns:
+            (R, B, out).
+        """
         columns = self._columns
         widths = [
             columns.own,
@@ -131,7 +139,7 @@ class EntityEncoder(nn.Module):
             obs.shape[2] - columns.width,
         ]
         own, teammates, victims, extra = torch.split(obs, widths, dim=2)
-        own = functional.leaky_relu_(self.own.batch_last(torch.cat([own, extra], dim=2)))
+        own = functional.leaky_relu_(self.own.batch_last(torch.cat([own, extra, *beside], dim=2)))
         width, queries = own.shape[1], None
         if self.query is not None:
             queries = self.query.batch_last(own.transpose(1, 2)) * _HEAD_WIDTH**-0.5
@@ -146,8 +154,7 @@ class EntityEncoder(nn.Module):
             known, place = self._known(blocks), columns.teammate_place
             asked = None if queries is None else queries[:, width:]
             parts.append(self._pool(encoded, blocks, known, place, asked))
-        hidden: Tensor = self.output(torch.cat(parts, dim=1).transpose(1, 2))
-        return hidden
+        return self.output.batch_last(torch.cat(parts, dim=1).transpose(1, 2)).transpose(1, 2)
 
     def teammate_weights(self, obs: Tensor) -> Tensor | None:
         """The weights with which teammates are summed up.
@@ -213,16 +220,27 @@ class EntityEncoder(nn.Module):
             assert place is not None  # as checked where it was made
             x, y = (blocks[:, axis] for axis in place)
             weights = nearest_one(there, x.square() + y.square()).to(encoded.dtype)
-        else:
-            weights = equal_weights(there, 1, encoded.dtype)
-        return (weights.unsqueeze(1) * encoded).sum(dim=2)
+            return (weights.unsqueeze(1) * encoded).sum(dim=2)
+        weights = there.to(encoded.dtype)
+        count = weights.sum(dim=1, keepdim=True).clamp_min(1.0)
+        return (weights.unsqueeze(1) * encoded).sum(dim=2) / count
+
+
+def encoded_beside(encoder: PerRobotLinear | EntityEncoder, obs: Tensor, extra: Tensor) -> Tensor:
+    """Encode observations (R, B, D) with extra columns (R, B, n) behind them, to (R, B, out)."""
+    if isinstance(encoder, EntityEncoder):
+        encoded: Tensor = encoder(obs, extra)  # no copy of the observations: they keep their layout
+    else:
+        encoded = encoder(torch.cat([obs, extra], dim=2))
+    return encoded
 
 
 def _encoded(layer: PerRobotLinear, blocks: Tensor) -> Tensor:
     """Encodings (R, W, K, B) of K entities (R, columns, K, B)."""
     encoded = torch.bmm(layer.weight, blocks.flatten(2)).to(layer.weight.dtype)
-    encoded = functional.leaky_relu_(encoded.add_(layer.bias.unsqueeze(2)))
-    return encoded.view(len(blocks), -1, *blocks.shape[2:])
+    encoded = encoded.add_(layer.bias.unsqueeze(2)).view(len(blocks), -1, *blocks.shape[2:])
+    # After the view: a compiler else takes entities and batch apart number by number.
+    return functional.leaky_relu(encoded)
 
 
 def _attend(encoded: Tensor, asked: Tensor, there: Tensor | None) -> Tensor:

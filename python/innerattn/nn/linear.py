@@ -40,6 +40,25 @@ def swap_robots(network: nn.Module, one: int, other: int) -> None:
                 parameter[[one, other]] = parameter[[other, one]]
 
 
+def products_plus(bias: Tensor, left: Tensor, right: Tensor) -> Tensor:
+    """Add a bias to products: bias + left @ right, of the dtype of the products.
+
+    A compiled program adds the bias where it reads the products next, which saves a pass over them.
+
+    Args:
+        bias: Broadcasts to (R, n, m).
+        left: (R, n, k).
+        right: (R, k, m).
+
+    Returns:
+        (R, n, m).
+    """
+    if torch.compiler.is_compiling():
+        products = torch.bmm(left, right)
+        return products + bias.to(products.dtype)
+    return torch.baddbmm(bias, left, right)
+
+
 class PerRobotLinear(nn.Module):
     """y_i = W_i x_i + b_i for every robot i.
 
@@ -65,15 +84,16 @@ class PerRobotLinear(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Map (R, B, in) to (R, B, out)."""
-        return torch.baddbmm(self.bias.unsqueeze(1), x, self.weight.transpose(1, 2))
+        return products_plus(self.bias.unsqueeze(1), x, self.weight.transpose(1, 2))
 
     def side_by_side(self, left: Tensor, right: Tensor) -> Tensor:
         """Map (R, B, m) and (R, B, in - m), as if concatenated, to (R, B, out); no copy is made."""
         width = left.shape[2]
         weight = self.weight.transpose(1, 2)
-        partial = torch.baddbmm(self.bias.unsqueeze(1), left, weight[:, :width])
-        if partial.dtype != weight.dtype:  # autocast has no in-place products
-            return torch.baddbmm(partial, right, weight[:, width:])
+        partial = products_plus(self.bias.unsqueeze(1), left, weight[:, :width])
+        # Autocast has no in-place products, and a compiler does without them.
+        if partial.dtype != weight.dtype or torch.compiler.is_compiling():
+            return products_plus(partial, right, weight[:, width:])
         return partial.baddbmm_(right, weight[:, width:])
 
     def batch_last(self, x: Tensor) -> Tensor:
@@ -83,5 +103,5 @@ class PerRobotLinear(nn.Module):
         runs along memory. The result has the dtype of the parameters, also under autocast.
         """
         weight = self.weight
-        outputs = torch.baddbmm(self.bias.unsqueeze(2), weight, x.transpose(1, 2))
+        outputs = products_plus(self.bias.unsqueeze(2), weight, x.transpose(1, 2))
         return outputs.to(weight.dtype)

@@ -136,7 +136,7 @@ class Messages(nn.Module):
         said, frame = obs, element
         if self._hearing.delay:
             said, frame = rows[..., width + 1 : -1], rows[..., -1]
-        encoded = functional.leaky_relu_(self.encoder(said))
+        encoded = functional.leaky_relu(self.encoder(said))
         messages = self.output(encoded).tanh().to(rows.dtype)
         arriving = messages.expand(len(obs), *messages.shape)  # (R, R, B, K), by who hears
         if self._turns:
@@ -146,7 +146,7 @@ class Messages(nn.Module):
             return largest(arriving, hears.unsqueeze(3), dim=1)
         if self._pooling == "attention":
             if self._hearing.delay:
-                encoded = functional.leaky_relu_(self.encoder(obs))
+                encoded = functional.leaky_relu(self.encoder(obs))
             weights = self._attention(encoded, arriving, hears)
         else:
             if self._pooling == "nearest":
