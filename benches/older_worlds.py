@@ -8,14 +8,12 @@ actions, all cores, `copy=False`, Python call included.
 from __future__ import annotations
 
 import hashlib
-import os
 import statistics
-import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
+from versions import older_and_now
 
 ENGINES = ("rapier", "discs")
 BATCHES = (1, 1_024, 4_096)
@@ -51,41 +49,14 @@ def measure() -> None:
         print(steps * num_envs / (time.perf_counter() - start), flush=True)
 
 
-class Version:
-    """A process that measures one version.
-
-    Args:
-        python: its `PYTHONPATH`.
-    """
-
-    def __init__(self, python: Path) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, __file__, "--measure"],
-            env=os.environ | {"PYTHONPATH": str(python)},
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-
-    def ask(self, engine: str, batch: int) -> str:
-        """What it answers."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(f"{engine} {batch}\n")
-        self._process.stdin.flush()
-        return self._process.stdout.readline().strip()
-
-
 def main() -> None:
     """Measure and publish."""
-    if len(sys.argv) != 2:
-        sys.exit(f"usage: python {sys.argv[0]} FOLDER")
-    if sys.argv[1] == "--measure":
+    if sys.argv[1:] == ["--measure"]:
         measure()
         return
     from page import machine, publish, table
 
-    versions = [Version(Path(sys.argv[1])), Version(Path(__file__).parents[1] / "python")]
+    versions = older_and_now(__file__)
     rows = []
     for engine in ENGINES:
         for batch in BATCHES:

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from innerattn.nn.attention import Attended, TeammateAttention
-from innerattn.nn.encoder import EntityColumns, encoded_beside, observation_encoder
+from innerattn.nn.encoder import EntityColumns, EntityEncoder, observation_encoder
 from innerattn.nn.linear import PerRobotLinear
 from innerattn.nn.partner import OracleAttention, right_partners
 
@@ -99,9 +99,13 @@ class Critic(nn.Module):
             Both (R, B, W).
         """
         chosen = self.action_inputs(obs, actions)
-        own = functional.leaky_relu(self.state_encoder(obs))
-        others = functional.leaky_relu(encoded_beside(self.action_encoder, obs, chosen))
-        return own, others
+        state, action = self.state_encoder, self.action_encoder
+        if isinstance(state, EntityEncoder) and isinstance(action, EntityEncoder):
+            seen = state.read(obs)
+            own, others = state.encode(seen), action.encode(seen, chosen)
+        else:
+            own, others = state(obs), action(torch.cat([obs, chosen], dim=2))
+        return functional.leaky_relu(own), functional.leaky_relu(others)
 
     def action_inputs(self, obs: Tensor, actions: Tensor) -> Tensor:
         """Actions as numbers (R, B, A): one column for each action, 1 for the one taken."""

@@ -6,6 +6,7 @@ They know which columns belong to which entity, not what a column means.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -50,6 +51,24 @@ class EntityColumns:
     def width(self) -> int:
         """D, columns of a whole observation."""
         return self.own + self.teammates * self.teammate + self.victims * self.victim
+
+
+class Entities(NamedTuple):
+    """What observations say of entities.
+
+    Attributes:
+        own: (R, B, n) the columns of the robot itself, and extra ones.
+        victims: (R, columns, K, B).
+        there: (R, K, B) bool, the victims that are there.
+        teammates: (R, columns, K, B); anything, if there are none.
+        known: (R, K, B) bool, the teammates that are there; None: all are.
+    """
+
+    own: Tensor
+    victims: Tensor
+    there: Tensor
+    teammates: Tensor
+    known: Tensor | None
 
 
 class EntityEncoder(nn.Module):
@@ -121,16 +140,12 @@ class EntityEncoder(nn.Module):
             self.query = PerRobotLinear(num_robots, width, pools * width, generator)
         self.output = PerRobotLinear(num_robots, (1 + pools) * width, out_width, generator)
 
-    def forward(self, obs: Tensor, *beside: Tensor) -> Tensor:
-        """Encode observations.
+    def forward(self, obs: Tensor) -> Tensor:
+        """Map observations, with extra columns behind them, (R, B, D + extra) to (R, B, out)."""
+        return self.encode(self.read(obs))
 
-        Args:
-            obs: (R, B, D), or more columns, of which those behind an observation are extra ones.
-            beside: (R, B, n), the last n of the extra columns, where they are not in ``obs``.
-
-        Returns:
-            (R, B, out).
-        """
+    def read(self, obs: Tensor) -> Entities:
+        """Take observations (R, B, D) apart, which may have extra columns behind them."""
         columns = self._columns
         widths = [
             columns.own,
@@ -139,21 +154,37 @@ class EntityEncoder(nn.Module):
             obs.shape[2] - columns.width,
         ]
         own, teammates, victims, extra = torch.split(obs, widths, dim=2)
-        own = functional.leaky_relu_(self.own.batch_last(torch.cat([own, extra, *beside], dim=2)))
+        victims = _blocks(victims, columns.victims)
+        there = victims[:, columns.present] > _YES
+        known = None
+        if self.teammate is not None:
+            teammates = _blocks(teammates, columns.teammates)
+            known = self._known(teammates)
+        return Entities(torch.cat([own, extra], dim=2), victims, there, teammates, known)
+
+    def encode(self, seen: Entities, *beside: Tensor) -> Tensor:
+        """Encode what observations say of entities.
+
+        Args:
+            seen: By `read` of this or an equal encoder.
+            beside: (R, B, n), the last n of the extra columns, where observations lacked them.
+
+        Returns:
+            (R, B, out).
+        """
+        columns = self._columns
+        own = functional.leaky_relu_(self.own.batch_last(torch.cat([seen.own, *beside], dim=2)))
         width, queries = own.shape[1], None
         if self.query is not None:
             queries = self.query.batch_last(own.transpose(1, 2)) * _HEAD_WIDTH**-0.5
-        blocks = _blocks(victims, columns.victims)
-        encoded = _encoded(self.victim, blocks)
-        there = blocks[:, columns.present] > _YES
+        encoded = _encoded(self.victim, seen.victims)
         asked = None if queries is None else queries[:, :width]
-        parts = [own, self._pool(encoded, blocks, there, columns.victim_place, asked)]
+        parts = [own, self._pool(encoded, seen.victims, seen.there, columns.victim_place, asked)]
         if self.teammate is not None:
-            blocks = _blocks(teammates, columns.teammates)
-            encoded = _encoded(self.teammate, blocks)
-            known, place = self._known(blocks), columns.teammate_place
+            encoded = _encoded(self.teammate, seen.teammates)
             asked = None if queries is None else queries[:, width:]
-            parts.append(self._pool(encoded, blocks, known, place, asked))
+            place = columns.teammate_place
+            parts.append(self._pool(encoded, seen.teammates, seen.known, place, asked))
         return self.output.batch_last(torch.cat(parts, dim=1).transpose(1, 2)).transpose(1, 2)
 
     def teammate_weights(self, obs: Tensor) -> Tensor | None:
@@ -183,7 +214,7 @@ class EntityEncoder(nn.Module):
             return teammates[:, self._columns.seen] > _YES
         if self._pooling == "attention":
             return None
-        return (teammates != 0.0).any(dim=1)
+        return teammates.abs().amax(dim=1) > 0.0
 
     def _by_head(self, encoded: Tensor, queries: Tensor) -> tuple[Tensor, Tensor]:
         """Encodings (R, W, K, B) as (R, H, d, K, B), and queries (R, W, B) as (R, H, d, 1, B)."""
@@ -224,15 +255,6 @@ class EntityEncoder(nn.Module):
         weights = there.to(encoded.dtype)
         count = weights.sum(dim=1, keepdim=True).clamp_min(1.0)
         return (weights.unsqueeze(1) * encoded).sum(dim=2) / count
-
-
-def encoded_beside(encoder: PerRobotLinear | EntityEncoder, obs: Tensor, extra: Tensor) -> Tensor:
-    """Encode observations (R, B, D) with extra columns (R, B, n) behind them, to (R, B, out)."""
-    if isinstance(encoder, EntityEncoder):
-        encoded: Tensor = encoder(obs, extra)  # no copy of the observations: they keep their layout
-    else:
-        encoded = encoder(torch.cat([obs, extra], dim=2))
-    return encoded
 
 
 def _encoded(layer: PerRobotLinear, blocks: Tensor) -> Tensor:
