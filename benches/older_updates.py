@@ -72,7 +72,10 @@ def measure() -> None:
     """In a process of one version: answer each number of a case by passes and milliseconds."""
     import torch
 
+    from innerattn.train.build import keep_heap_small
+
     torch.set_num_threads(1)
+    keep_heap_small()  # as a training does
     updates: dict[int, tuple[Callable[[], object], int]] = {}
     for line in sys.stdin:
         number = int(line)
