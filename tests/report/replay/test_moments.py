@@ -166,7 +166,8 @@ def test_published_moments_say_how_large_weights_are(file: Path) -> None:
     assert len(read_moments(file, [record], ["a"])) == len(moments) == 10
     for one in moments:
         episode = one["episode"] - record.first_episode
-        weights = record.steps["actor_attention"][episode, one["step"] - 1].mean(0)
+        kind = "actor_attention" if one.get("attention") == "actor" else "attention"
+        weights = record.steps[kind][episode, one["step"] - 1].mean(0)
         shares = [round(100 * float(w)) for w in weights[record.robot_names.index(one["robot"])]]
         named = [int(share) for share in re.findall(r"(\d+) %", one["text"])]
         assert set(named) <= set(shares), one["text"]
