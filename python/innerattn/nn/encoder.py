@@ -197,16 +197,13 @@ class EntityEncoder(nn.Module):
             (R, H, K, B): those of each robot on its K teammates, which add up to 1, or to 0 where
             it sees none. None without teammates, or if the pooling is not "attention".
         """
-        columns = self._columns
         if self.query is None or self.teammate is None:
             return None
-        mates = columns.own + columns.teammates * columns.teammate
-        own = torch.cat([obs[..., : columns.own], obs[..., columns.width :]], dim=2)
-        own = functional.leaky_relu_(self.own.batch_last(own))
+        seen = self.read(obs)
+        own = functional.leaky_relu_(self.own.batch_last(seen.own))
         queries = self.query.batch_last(own.transpose(1, 2)) * _HEAD_WIDTH**-0.5
-        blocks = _blocks(obs[..., columns.own : mates], columns.teammates)
-        encoded = _encoded(self.teammate, blocks)
-        return _weights(*self._by_head(encoded, queries[:, own.shape[1] :]), self._known(blocks))
+        encoded = _encoded(self.teammate, seen.teammates)
+        return _weights(*self._by_head(encoded, queries[:, own.shape[1] :]), seen.known)
 
     def _known(self, teammates: Tensor) -> Tensor | None:
         """(R, K, B) bool: which teammates (R, columns, K, B) are there; None: all are."""
