@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from innerattn.nn.linear import PerRobotLinear
-from innerattn.nn.pooling import largest, nearest_one
+from innerattn.nn.pooling import largest, mean, nearest_one
 
 _HEAD_WIDTH = 8
 _YES = 0.5
@@ -173,10 +173,8 @@ class EntityEncoder(nn.Module):
             (R, B, out).
         """
         columns = self._columns
-        own = functional.leaky_relu_(self.own.batch_last(torch.cat([seen.own, *beside], dim=2)))
-        width, queries = own.shape[1], None
-        if self.query is not None:
-            queries = self.query.batch_last(own.transpose(1, 2)) * _HEAD_WIDTH**-0.5
+        own, queries = self._own_and_queries(torch.cat([seen.own, *beside], dim=2))
+        width = own.shape[1]
         encoded = _encoded(self.victim, seen.victims)
         asked = None if queries is None else queries[:, :width]
         parts = [own, self._pool(encoded, seen.victims, seen.there, columns.victim_place, asked)]
@@ -197,13 +195,22 @@ class EntityEncoder(nn.Module):
             (R, H, K, B): those of each robot on its K teammates, which add up to 1, or to 0 where
             it sees none. None without teammates, or if the pooling is not "attention".
         """
-        if self.query is None or self.teammate is None:
-            return None
         seen = self.read(obs)
-        own = functional.leaky_relu_(self.own.batch_last(seen.own))
-        queries = self.query.batch_last(own.transpose(1, 2)) * _HEAD_WIDTH**-0.5
+        own, queries = self._own_and_queries(seen.own)
+        if queries is None or self.teammate is None:
+            return None
         encoded = _encoded(self.teammate, seen.teammates)
         return _weights(*self._by_head(encoded, queries[:, own.shape[1] :]), seen.known)
+
+    def _own_and_queries(self, own: Tensor) -> tuple[Tensor, Tensor | None]:
+        """Encodings (R, W, B) of robots (R, B, n) themselves, and their queries (R, pools * W, B).
+
+        Queries are divided by sqrt(d); None: nothing is asked.
+        """
+        encoded = functional.leaky_relu_(self.own.batch_last(own))
+        if self.query is None:
+            return encoded, None
+        return encoded, self.query.batch_last(encoded.transpose(1, 2)) * _HEAD_WIDTH**-0.5
 
     def _known(self, teammates: Tensor) -> Tensor | None:
         """(R, K, B) bool: which teammates (R, columns, K, B) are there; None: all are."""
@@ -249,9 +256,7 @@ class EntityEncoder(nn.Module):
             x, y = (blocks[:, axis] for axis in place)
             weights = nearest_one(there, x.square() + y.square()).to(encoded.dtype)
             return (weights.unsqueeze(1) * encoded).sum(dim=2)
-        weights = there.to(encoded.dtype)
-        count = weights.sum(dim=1, keepdim=True).clamp_min(1.0)
-        return (weights.unsqueeze(1) * encoded).sum(dim=2) / count
+        return mean(encoded, there.unsqueeze(1), dim=2)
 
 
 def _encoded(layer: PerRobotLinear, blocks: Tensor) -> Tensor:

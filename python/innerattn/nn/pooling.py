@@ -17,6 +17,18 @@ def equal_weights(there: Tensor, dim: int, dtype: torch.dtype) -> Tensor:
     return there.to(dtype) / there.sum(dim=dim, keepdim=True).clamp_min(1)
 
 
+def mean(values: Tensor, there: Tensor, dim: int) -> Tensor:
+    """The mean of those that are there, 0 where none is; one division for each number of it.
+
+    Args:
+        values: Of any shape.
+        there: Bool, of a shape that broadcasts to that of ``values``.
+        dim: The dimension to pool; the result lacks it.
+    """
+    weights = there.to(values.dtype)
+    return (weights * values).sum(dim=dim) / weights.sum(dim=dim).clamp_min(1.0)
+
+
 def largest(values: Tensor, there: Tensor, dim: int) -> Tensor:
     """The largest of each number, of those that are there; 0 where none is.
 
