@@ -2,6 +2,7 @@
 
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -9,9 +10,11 @@ from innerattn.config import RunConfig, Scenario, load_run_config
 from innerattn.envs import BatchEnv
 from innerattn.policies.exported.contract import WEIGHTS, Contract, contract_in, contract_text
 from innerattn.policies.exported.pair_network import PairActor, PairLayers
+from innerattn.policies.exported.view import VIEW, ViewActor
 from innerattn.train import RunFolder
 from innerattn.train.export import export_run
 from innerattn.train.export.document import contract_document, network_of
+from innerattn.train.export.view_form import ViewForm
 from innerattn.train.teams.policy import TeamPolicy
 from innerattn.zoo import run_path
 
@@ -83,6 +86,25 @@ def actors_of(contract: Contract, policy: TeamPolicy) -> list[PairActor]:
     tensors = {name: one.numpy() for name, one in policy.actor.state_dict().items()}
     layers = PairLayers(contract.network, tensors)
     return [PairActor(contract, robot, layers) for robot in range(len(contract.robots))]
+
+
+class EagerFile:
+    """The graph of a policy's ONNX file, computed by torch."""
+
+    def __init__(self, policy: TeamPolicy) -> None:
+        self._form = ViewForm(policy.actor)
+
+    @torch.no_grad()
+    def logits(self, view: dict[str, Any]) -> Any:
+        """See `innerattn.policies.exported.view.ViewFile`."""
+        logits, probabilities = self._form(*(torch.tensor(view[name]) for name in VIEW))
+        torch.testing.assert_close(probabilities, logits.exp(), rtol=1e-4, atol=1e-6)
+        return logits.numpy()
+
+
+def view_actors_of(contract: Contract, file: Any) -> list[ViewActor]:
+    """The policy of a file, for each robot."""
+    return [ViewActor(contract, robot, file) for robot in range(len(contract.robots))]
 
 
 def run_of(folder: Path, config: RunConfig) -> Path:

@@ -53,8 +53,8 @@ class Export(Command):
         robots, actors = len(contract.robots), len(contract.actors)
         size = sum(entry.bytes for entry in contract.files.values()) / 1e6
         frame = "as the world is" if contract.network.frame is None else "canonical, in the files"
-        has_onnx = contract.network.pairs is None
-        files = f"{actors} ONNX files" if has_onnx else "for numpy alone"
+        has_onnx = any(name.endswith(".onnx") for name in contract.files)
+        files = f"{actors} ONNX file{'s' * (actors > 1)}" if has_onnx else "for numpy alone"
         print(f"{folder}: {robots} robots, {files}, {size:.1f} MB")
         print(f"observation: {len(contract.observation)} columns; frame: {frame}")
         print(f"control period: {contract.control_period_s:g} s")
@@ -67,4 +67,6 @@ class Export(Command):
         differences.append(("numpy", checked.largest_difference_numpy))
         said = [f"{one:.1e} in {name}" for name, one in differences if one is not None]
         print(f"largest difference: {', '.join(said)}")
+        if not has_onnx:
+            print("pip install 'innerattn[deploy]' and export again for an ONNX file, too")
         return 0

@@ -12,7 +12,15 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from team_of_any import TEAM, actors_of, config_of, contract_of, policy_of
+from team_of_any import (
+    TEAM,
+    EagerFile,
+    actors_of,
+    config_of,
+    contract_of,
+    policy_of,
+    view_actors_of,
+)
 
 from innerattn.config import Scenario
 from innerattn.config.family import Family
@@ -20,13 +28,16 @@ from innerattn.config.scenario import Fault
 from innerattn.envs import BatchEnv
 from innerattn.errors import ExportError, ReadingError
 from innerattn.nn.teams.frames import turn, turn_back_choices
-from innerattn.policies import Exported
+from innerattn.policies import Exported, PolicyInput
 from innerattn.policies.exported.contract import contract_text
 from innerattn.policies.exported.pair_network import mixture
 from innerattn.policies.exported.pairs import frame_of, turned
 from innerattn.policies.exported.readings import RowBuilder
 from innerattn.policies.exported.table import bodies_of, demand_of
+from innerattn.policies.exported.view import ViewFile
 from innerattn.train.export.check import MOST_OF_PAIRS, at_edge
+from innerattn.train.export.onnx_file import view_file
+from innerattn.train.export.view_form import ViewForm
 from innerattn.train.teams.sheet import TeamSheet, as_tensor
 
 POOLINGS = ("inner", "uniform", "max", "nearest")
@@ -48,7 +59,10 @@ SENSES = (
 def test_any_team_acts_as_the_learner_does(
     number: int, pooling: str, faults: tuple[Fault, ...], leave: bool
 ) -> None:
-    """Random teams of the family, whose robots drive at random; some are unavailable."""
+    """Random teams of the family, whose robots drive at random; some are unavailable.
+
+    In numpy, and in the graph of the ONNX file.
+    """
     scenario = SORTS.draw(5, number)
     scenario = scenario.replace(faults=(*scenario.faults, *faults))
     if leave:
@@ -63,7 +77,8 @@ def test_any_team_acts_as_the_learner_does(
         for _ in range(rng.integers(0, 8)):
             obs = env.step(rng.integers(0, 5, obs.shape[:2])).obs
     expected = policy.own_log_probs(torch.tensor(obs)).numpy()
-    for robot, actor in enumerate(actors_of(contract, policy)):
+    in_numpy, in_graph = actors_of(contract, policy), view_actors_of(contract, EagerFile(policy))
+    for robot, actor in [*enumerate(in_numpy), *enumerate(in_graph)]:
         found = actor.logits(obs[:, robot])
         assert found.dtype == np.float32
         wanted = expected[:, robot]
@@ -195,15 +210,80 @@ def test_a_robot_alone_acts() -> None:
     policy = policy_of(config)
     with closing(BatchEnv(alone, 20, seed=1, num_threads=1)) as env:
         obs = env.reset()
-    found = actors_of(contract_of(config), policy)[0].logits(obs[:, 0])
-    np.testing.assert_allclose(found, policy.own_log_probs(torch.tensor(obs))[:, 0], atol=1e-4)
+    expected = policy.own_log_probs(torch.tensor(obs))[:, 0]
+    contract = contract_of(config)
+    for actor in (actors_of(contract, policy)[0], view_actors_of(contract, EagerFile(policy))[0]):
+        np.testing.assert_allclose(actor.logits(obs[:, 0]), expected, atol=1e-4)
 
 
-def test_onnxruntime_is_refused(any_team: Path) -> None:
+@pytest.mark.parametrize(
+    "pooling", ["inner", *(pytest.param(one, marks=pytest.mark.long) for one in POOLINGS[1:])]
+)
+def test_one_file_serves_any_team(pooling: str) -> None:
+    """Other robots, victims and abilities than the file was made with; also none to help."""
+    config = config_of(pooling, TEAM, 5)
+    policy = policy_of(config)
+    file = ViewFile(view_file(ViewForm(policy.actor), "mark"), "any.onnx", "mark")
+    alone = TEAM.replace(
+        robots=[TEAM.robots[-1]],
+        tasks=[TEAM.tasks[1].model_copy(update={"needs": ("heal",)})],
+        situation="single",
+    )
+    teams = [TEAM, alone, *(SORTS.draw(6, number) for number in range(4))]
+    sizes = set()
+    for number, scenario in enumerate(teams):
+        here = config.model_copy(update={"scenario": scenario})
+        contract = contract_of(here)
+        with closing(BatchEnv(scenario, 8, seed=number, num_threads=1)) as env:
+            obs = env.reset()
+            obs = env.step(np.full(obs.shape[:2], number % 5)).obs
+        obs[0] = 0.0  # nobody is there
+        numpys, graphs = actors_of(contract, policy), view_actors_of(contract, file)
+        for robot, (plain, graph) in enumerate(zip(numpys, graphs, strict=True)):
+            wanted, found = plain.logits(obs[:, robot]), graph.logits(obs[:, robot])
+            assert found.dtype == np.float32
+            apart = np.abs(np.exp(found) - np.exp(wanted)).max(axis=1)
+            assert np.sort(apart)[-2] < MOST_OF_PAIRS  # but for one where two arrive at once
+        sizes.add((len(scenario.robots), scenario.num_victims, len(contract.abilities)))
+    assert len(sizes) > 3
+
+
+def test_rows_of_nobody_change_nothing() -> None:
+    """A program may keep rows for robots and victims that are not there."""
+    config = config_of("inner", TEAM, 3)
+    policy, contract = policy_of(config), contract_of(config)
+    file, rng = EagerFile(policy), np.random.default_rng(3)
+    (actor, *_), builder = view_actors_of(contract, file), RowBuilder(contract, 0, 1.0)
+    for _ in range(20):
+        view = actor.view(builder.row(readings(rng, ["drone_1", "digger_0", "digger_1", "medic"])))
+        expected = file.logits(view)
+        more = dict(view)
+        for name in ("positions", "velocities", "bodies"):
+            more[name] = np.append(view[name], rng.random((2, view[name].shape[1])), 0)
+        for name, rows in (("abilities", 2), ("needs", 3)):
+            more[name] = np.append(view[name], np.zeros((rows, view[name].shape[1])), 0)
+        more["present"] = np.append(view["present"], [False, False])
+        for name in ("victims", "waits"):
+            more[name] = np.append(view[name], rng.random((3, view[name].shape[1])), 0)
+        more = {name: np.asarray(one, view[name].dtype) for name, one in more.items()}
+        np.testing.assert_allclose(file.logits(more), expected, rtol=1e-4, atol=1e-4)
+        assert np.abs(file.logits({**view, "needs": view["needs"] * 0})[0] - expected[0]) > 1e-3
+
+
+def test_both_backends_play_alike(any_team: Path) -> None:
     folder = any_team / "export"
-    with pytest.raises(ExportError, match=r"backend = 'onnxruntime': must be 'numpy' or None; a"):
-        Exported(folder, backend="onnxruntime")
-    assert Exported(folder, backend="numpy").backend == "numpy"
+    assert Exported(folder).backend == "numpy"
+    numpy, onnx = (Exported(folder, backend=one) for one in ("numpy", "onnxruntime"))
+    assert onnx.backend == "onnxruntime"
+    with closing(BatchEnv(TEAM, 16, seed=4, num_threads=1)) as env:
+        obs = env.reset()
+        for _ in range(10):
+            actions = numpy.act(PolicyInput(obs))
+            assert (onnx.act(PolicyInput(obs)) == actions).mean() > 0.98
+            obs = env.step(actions).obs
+    width = len(onnx.contract.observation)
+    with pytest.raises(ReadingError, match="row: is beyond what the policy of medic can act on"):
+        onnx.decide("medic", np.full(width, 1e12))
 
 
 def test_rows_that_need_too_much_are_refused() -> None:
@@ -213,10 +293,11 @@ def test_rows_that_need_too_much_are_refused() -> None:
     scenario = TEAM.replace(robots=robots, tasks=tasks)
     config = config_of("uniform", scenario, 0)
     contract = contract_of(config)
-    actor = actors_of(contract, policy_of(config))[0]
+    policy = policy_of(config)
     row = np.ones(len(contract.observation), np.float32)
-    with pytest.raises(ReadingError, match="row: has a victim that needs 13 abilities: must be at"):
-        actor.logits(row[None])
+    for actor in (actors_of(contract, policy)[0], view_actors_of(contract, EagerFile(policy))[0]):
+        with pytest.raises(ReadingError, match="row: has a victim that needs 13 abilities: must"):
+            actor.logits(row[None])
 
 
 Change = Callable[[dict[str, Any]], None]

@@ -27,11 +27,12 @@ def loaded() -> TeamPolicy:
     return policy
 
 
-def test_the_folder_has_a_contract_and_weights_alone(any_team: Path) -> None:
+def test_the_folder_has_a_contract_weights_and_one_file_for_any_team(any_team: Path) -> None:
     folder = any_team / "export"
-    assert {path.name for path in folder.iterdir()} == {"contract.json", "weights.safetensors"}
+    names = {path.name for path in folder.iterdir()}
+    assert names == {"contract.json", "weights.safetensors", "any.onnx"}
     contract = Exported(folder).contract
-    assert contract.actors == {"any": "weights.safetensors"}
+    assert contract.actors == {"any": "any.onnx"}
     assert {robot.actor for robot in contract.robots} == {"any"}
     assert [robot.name for robot in contract.robots] == [robot.name for robot in TEAM.robots]
     assert [robot.mass_kg for robot in contract.robots] == [robot.mass_kg for robot in TEAM.robots]
@@ -39,12 +40,13 @@ def test_the_folder_has_a_contract_and_weights_alone(any_team: Path) -> None:
     assert contract.network.pairs is not None
     assert contract.network.pairs.rescue_radius_m == TEAM.rescue_radius_m
     assert contract.run["method"] == "team-inner"
-    assert set(contract.made_with) == {"innerattn", "torch"}
+    assert set(contract.made_with) == {"innerattn", "torch", "onnx", "onnxscript"}
     checked = contract.checked
     assert checked is not None
     assert checked.observations >= 10_000
     assert checked.same_greedy_action + checked.near_ties == checked.observations
-    assert checked.largest_difference_onnx is None
+    assert checked.largest_difference_onnx is not None
+    assert 0.0 < checked.largest_difference_onnx < 1e-4
     assert 0.0 < checked.largest_difference_numpy < 1e-4
     said = " ".join(contract.about.values())
     assert "ONNX file" in contract.about["any_team"]
@@ -88,7 +90,14 @@ def test_without_a_scenario_it_is_that_of_the_run(tmp_path: Path) -> None:
 def test_no_library_of_onnx_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("innerattn.train.export.write.find_spec", lambda _: None)
     run = make_run(tmp_path / "run", config_of("max", Scenario.preset("mixed"), 1))
-    assert Exported(export_run(run)[0]).backend == "numpy"
+    folder, contract = export_run(run)
+    assert contract.actors == {"any": "weights.safetensors"}
+    assert set(contract.made_with) == {"innerattn", "torch"}
+    assert contract.checked is not None
+    assert contract.checked.largest_difference_onnx is None
+    assert Exported(folder).backend == "numpy"
+    with pytest.raises(ExportError, match=r"backend = 'onnxruntime': must be 'numpy' or None; th"):
+        Exported(folder, backend="onnxruntime")
 
 
 @pytest.mark.parametrize(

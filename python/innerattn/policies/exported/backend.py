@@ -44,36 +44,48 @@ class OnnxActor:
             ExportError: the file cannot be loaded, or belongs to another team.
             MissingLibraryError: onnxruntime is not installed.
         """
-        runtime = _onnxruntime()
-        options = runtime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 4
-        try:
-            session = runtime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
-        except Exception as error:  # onnxruntime has no common base of its errors
-            raise ExportError(
-                f"{name}: onnxruntime cannot load it ({_first_line(error)})"
-            ) from error
-        said = session.get_modelmeta().custom_metadata_map.get(MARK)
-        if said != mark:
-            raise ExportError(f"{name}: is not of this team and robot: it says {said!r}")
-        shapes = [
-            [one.name, *one.shape[1:]] for one in (*session.get_inputs(), *session.get_outputs())
-        ]
         width, outputs = len(contract.observation), contract.outputs
         if contract.action_kind == "continuous":
             self._output, expected = POLICY, [[INPUT, width], [POLICY, outputs], [FORCE, 2]]
         else:
             self._output = LOGITS
             expected = [[INPUT, width], [LOGITS, outputs], [PROBABILITIES, outputs]]
-        if shapes != expected:
-            raise ExportError(f"{name}: has {shapes}, must have {expected}")
-        self._session: Any = session
+        self._session = onnx_session(data, name, mark, expected)
 
     def logits(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
         """See `Actor.logits`."""
         (found,) = self._session.run([self._output], {INPUT: rows})
         return np.asarray(found)
+
+
+def onnx_session(data: bytes, name: str, mark: str, expected: list[list[Any]]) -> Any:
+    """Load an ONNX file into onnxruntime, on one thread.
+
+    Args:
+        data: the file.
+        name: what to call it in messages.
+        mark: what it must say of itself, as of `onnx_mark`.
+        expected: its inputs and outputs: the name of each, and its sizes but for the first.
+
+    Raises:
+        ExportError: the file cannot be loaded, or belongs to another team.
+        MissingLibraryError: onnxruntime is not installed.
+    """
+    runtime = _onnxruntime()
+    options = runtime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    try:
+        session = runtime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime has no common base of its errors
+        raise ExportError(f"{name}: onnxruntime cannot load it ({_first_line(error)})") from error
+    said = session.get_modelmeta().custom_metadata_map.get(MARK)
+    if said != mark:
+        raise ExportError(f"{name}: is not of this team and robot: it says {said!r}")
+    found = [[one.name, *one.shape[1:]] for one in (*session.get_inputs(), *session.get_outputs())]
+    if found != expected:
+        raise ExportError(f"{name}: has {found}, must have {expected}")
+    return session
 
 
 MARK = "innerattn.actor"

@@ -21,7 +21,7 @@ from innerattn.policies.exported.pairs import (
     Pairs,
     Relating,
 )
-from innerattn.policies.exported.table import TableReader
+from innerattn.policies.exported.table import TableReader, too_large
 
 Array = NDArray[np.float32]
 
@@ -33,8 +33,6 @@ _ZERO, _SHARPNESS, _LARGEST_LOGIT, _ALMOST_NOTHING = (
 _NO_BIAS = np.zeros(1, np.float32)
 _ROUNDS = ("", "_again")
 """Suffixes of the poolings' names in the first and the second round."""
-_MOST_NUMBER = 1e9
-"""Largest number of a row that a robot acts on; beyond it, float32 does not suffice."""
 
 
 class PairLayers:
@@ -119,7 +117,7 @@ class PairActor:
         return np.array(found, np.float32).reshape(-1, _ACTIONS)
 
     def _log_probabilities(self, row: Array) -> list[float]:
-        if not -_MOST_NUMBER < row.min() <= row.max() < _MOST_NUMBER:
+        if too_large(row):
             return [nan] * _ACTIONS
         pairs, home = self._relating.relate(self._reader.table(row))
         if pairs is None:
@@ -219,7 +217,7 @@ def mixture(proposals: Sequence[Sequence[float]], frames: Sequence[int]) -> list
     rows = []
     for (weight, *choices), frame in zip(proposals, frames):
         rest = weight - total - _log_sum(choices)
-        rows.append([choices[name] + rest for name in _NAMES[frame]])
+        rows.append([choices[name] + rest for name in ACTION_NAMES[frame]])
     return [_log_sum(column) for column in zip(*rows)]
 
 
@@ -239,7 +237,8 @@ def _names(frame: int) -> list[int]:
     return [stay, right, left, up, down]
 
 
-_NAMES = [_names(frame) for frame in range(8)]
+ACTION_NAMES = [_names(frame) for frame in range(8)]
+"""Of each frame; see `_names`."""
 
 
 def pair_shapes(network: Network) -> dict[str, tuple[int, ...]]:

@@ -12,11 +12,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.errors import ReadingError
-from innerattn.policies.exported.contract import MOST_NEEDS, Contract
+from innerattn.policies.exported.contract import Contract
 from innerattn.policies.exported.moves import GAINS_WIDTH, Moves
 from innerattn.policies.exported.roles import Roles, roles_of
-from innerattn.policies.exported.table import ENDLESS_S, Bodies, Table, bodies_of, demand_of
+from innerattn.policies.exported.table import (
+    ENDLESS_S,
+    Bodies,
+    Table,
+    bodies_of,
+    demand_of,
+    refuse_too_many_needs,
+)
 
 Array = NDArray[np.float32]
 Numbers = NDArray[np.int64]
@@ -316,9 +322,7 @@ class Relating:
             np.frombuffer(data, np.float32).reshape(-1, self._abilities)
             for data in (needs, abilities)
         )
-        if (most := int((wanted > 0.0).sum(axis=1).max())) > MOST_NEEDS:
-            said = f"has a victim that needs {most} abilities: must be at most {MOST_NEEDS}"
-            raise ReadingError("row", said)
+        refuse_too_many_needs(wanted)
         roles = roles_of(wanted, able)
         columns = np.zeros((*roles.useful.shape, PAIR_WIDTH), np.float32)
         columns[..., _NEEDED] = roles.needed[:, None]

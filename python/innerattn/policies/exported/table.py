@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.policies.exported.contract import Contract
+from innerattn.errors import ReadingError
+from innerattn.policies.exported.contract import MOST_NEEDS, Contract
 from innerattn.policies.exported.layout import layout_of
 from innerattn.policies.exported.motion import final_speed_and_lag
 
@@ -16,6 +17,8 @@ Array = NDArray[np.float32]
 
 ENDLESS_S = 1e3
 """Time until a victim without a deadline is lost [s]."""
+_MOST_NUMBER = 1e9
+"""Largest number of a row that a robot acts on."""
 
 
 class Table(NamedTuple):
@@ -137,6 +140,23 @@ class TableReader:
         if "blocked" in times:
             found[:, 2] = victims[:, times["blocked"]]
         return found
+
+
+def refuse_too_many_needs(needs: Array) -> None:
+    """Refuse a victim with more needs (M, K) than a policy for any team knows.
+
+    Raises:
+        ReadingError: one needs more than `MOST_NEEDS` abilities.
+    """
+    most = int((needs > 0.0).sum(axis=1).max(initial=0))
+    if most > MOST_NEEDS:
+        said = f"has a victim that needs {most} abilities: must be at most {MOST_NEEDS}"
+        raise ReadingError("row", said)
+
+
+def too_large(row: Array) -> bool:
+    """Whether a row has a number that is not finite, or for which float32 does not suffice."""
+    return not -_MOST_NUMBER < row.min() <= row.max() < _MOST_NUMBER
 
 
 def bodies_of(contract: Contract, order: list[int]) -> Bodies:

@@ -30,6 +30,7 @@ from innerattn.policies.exported.network import NumpyActor, probabilities_of
 from innerattn.policies.exported.pair_network import PairActor, PairLayers
 from innerattn.policies.exported.readings import RowBuilder
 from innerattn.policies.exported.tensors import tensors_in
+from innerattn.policies.exported.view import ViewActor, ViewFile
 
 _NOTHING = np.zeros(0, np.float32)
 
@@ -47,7 +48,7 @@ class Exported:
 
     Attributes:
         contract: what ``contract.json`` says.
-        backend: what computes it, "onnxruntime" or "numpy"; the second for any team.
+        backend: what computes it, "onnxruntime" or "numpy".
         greedy: whether it takes the likeliest action instead of drawing one.
         name: method of the training.
     """
@@ -67,15 +68,15 @@ class Exported:
 
         Args:
             folder: what `innerattn export` wrote.
-            backend: "onnxruntime" or "numpy"; None: onnxruntime where it is installed. Policies for
-                any team run with numpy alone.
+            backend: "onnxruntime" or "numpy"; None: onnxruntime where it is installed, but numpy
+                for a policy for any team, which it computes sooner.
             greedy: take the likeliest actions; None: as the contract says.
             max_age_s: how old readings may be [s]; None: as the contract says.
             seed: of the actions that are drawn.
 
         Raises:
-            ExportError: no such folder, a file is missing, altered, or of another team, or a policy
-                for any team is asked of onnxruntime.
+            ExportError: no such folder, a file is missing, altered, or of another team, or
+                onnxruntime is asked for and there is no ONNX file.
             MissingLibraryError: onnxruntime is asked for and not installed.
             ValueError: an unknown backend, or an age that is not above 0.
         """
@@ -83,12 +84,13 @@ class Exported:
         found = read_export(folder)
         self.contract: Contract = found.contract
         if self.contract.network.pairs is not None:
-            if backend == "onnxruntime":
+            if backend is None:
+                chosen = "numpy"
+            elif chosen == "onnxruntime" and WEIGHTS in self.contract.actors.values():
                 raise ExportError(
-                    f"{found.path}: backend = 'onnxruntime': must be 'numpy' or None; a policy for "
-                    "any team has no ONNX file"
+                    f"{found.path}: backend = 'onnxruntime': must be 'numpy' or None; this export "
+                    "of a policy for any team has no ONNX file"
                 )
-            chosen = "numpy"
         self.backend = chosen
         age = self.contract.max_age_s if max_age_s is None else max_age_s
         if not 0 < age < np.inf:
@@ -323,13 +325,12 @@ def _actors(found: ExportFolder, backend: Backend) -> list[Actor]:
     contract = found.contract
     width = len(contract.observation)
     made: dict[str, Actor] = {}
+    if contract.network.pairs is not None:
+        return _pair_actors(found) if backend == "numpy" else _view_actors(found)
     if backend == "onnxruntime":
-        for name, file in contract.actors.items():
-            mark = onnx_mark(contract.weights_sha256, contract.scenario_sha256, name)
-            place = str(found.path / file)
-            made[name] = OnnxActor(found.files[file], place, contract, mark)
-    elif contract.network.pairs is not None:
-        return _pair_actors(found)
+        for name, place, mark in _onnx_files(found):
+            data = found.files[contract.actors[name]]
+            made[name] = OnnxActor(data, place, contract, mark)
     else:
         tensors = tensors_in(found.files[WEIGHTS])
         for name in contract.actors:
@@ -348,6 +349,29 @@ def _pair_actors(found: ExportFolder) -> list[Actor]:
     return [
         PairActor(contract, number, layers[robot.actor])
         for number, robot in enumerate(contract.robots)
+    ]
+
+
+def _view_actors(found: ExportFolder) -> list[Actor]:
+    """The same in onnxruntime: each robot has the same file, and a table of its own."""
+    contract = found.contract
+    files = {
+        name: ViewFile(found.files[contract.actors[name]], place, mark)
+        for name, place, mark in _onnx_files(found)
+    }
+    return [
+        ViewActor(contract, number, files[robot.actor])
+        for number, robot in enumerate(contract.robots)
+    ]
+
+
+def _onnx_files(found: ExportFolder) -> list[tuple[str, str, str]]:
+    """Name, place and mark of each actor's file."""
+    contract = found.contract
+    digests = contract.weights_sha256, contract.scenario_sha256
+    return [
+        (name, str(found.path / file), onnx_mark(*digests, name))
+        for name, file in contract.actors.items()
     ]
 
 

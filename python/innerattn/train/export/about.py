@@ -95,11 +95,11 @@ _ABOUT_ANY = {
     "frames": "World frame: origin in the centre of the arena, x and y along its walls, metres. "
     "relative_* columns are differences in axes of the world frame; nothing is rotated with the "
     "robot's heading. Rows and actions are in this frame.",
-    "any_team": "One policy acts for every robot, and there is no ONNX file: numpy computes it. A "
-    "robot reads its row as a table of robots and victims. A teammate tells its position, velocity "
-    "and availability; its abilities come with its columns, and max_speed_mps, mass_kg and "
-    "drive_force_n of all robots from `robots`. The policy does not see faults, services, "
-    "deadlines, the order of tasks and obstacles.",
+    "any_team": "One policy acts for every robot. A robot reads its row as a table of robots and "
+    "victims. A teammate tells its position, velocity and availability; its abilities come with "
+    "its columns, and max_speed_mps, mass_kg and drive_force_n of all robots from `robots`. The "
+    "ONNX file, if there is one, takes these tables instead of a row, of any numbers of robots and "
+    "victims. The policy does not see faults and obstacles.",
     "not_heard": "All columns of a teammate that is not heard are zeros, its abilities and "
     "availability too. A message older than max_age_s counts as not heard. The robot then acts as "
     "in a team without that teammate. One that has left for good is never heard.",

@@ -86,8 +86,10 @@ def check_export(
     return tally.checked(onnx=tally.onnx)
 
 
-def check_pairs(scenario: Scenario, policy: TeamPolicy, plain: Exported) -> Checked:
-    """As `check_export`, of a policy for any team, which numpy alone computes.
+def check_pairs(
+    scenario: Scenario, policy: TeamPolicy, plain: Exported, onnx: Exported | None = None
+) -> Checked:
+    """As `check_export`, of a policy for any team.
 
     Each robot looks at its own row, in the learner too. Where two robots arrive at a victim at the
     same time but for rounding, the policy itself jumps: there the export must give what the learner
@@ -97,11 +99,14 @@ def check_pairs(scenario: Scenario, policy: TeamPolicy, plain: Exported) -> Chec
         scenario: the worlds.
         policy: with its weights; it draws actions.
         plain: the export in numpy.
+        onnx: the export in onnxruntime; None: it has no ONNX file.
 
     Raises:
         ExportError: they differ; the message says where.
     """
     tally, teams = _Tally(), {"numpy": plain}
+    if onnx is not None:
+        teams["onnx"] = onnx
     names = [column.name for column in plain.contract.observation]
     moving = np.array(["position" in name or "velocity" in name for name in names])
     for obs, seen in _played(scenario, policy):
@@ -110,7 +115,7 @@ def check_pairs(scenario: Scenario, policy: TeamPolicy, plain: Exported) -> Chec
             own = logits[:, index]
             greedy, jumps = own.argmax(axis=1), partial(at_edge, policy, moving, index)
             _compare(robot, own, greedy, obs[:, index], teams, tally, MOST_OF_PAIRS, jumps)
-    return tally.checked(onnx=None)
+    return tally.checked(onnx=None if onnx is None else tally.onnx)
 
 
 def _played(

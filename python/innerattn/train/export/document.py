@@ -84,7 +84,8 @@ def contract_document(
         del parts["frame"]["rays"], parts["frame"]["ray_turns"]
     kind = {"action_kind": scenario.actions} if continuous else {}
     forces = () if continuous else _FORCES
-    libraries = ["innerattn", "torch", *(("onnx", "onnxscript") if network.pairs is None else ())]
+    has_onnx = any(name.endswith(".onnx") for name in files)
+    libraries = ["innerattn", "torch", *(("onnx", "onnxscript") if has_onnx else ())]
     worlds = scenario.model_dump(mode="json")
     return _plain(
         {

@@ -10,8 +10,13 @@ from typing import Any
 
 import torch
 
-from innerattn.policies.exported.backend import INPUT, MARK
+from innerattn.policies.exported.backend import INPUT, LOGITS, MARK, PROBABILITIES
+from innerattn.policies.exported.view import ABILITIES, ROBOTS, VICTIMS, VIEW
 from innerattn.train.export.actors import OnnxForm
+from innerattn.train.export.view_form import ViewForm
+
+_MOST = 4096
+"""Robots, victims and abilities that a policy for any team is made for."""
 
 
 def onnx_files(
@@ -46,6 +51,42 @@ def onnx_files(
             program.optimize()
             files[name] = _bytes_of(program.model_proto, marks[name])
     return files
+
+
+def view_file(form: ViewForm, mark: str) -> bytes:
+    """The ONNX file of a policy for any team, for one robot's view of any sizes.
+
+    Args:
+        form: the policy.
+        mark: what the file says of itself, as of `innerattn.policies.exported.backend.onnx_mark`.
+    """
+    sizes = {
+        name: torch.export.Dim(name, min=least, max=_MOST)
+        for name, least in ((ROBOTS, 1), (VICTIMS, 0), (ABILITIES, 1))
+    }
+    shapes = tuple(
+        {place: sizes[size] for place, size in enumerate(shape) if isinstance(size, str)}
+        for shape in VIEW.values()
+    )
+    few = {ROBOTS: 3, VICTIMS: 4, ABILITIES: 5}
+    view = {
+        name: torch.ones([one if isinstance(one, int) else few[one] for one in shape])
+        for name, shape in VIEW.items()
+    }
+    view["present"] = view["present"].bool()
+    with _quiet():
+        program = torch.onnx.export(
+            form.eval(),
+            tuple(view.values()),
+            dynamo=True,
+            external_data=False,
+            input_names=[*VIEW],
+            output_names=[LOGITS, PROBABILITIES],
+            dynamic_shapes=(shapes,),
+            verbose=False,
+        )
+    assert program is not None  # as no file was asked for
+    return _bytes_of(program.model_proto, mark)
 
 
 def _bytes_of(model: Any, mark: str) -> bytes:

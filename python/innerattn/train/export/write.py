@@ -34,7 +34,8 @@ from innerattn.train.columns import entity_columns
 from innerattn.train.export.actors import OnnxForm, OnnxVectorForm, inner_actor, team_actors
 from innerattn.train.export.check import check_export, check_pairs
 from innerattn.train.export.document import contract_document, frame_in, network_of
-from innerattn.train.export.onnx_file import onnx_files
+from innerattn.train.export.onnx_file import onnx_files, view_file
+from innerattn.train.export.view_form import ViewForm
 from innerattn.train.policy import NewestPolicy, load_newest
 from innerattn.train.teams.policy import TeamPolicy
 from innerattn.train.weights import write_weights
@@ -51,12 +52,15 @@ def needed_libraries() -> None:
     Raises:
         MissingLibraryError: one is; the message says how to install it.
     """
-    for name in _LIBRARIES:
-        if find_spec(name) is None:
-            error = ModuleNotFoundError(name=name)
-            missing: MissingLibraryError | None = missing_library("innerattn export", error)
-            assert missing is not None
-            raise missing
+    for name in _missing_libraries():
+        error = ModuleNotFoundError(name=name)
+        missing: MissingLibraryError | None = missing_library("innerattn export", error)
+        assert missing is not None
+        raise missing
+
+
+def _missing_libraries() -> list[str]:
+    return [name for name in _LIBRARIES if find_spec(name) is None]
 
 
 def export_run(
@@ -133,24 +137,34 @@ def _origin_of(run: Path, newest: NewestPolicy) -> dict[str, str | int | None]:
 def _write_pairs(
     config: RunConfig, policy: TeamPolicy, made_by: Mapping[str, str | int | None], out: Path
 ) -> Contract:
-    """Fill a folder with a policy for any team, for the team of ``config``, and check it."""
+    """Fill a folder with a policy for any team, for the team of ``config``, and check it.
+
+    It has an ONNX file where the libraries for it are installed.
+    """
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         names = env.observation_names()
     tensors = {f"{ANY}.{name}": one.detach() for name, one in policy.actor.state_dict().items()}
     weights_sha256 = write_weights(out / WEIGHTS, tensors, FORMAT)
+    file = WEIGHTS
+    if not _missing_libraries():
+        file = f"{ANY}.onnx"
+        scenario_sha256 = digest_of(config.scenario.model_dump(mode="json"))
+        mark = onnx_mark(weights_sha256, scenario_sha256, ANY)
+        write_whole(out / file, view_file(ViewForm(policy.actor), mark))
     document = contract_document(
         config,
         names,
         network_of(config, names, None),
         of_robot=[ANY] * len(config.scenario.robots),
-        actors={ANY: WEIGHTS},
+        actors={ANY: file},
         weights_sha256=weights_sha256,
         run=made_by,
-        files={WEIGHTS: (out / WEIGHTS).read_bytes()},
+        files={name: (out / name).read_bytes() for name in dict.fromkeys((WEIGHTS, file))},
     )
     write_whole(out / NAME, contract_text(document))
-    checked = check_pairs(config.scenario, policy, Exported(out, backend="numpy"))
-    return _sealed(document, checked, out)
+    plain = Exported(out, backend="numpy")
+    onnx = None if file == WEIGHTS else Exported(out, backend="onnxruntime")
+    return _sealed(document, check_pairs(config.scenario, policy, plain, onnx), out)
 
 
 def _sealed(document: dict[str, Any], checked: Checked, out: Path) -> Contract:
