@@ -64,7 +64,7 @@ def test_a_missing_library_is_named_with_its_extra(
 
 
 def test_a_policy_for_any_team_is_exported_for_the_team_of_a_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robots = """robots = [
   { name = "a", kind = "a", abilities = ["see"], max_speed_mps = 1.0, mass_kg = 1.0%s },
@@ -80,10 +80,15 @@ situation = "single"
     out, err = capsys.readouterr()
     assert err == ""
     lines = out.splitlines()
-    assert lines[0] == f"{folder}: 2 robots, for numpy alone, 0.2 MB"
+    assert lines[0] == f"{folder}: 2 robots, 1 ONNX file, 0.4 MB"
     assert lines[-1].startswith("largest difference: ")
     assert lines[-1].endswith(" in numpy")
     assert Exported(folder).robot_names == ("a", "b")
+    monkeypatch.setattr("innerattn.train.export.write.find_spec", lambda _: None)
+    assert main([*words[:-1], str(tmp_path / "plain")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"{tmp_path / 'plain'}: 2 robots, for numpy alone, 0.2 MB"
+    assert lines[-1] == "pip install 'innerattn[deploy]' and export again for an ONNX file, too"
     file.write_text(robots % ", sight_m = 0.5")
     assert main([*words[:-1], str(tmp_path / "none")]) == 1
     assert capsys.readouterr().err == (
