@@ -43,75 +43,82 @@ _KEPT_ROLES = 16
 _ZERO, _ONE, _SHORTEST, _LONGEST, _NEVER = (
     np.array(value, np.float32) for value in (0.0, 1.0, 1e-6, _LONGEST_S, NEVER_S)
 )
-(
-    _DISTANCE,
-    _TIME,
-    _TOWARDS,
-    _INSIDE,
-    _NEEDED,
-    _MET,
-    _FILLS,
-    _SPARE,
-    _SPARE_MINE,
-    _SPEED,
-    _PUSH,
-    _ARENA,
-    _WAITING,
-    _MOST_WAITING,
-    _RANK,
-    _LATER,
-    _CHOICES,
-    _WITHOUT,
-    _OTHERS,
-    _LAST,
-    _NEARER,
-    _RIVALS,
-    _PARTNERS,
-    _WAIT,
-    _LEFT,
-    _BLOCKED,
-    _TO_SPARE,
-) = range(PAIR_WIDTH)
-"""Columns of a pair."""
+
+
+class Column:
+    """Columns of a pair."""
+
+    (
+        DISTANCE,
+        TIME,
+        TOWARDS,
+        INSIDE,
+        NEEDED,
+        MET,
+        FILLS,
+        SPARE,
+        SPARE_MINE,
+        SPEED,
+        PUSH,
+        ARENA,
+        WAITING,
+        MOST_WAITING,
+        RANK,
+        LATER,
+        CHOICES,
+        WITHOUT,
+        OTHERS,
+        LAST,
+        NEARER,
+        RIVALS,
+        PARTNERS,
+        WAIT,
+        LEFT,
+        BLOCKED,
+        TO_SPARE,
+    ) = range(PAIR_WIDTH)
+
+
 _RANGES = {
-    _SPARE: (-1.0, 4.0),
-    _SPARE_MINE: (-1.0, 4.0),
-    _PUSH: (-np.inf, 3.0),
-    _LATER: (0.0, 4.0),
-    _WITHOUT: (-3.0, 3.0),
-    _OTHERS: (-np.inf, 4.0),
-    _LAST: (-3.0, 3.0),
-    _NEARER: (-np.inf, 4.0),
-    _RIVALS: (-np.inf, 6.0),
-    _PARTNERS: (-np.inf, 6.0),
-    _WAIT: (-np.inf, 4.0),
-    _LEFT: (-np.inf, 8.0),
-    _TO_SPARE: (-3.0, 3.0),
+    Column.SPARE: (-1.0, 4.0),
+    Column.SPARE_MINE: (-1.0, 4.0),
+    Column.PUSH: (-np.inf, 3.0),
+    Column.LATER: (0.0, 4.0),
+    Column.WITHOUT: (-3.0, 3.0),
+    Column.OTHERS: (-np.inf, 4.0),
+    Column.LAST: (-3.0, 3.0),
+    Column.NEARER: (-np.inf, 4.0),
+    Column.RIVALS: (-np.inf, 6.0),
+    Column.PARTNERS: (-np.inf, 6.0),
+    Column.WAIT: (-np.inf, 4.0),
+    Column.LEFT: (-np.inf, 8.0),
+    Column.TO_SPARE: (-3.0, 3.0),
 }
 """What columns are cut to."""
 _UNITS = {
-    _TIME: 2,
-    _NEEDED: 3,
-    _MET: 3,
-    _FILLS: 2,
-    _SPARE: 3,
-    _SPARE_MINE: 3,
-    _WAITING: 4,
-    _MOST_WAITING: 4,
-    _RANK: 2,
-    _CHOICES: 3,
-    _NEARER: 3,
-    _RIVALS: 3,
-    _PARTNERS: 3,
-    _WAIT: 2,
-    _LEFT: 4,
+    Column.TIME: 2,
+    Column.NEEDED: 3,
+    Column.MET: 3,
+    Column.FILLS: 2,
+    Column.SPARE: 3,
+    Column.SPARE_MINE: 3,
+    Column.WAITING: 4,
+    Column.MOST_WAITING: 4,
+    Column.RANK: 2,
+    Column.CHOICES: 3,
+    Column.NEARER: 3,
+    Column.RIVALS: 3,
+    Column.PARTNERS: 3,
+    Column.WAIT: 2,
+    Column.LEFT: 4,
 }
 """What they are divided by then."""
-_LOW, _HIGH = (
+LOW, HIGH = (
     np.array([_RANGES.get(one, (-np.inf, np.inf))[end] for one in range(PAIR_WIDTH)], np.float32)
     for end in (0, 1)
 )
-_SCALE = np.array([1 / _UNITS.get(one, 1) for one in range(PAIR_WIDTH)], np.float32)
+SCALE = np.array([1 / _UNITS.get(one, 1) for one in range(PAIR_WIDTH)], np.float32)
+"""What columns are cut to, and multiplied by then."""
 
 
 class Pairs(NamedTuple):
@@ -233,22 +240,22 @@ class Relating:
         without, others = _when_filled(times, known)
 
         columns = known.columns.copy()
-        columns[..., _DISTANCE] = distance
-        columns[..., _TIME] = times
-        columns[..., _TOWARDS] = towards
-        columns[..., _INSIDE] = inside
-        columns[..., _MET] = met.min(axis=0)[:, None]
-        columns[..., _RANK] = ranks
-        columns[..., _LATER] = times - soonest
-        columns[..., _WITHOUT] = without - times
-        columns[..., _OTHERS] = others
-        columns[..., _LAST] = others - times
-        columns[..., _NEARER] = nearer.sum(axis=2)
+        columns[..., Column.DISTANCE] = distance
+        columns[..., Column.TIME] = times
+        columns[..., Column.TOWARDS] = towards
+        columns[..., Column.INSIDE] = inside
+        columns[..., Column.MET] = met.min(axis=0)[:, None]
+        columns[..., Column.RANK] = ranks
+        columns[..., Column.LATER] = times - soonest
+        columns[..., Column.WITHOUT] = without - times
+        columns[..., Column.OTHERS] = others
+        columns[..., Column.LAST] = others - times
+        columns[..., Column.NEARER] = nearer.sum(axis=2)
         if table.waits is not None:
             _add_waits(columns, table.waits, np.maximum(times, others) + known.never)
-        np.maximum(columns, _LOW, out=columns)
-        np.minimum(columns, _HIGH, out=columns)
-        columns *= _SCALE
+        np.maximum(columns, LOW, out=columns)
+        np.minimum(columns, HIGH, out=columns)
+        columns *= SCALE
 
         there = known.there
         if len(times) > NEAREST:
@@ -325,20 +332,20 @@ class Relating:
         refuse_too_many_needs(wanted)
         roles = roles_of(wanted, able)
         columns = np.zeros((*roles.useful.shape, PAIR_WIDTH), np.float32)
-        columns[..., _NEEDED] = roles.needed[:, None]
-        columns[..., _FILLS] = roles.filled_by
-        columns[..., _SPARE] = roles.spare[:, None]
-        columns[..., _SPARE_MINE] = roles.spare_mine
-        columns[..., _SPEED] = self._speed
-        columns[..., _PUSH] = self._bodies.push
-        columns[..., _ARENA] = self._half
-        columns[..., _WAITING] = len(wanted)
-        columns[..., _MOST_WAITING] = self._victims
-        columns[..., _CHOICES] = roles.useful.sum(axis=0)
-        columns[..., _RIVALS] = roles.rivals.sum(axis=2)
-        columns[..., _PARTNERS] = roles.partners.sum(axis=2)
-        columns[..., _LEFT] = ENDLESS_S
-        columns[..., _TO_SPARE] = ENDLESS_S
+        columns[..., Column.NEEDED] = roles.needed[:, None]
+        columns[..., Column.FILLS] = roles.filled_by
+        columns[..., Column.SPARE] = roles.spare[:, None]
+        columns[..., Column.SPARE_MINE] = roles.spare_mine
+        columns[..., Column.SPEED] = self._speed
+        columns[..., Column.PUSH] = self._bodies.push
+        columns[..., Column.ARENA] = self._half
+        columns[..., Column.WAITING] = len(wanted)
+        columns[..., Column.MOST_WAITING] = self._victims
+        columns[..., Column.CHOICES] = roles.useful.sum(axis=0)
+        columns[..., Column.RIVALS] = roles.rivals.sum(axis=2)
+        columns[..., Column.PARTNERS] = roles.partners.sum(axis=2)
+        columns[..., Column.LEFT] = ENDLESS_S
+        columns[..., Column.TO_SPARE] = ENDLESS_S
         count, size = roles.useful.shape
         return _Known(
             roles=roles,
@@ -372,10 +379,10 @@ def _add_waits(columns: Array, waits: Array, ready: Array) -> None:
     """
     wait, left, blocked = waits[:, :1], waits[:, 1:2], waits[:, 2:]
     complete = np.minimum(ready.min(axis=1, keepdims=True), _NEVER)
-    columns[..., _WAIT] = wait
-    columns[..., _LEFT] = left
-    columns[..., _BLOCKED] = blocked
-    columns[..., _TO_SPARE] = np.where(left < ENDLESS_S, left - complete - wait, ENDLESS_S)
+    columns[..., Column.WAIT] = wait
+    columns[..., Column.LEFT] = left
+    columns[..., Column.BLOCKED] = blocked
+    columns[..., Column.TO_SPARE] = np.where(left < ENDLESS_S, left - complete - wait, ENDLESS_S)
 
 
 def _when_filled(times: Array, known: _Known) -> Array:

@@ -18,46 +18,25 @@ from innerattn.nn.teams.coalitions import NEVER_S
 from innerattn.nn.teams.relations import NEAREST
 from innerattn.nn.teams.tables import ENDLESS_S
 from innerattn.policies.exported.contract import MOST_NEEDS
+from innerattn.policies.exported.pairs import HIGH, LOW, SCALE, Column
 
 _LONGEST_S, _BLOCKED_S, _FARTHEST_M, _MOST_PUSH = 8.0, 100.0, 2.0, 3.0
 _GAIN_SHARPNESS = 20.0
 _DIRECTIONS = ((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
-_ENDS = (-torch.inf, torch.inf)
-_COLUMNS: tuple[tuple[int, float, float, float], ...] = (
+COLUMN_ORDER = (
     # Of a robot at a victim.
-    (0, *_ENDS, 1),  # distance
-    (1, *_ENDS, 2),  # arrival time
-    (2, *_ENDS, 1),  # speed towards it
-    (3, *_ENDS, 1),  # whether it is there
-    (6, *_ENDS, 2),  # needs that it could fill
-    (8, -1.0, 4.0, 3),  # robots to spare, of needs that it could fill
-    (14, *_ENDS, 2),  # rank of the victim among its own
-    (15, 0.0, 4.0, 1),  # later than the first of its own
-    (17, -3.0, 3.0, 1),  # filled without it, after it arrives
-    (18, *_ENDS[:1], 4.0, 1),  # enough others there
-    (19, -3.0, 3.0, 1),  # the same, after it arrives
-    (20, *_ENDS[:1], 4.0, 3),  # rivals that are nearer
-    (21, *_ENDS[:1], 6.0, 3),  # rivals
-    (22, *_ENDS[:1], 6.0, 3),  # partners
+    *(Column.DISTANCE, Column.TIME, Column.TOWARDS, Column.INSIDE, Column.FILLS),
+    *(Column.SPARE_MINE, Column.RANK, Column.LATER, Column.WITHOUT, Column.OTHERS, Column.LAST),
+    *(Column.NEARER, Column.RIVALS, Column.PARTNERS),
     # Of a robot.
-    (9, *_ENDS, 1),  # speed
-    (10, *_ENDS[:1], _MOST_PUSH, 1),  # push
-    (16, *_ENDS, 3),  # victims that it can help
+    *(Column.SPEED, Column.PUSH, Column.CHOICES),
     # Of a victim.
-    (4, *_ENDS, 3),  # needs
-    (5, *_ENDS, 3),  # needs that are met
-    (7, -1.0, 4.0, 3),  # robots to spare
-    (23, *_ENDS[:1], 4.0, 2),  # service
-    (24, *_ENDS[:1], _LONGEST_S, 4),  # time left
-    (25, *_ENDS, 1),  # blocked
-    (26, -3.0, 3.0, 1),  # time to spare
+    *(Column.NEEDED, Column.MET, Column.SPARE),
+    *(Column.WAIT, Column.LEFT, Column.BLOCKED, Column.TO_SPARE),
     # Of the world.
-    (11, *_ENDS, 1),  # arena
-    (12, *_ENDS, 4),  # victims that wait
-    (13, *_ENDS, 4),  # most victims
+    *(Column.ARENA, Column.WAITING, Column.MOST_WAITING),
 )
-"""Columns of a pair as they are computed: number in the network, what it is cut to, unit."""
-COLUMN_ORDER = tuple(number for number, *_ in _COLUMNS)
+"""The columns of a pair as they are put together here: those of a robot at a victim come first."""
 
 
 class View(NamedTuple):
@@ -151,9 +130,10 @@ class Relate(nn.Module):
         bits = numbers[:, None] >> torch.arange(MOST_NEEDS) & 1
         self.sets = nn.Buffer(bits.float())  # (256, MOST_NEEDS) all sets of needs
         self.numbers_of_sets = nn.Buffer(2 ** torch.arange(MOST_NEEDS + 1))
-        lowest, highest, units = torch.tensor([one[1:] for one in _COLUMNS]).t()[..., None]
-        self.lowest, self.highest = nn.Buffer(lowest), nn.Buffer(highest)
-        self.scale = nn.Buffer(1.0 / units)
+        order = list(COLUMN_ORDER)
+        self.lowest, self.highest, self.scale = (
+            nn.Buffer(torch.from_numpy(one[order])[:, None]) for one in (LOW, HIGH, SCALE)
+        )
         self.directions = nn.Buffer(torch.tensor(_DIRECTIONS))
         self.first_ranks = nn.Buffer(torch.arange(NEAREST))
         self.frame_parts = nn.Buffer(torch.tensor([1.0, 2.0, 4.0]))
