@@ -17,7 +17,7 @@ from innerattn.nn.teams.frames import frame_of, turn
 from innerattn.nn.teams.moves import GAINS_WIDTH, gains
 from innerattn.nn.teams.tables import ENDLESS_S, TeamTables
 
-NEAREST = 3
+NEAREST = 6
 """Victims that a robot looks at, by its own arrival time."""
 _LONGEST_S = 8.0
 """Beyond this, arrival times tell no more."""

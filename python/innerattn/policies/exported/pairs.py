@@ -29,7 +29,7 @@ Numbers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Vector = tuple[float, float]
 
-NEAREST = 3
+NEAREST = 6
 """Victims that a robot looks at, by its own arrival time; blocked ones come after all others."""
 _BLOCKED_S = np.float32(100.0)
 PAIR_WIDTH, TURNING_WIDTH, HOME_WIDTH = 27, 10 + GAINS_WIDTH, 16 + GAINS_WIDTH

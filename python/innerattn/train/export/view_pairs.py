@@ -1,8 +1,8 @@
 """What a robot for any team makes of its view, as a graph: `innerattn.policies.exported.pairs`.
 
 Sizes are those of the view: R robots, the robot itself first, V victims and K abilities. There are
-M = V + 3 victims in here: behind those of the view come three that need nothing, so that a robot
-always has `NEAREST` to look at. Tables have robots last, so that an array need not be laid out anew
+M = V + NEAREST victims in here: behind those of the view come some that need nothing, so that a
+robot always has `NEAREST` to look at. Tables have robots last, so that an array need not be laid out anew
 for each number of a pair.
 """
 
@@ -290,7 +290,7 @@ class Relate(nn.Module):
         mate = ways.index_select(0, squares.argmin(0, keepdim=True))
         mate = mate.clamp(-_FARTHEST_M, _FARTHEST_M) * mates.float().amax(0)
         known = torch.where(helps, targets, 0.0)
-        nexts = torch.cat([known[1:2], known[:1], known[:1], known[:1]])
+        nexts = torch.cat([known[1:2], known[:1].expand(NEAREST, -1)])
         heads = torch.cat([targets, -place])
         same = torch.cat([velocity, mate, place])[None].expand(NEAREST + 1, -1, -1)
         vectors = torch.cat([heads[:, None], same, nexts[:, None]], 1)

@@ -1,7 +1,7 @@
 // What a robot for any team makes of its row: one list of numbers for each pair of a robot and a victim. See
 // innerattn.policies.exported.table and innerattn.policies.exported.pairs; numbers are rounded as there.
 
-const NEAREST = 3; // victims that a robot looks at, by its own arrival time; blocked ones come after all others
+const NEAREST = 6; // victims that a robot looks at, by its own arrival time; blocked ones come after all others
 const BLOCKED_S = 100;
 const ENDLESS_S = 1000; // time until a victim without a deadline is lost
 const NOBODY_S = 1000; // arrival time of nobody
