@@ -2,8 +2,8 @@
 
 Sizes are those of the view: R robots, the robot itself first, V victims and K abilities. There are
 M = V + NEAREST victims in here: behind those of the view come some that need nothing, so that a
-robot always has `NEAREST` to look at. Tables have robots last, so that an array need not be laid out
-anew for each number of a pair.
+robot always has `NEAREST` to look at. Tables have robots last, so that an array need not be laid
+out anew for each number of a pair.
 """
 
 from __future__ import annotations
