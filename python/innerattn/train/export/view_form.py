@@ -20,7 +20,8 @@ _ROUNDS = ("", "_again")
 """Suffixes of the poolings' names in the first and the second round."""
 _SHARPNESS, _LARGEST_LOGIT, _NEVER = 10.0, 20.0, -1e9
 _ALMOST_NOTHING, _SHIFT = 1e-6, 6.907755279
-"""1e-9 of `InnerPooling` and the weights beside it, both times 1000: exporters drop less."""
+"""What `InnerPooling` adds to a sum of weights, and the logarithm of 1000. Both are 1000 times as
+large as there, because an exporter takes a sum with 1e-9 for a sum with 0 and leaves it out."""
 
 
 class _Asking(nn.Module):

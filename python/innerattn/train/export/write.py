@@ -52,15 +52,16 @@ def needed_libraries() -> None:
     Raises:
         MissingLibraryError: one is; the message says how to install it.
     """
-    for name in _missing_libraries():
+    if (name := _missing_library()) is not None:
         error = ModuleNotFoundError(name=name)
         missing: MissingLibraryError | None = missing_library("innerattn export", error)
         assert missing is not None
         raise missing
 
 
-def _missing_libraries() -> list[str]:
-    return [name for name in _LIBRARIES if find_spec(name) is None]
+def _missing_library() -> str | None:
+    """The first library of ONNX that is not installed; None: all are."""
+    return next((name for name in _LIBRARIES if find_spec(name) is None), None)
 
 
 def export_run(
@@ -146,7 +147,7 @@ def _write_pairs(
     tensors = {f"{ANY}.{name}": one.detach() for name, one in policy.actor.state_dict().items()}
     weights_sha256 = write_weights(out / WEIGHTS, tensors, FORMAT)
     file = WEIGHTS
-    if not _missing_libraries():
+    if _missing_library() is None:
         file = f"{ANY}.onnx"
         scenario_sha256 = digest_of(config.scenario.model_dump(mode="json"))
         mark = onnx_mark(weights_sha256, scenario_sha256, ANY)
