@@ -34,10 +34,11 @@ from innerattn.policies.exported.pair_network import mixture
 from innerattn.policies.exported.pairs import frame_of, turned
 from innerattn.policies.exported.readings import RowBuilder
 from innerattn.policies.exported.table import bodies_of, demand_of
-from innerattn.policies.exported.view import ViewFile
+from innerattn.policies.exported.view import VIEW, ViewFile
 from innerattn.train.export.check import MOST_OF_PAIRS, at_edge
 from innerattn.train.export.onnx_file import view_file
 from innerattn.train.export.view_form import ViewForm
+from innerattn.train.export.view_pairs import View
 from innerattn.train.teams.sheet import TeamSheet, as_tensor
 
 POOLINGS = ("inner", "uniform", "max", "nearest")
@@ -223,6 +224,7 @@ def test_one_file_serves_any_team(pooling: str) -> None:
     """Other robots, victims and abilities than the file was made with; also none to help."""
     config = config_of(pooling, TEAM, 5)
     policy = policy_of(config)
+    assert View._fields == tuple(VIEW)
     file = ViewFile(view_file(ViewForm(policy.actor), "mark"), "any.onnx", "mark")
     alone = TEAM.replace(
         robots=[TEAM.robots[-1]],

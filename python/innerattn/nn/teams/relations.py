@@ -19,9 +19,9 @@ from innerattn.nn.teams.tables import ENDLESS_S, TeamTables
 
 NEAREST = 6
 """Victims that a robot looks at, by its own arrival time."""
-_LONGEST_S = 8.0
+LONGEST_S = 8.0
 """Beyond this, arrival times tell no more."""
-_BLOCKED_S = 100.0
+BLOCKED_S = 100.0
 """What the arrival time at a blocked victim is longer, where victims are put in order [s]."""
 _MOST_NEARER, _MOST_OTHERS = 4, 6
 """Beyond these numbers of rivals and partners, more of them change nothing."""
@@ -85,7 +85,7 @@ def relate(tables: TeamTables) -> Relations:
     radius, half = tables.worlds[world, 1:2], tables.worlds[world, 0:1]
     gap = (distance - radius).clamp(min=0.0)
     times = gap / speed + (lag * (1.0 - towards / speed)).clamp(min=0.0) * (gap > 0.0)
-    times = times.clamp(max=_LONGEST_S)
+    times = times.clamp(max=LONGEST_S)
     needed = tables.needs[world, slot]
     able = tables.abilities[world] * tables.is_robot[world, :, None]
     fills = able * (needed > 0.0)[:, None]
@@ -98,7 +98,7 @@ def relate(tables: TeamTables) -> Relations:
     place = (world[:, None] * size + torch.arange(size)) * slots + slot[:, None]  # (M, R)
     own = torch.full((envs * size * slots,), NEVER_S)
     wait, left, blocked = (column[:, None] for column in tables.waits[world, slot].unbind(-1))
-    own[place] = torch.where(useful, times + _BLOCKED_S * blocked, NEVER_S)
+    own[place] = torch.where(useful, times + BLOCKED_S * blocked, NEVER_S)
     own = own.view(envs * size, slots)
     order = own.argsort(stable=True, dim=1)
     rank = torch.empty_like(order).scatter_(1, order, torch.arange(slots).expand_as(order))
@@ -189,7 +189,7 @@ def relate(tables: TeamTables) -> Relations:
 def _waits(wait: Tensor, left: Tensor, blocked: Tensor, complete: Tensor) -> tuple[Tensor, ...]:
     """Four columns (M, 1) of victims: service, deadline, order, and how much time is to spare."""
     spare = torch.where(left < ENDLESS_S, left - complete - wait, 3.0)
-    return wait.clamp(max=4.0) / 2.0, left.clamp(max=_LONGEST_S) / 4.0, blocked, spare.clamp(-3, 3)
+    return wait.clamp(max=4.0) / 2.0, left.clamp(max=LONGEST_S) / 4.0, blocked, spare.clamp(-3, 3)
 
 
 def _rivals_and_partners(fills: Tensor, useful: Tensor, needed: Tensor) -> tuple[Tensor, Tensor]:

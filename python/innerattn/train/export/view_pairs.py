@@ -15,14 +15,15 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from innerattn.nn.teams.coalitions import NEVER_S
-from innerattn.nn.teams.relations import NEAREST
+from innerattn.nn.teams.frames import frame_of
+from innerattn.nn.teams.moves import gains
+from innerattn.nn.teams.relations import BLOCKED_S, LONGEST_S, NEAREST
 from innerattn.nn.teams.tables import ENDLESS_S
 from innerattn.policies.exported.contract import MOST_NEEDS
 from innerattn.policies.exported.pairs import HIGH, LOW, SCALE, Column
 
-_LONGEST_S, _BLOCKED_S, _FARTHEST_M, _MOST_PUSH = 8.0, 100.0, 2.0, 3.0
-_GAIN_SHARPNESS = 20.0
-_DIRECTIONS = ((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
+_FARTHEST_M = 2.0
+_MOST_PUSH = float(HIGH[Column.PUSH])
 COLUMN_ORDER = (
     # Of a robot at a victim.
     *(Column.DISTANCE, Column.TIME, Column.TOWARDS, Column.INSIDE, Column.FILLS),
@@ -134,9 +135,7 @@ class Relate(nn.Module):
         self.lowest, self.highest, self.scale = (
             nn.Buffer(torch.from_numpy(one[order])[:, None]) for one in (LOW, HIGH, SCALE)
         )
-        self.directions = nn.Buffer(torch.tensor(_DIRECTIONS))
         self.first_ranks = nn.Buffer(torch.arange(NEAREST))
-        self.frame_parts = nn.Buffer(torch.tensor([1.0, 2.0, 4.0]))
 
     def forward(self, view: View) -> ViewPairs:
         """The pairs of a view."""
@@ -152,9 +151,9 @@ class Relate(nn.Module):
         towards = (ways * view.velocities.t()).sum(1, keepdim=True) / distance.clamp_min(1e-6)
         gap = (distance - view.world[1]).clamp_min(0.0)
         late = (lag * (1.0 - towards / speed)).clamp_min(0.0)
-        times = (gap / speed + torch.where(gap > 0.0, late, 0.0)).clamp_max(_LONGEST_S)
+        times = (gap / speed + torch.where(gap > 0.0, late, 0.0)).clamp_max(LONGEST_S)
         inside = (useful & (distance <= view.world[1])).float()
-        own = torch.where(useful, times + _BLOCKED_S * waits[:, 2:], NEVER_S)
+        own = torch.where(useful, times + BLOCKED_S * waits[:, 2:], NEVER_S)
         ranks = self._ranks(own)
         soonest = own.amin(0)  # (1, R)
         choices = useful.float().sum(0)  # (1, R)
@@ -188,13 +187,13 @@ class Relate(nn.Module):
         at = (ranks[:, 0, :1] == self.first_ranks).float().argmax(0)
         helps = useful[:, 0, :1].index_select(0, at)
         vectors, frames = self._vectors(view, ways[:, :, 0].index_select(0, at), helps)
-        gains = self._gains(vectors, robots[2:, :1])
+        gained = gains(vectors[:, 0], vectors[:, 1], view.bodies[:1])
         home = torch.cat(
             [
                 *(robots[:2, 0], robots[2:3, 0].clamp_max(_MOST_PUSH)),
                 *((choices[0, :1] > 0.0).float(), choices[0, :1] / 3.0),
                 *(view.abilities[:1].amax(1), soonest[0, :1].clamp_max(4.0), view.world[:1]),
-                *(self._asked(view), vectors[NEAREST, :3].flatten(), gains[NEAREST]),
+                *(self._asked(view), vectors[NEAREST, :3].flatten(), gained[NEAREST]),
             ]
         )
         return ViewPairs(
@@ -204,7 +203,7 @@ class Relate(nn.Module):
             helps=helps,
             times=times.index_select(0, at),
             masks=torch.stack([roles.rivals, roles.partners], 1).index_select(0, at),
-            turning=torch.cat([vectors[:NEAREST].flatten(1), gains[:NEAREST]], 1),
+            turning=torch.cat([vectors[:NEAREST].flatten(1), gained[:NEAREST]], 1),
             home=home[None],
             frames=frames,
         )
@@ -298,19 +297,7 @@ class Relate(nn.Module):
         swaps = heads[:, 1:].abs() > heads[:, :1].abs()
         vectors = vectors * torch.where(negative, -1.0, 1.0)[:, None]
         vectors = torch.where(swaps[..., None], vectors.flip(2), vectors)
-        frames = torch.cat([negative, swaps], 1).float() @ self.frame_parts
-        return vectors, frames.long()
-
-    def _gains(self, vectors: Tensor, body: Tensor) -> Tensor:
-        """(NEAREST + 1, GAINS_WIDTH), as of `innerattn.nn.teams.moves`."""
-        push, kept, limit, reach = body.unbind()
-        limit = limit.clamp_min(1e-6)
-        moving = kept * vectors[:, 1:2] + push * self.directions
-        fast = moving.square().sum(2, keepdim=True).sqrt()
-        far = reach * limit / torch.maximum(fast, limit)
-        left = (vectors[:, :1] - far * moving).square().sum(2).sqrt()
-        gains = (left[:, :1] - left) / (torch.minimum(push, limit) * reach).clamp_min(1e-6)
-        return torch.cat([gains[:, 1:], (_GAIN_SHARPNESS * gains).softmax(1)], 1)
+        return vectors, frame_of(heads)
 
     def _asked(self, view: View) -> Tensor:
         """(2,) how much the robot's abilities are asked for: of the scarcest one, and of all."""
