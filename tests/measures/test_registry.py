@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from innerattn.config import Scenario
 from innerattn.evaluate.play import run_episodes
 from innerattn.measures import MEASURES, Measure, measure_of, measures_of, needed_fields, register
 from innerattn.measures.dispatch_quality import dispatch_quality
+from innerattn.measures.sharing.imbalance import workload_imbalance
 from innerattn.measures.waiting import waiting
 from innerattn.policies import scripted_policy
 from innerattn.records.record import FIELDS, Record
@@ -75,11 +75,7 @@ def test_values_are_those_of_their_functions(record: Record) -> None:
     rescues = values["rescues_per_episode"]
     assert isinstance(rescues, Estimate)
     assert rescues.mean == record.rescue_counts().mean()
-    helped = np.zeros((2, 2))
-    for event in record.rescues:
-        helped[event["task"], event["helper_0"]] += 1
-    shares = helped[:, 0] / helped.sum(1)
-    assert values["imbalance"] == pytest.approx(np.abs(shares - 0.5).mean())
+    assert values["imbalance"] == workload_imbalance(record)
 
 
 def test_a_measure_is_over_the_episodes_that_have_what_it_needs(record: Record) -> None:
@@ -122,14 +118,6 @@ def test_a_measure_that_is_registered_is_computed(
     assert measures_of(record)["steps"] is None  # observations were not recorded
     with pytest.raises(ValueError, match="'steps': is registered already"):
         register(mine)
-
-
-def test_imbalance_is_of_tasks_that_two_robots_share(record: Record) -> None:
-    third = SCENARIO.robots[0].model_copy(update={"name": "food_2"})
-    three = SCENARIO.replace(robots=[*SCENARIO.robots, third])
-    assert MEASURES["imbalance"].of(replace(record, scenario=three)) is None
-    only = record.rescues[record.rescues["task"] == 0]
-    assert MEASURES["imbalance"].of(replace(record, rescues=only)) is None
 
 
 def test_what_is_no_measure_is_refused() -> None:

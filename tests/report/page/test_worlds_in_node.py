@@ -1,15 +1,12 @@
 """The worlds of pages without a browser: Node.js runs them, and they are Python's."""
 
 import json
-import os
-import subprocess
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import playwright
 import pytest
+from in_node import run_in_node
 from numpy.typing import NDArray
 from sensing import sensing
 
@@ -42,10 +39,6 @@ Rust.load(code).then((rust) => {
 """
 
 
-NODE = Path(playwright.__file__).parent / "driver" / ("node.exe" if os.name == "nt" else "node")
-"""Node.js, which Playwright brings."""
-
-
 def worlds(name: str) -> Scenario:
     """Worlds of some sort."""
     made = {
@@ -72,17 +65,11 @@ def test_they_give_the_same_observations_to_the_bit(name: str) -> None:
         "seed": str(seed),
         "actions": actions[:, 0].tolist(),
     }
-    done = subprocess.run(
-        [str(NODE), "-e", PLAY, str(FOLDER / "web" / "rust.js"), str(FOLDER / WORLDS)],
-        input=json.dumps(told).encode(),
-        capture_output=True,
-        timeout=200,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr.decode()
+    scripts = FOLDER / "web" / "rust.js", FOLDER / WORLDS
+    written = run_in_node(PLAY, *scripts, told=json.dumps(told), seconds=200)
     with BatchEnv(scenario, 1, seed, num_threads=1) as env:
         here = np.stack([env.reset(), *(env.step(one).obs for one in actions)])
         assert env.episodes()[0] == STEPS // scenario.episode_steps
-    there = np.frombuffer(done.stdout, "<f4").reshape(here.shape)
+    there = np.frombuffer(written, "<f4").reshape(here.shape)
     different = np.flatnonzero((there.view(np.uint32) != here.view(np.uint32)).any(axis=(1, 2, 3)))
     assert not len(different), f"first at step {different[0]}"

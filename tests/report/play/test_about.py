@@ -1,13 +1,11 @@
 """The sentences at the top of the page to play with: what there is to know of worlds."""
 
 import json
-import os
-import subprocess
 from importlib.resources import files
 from pathlib import Path
 
-import playwright
 import pytest
+from in_node import run_in_node
 
 from innerattn.config import Scenario
 from innerattn.report.play.state import playable_worlds
@@ -19,8 +17,6 @@ SCRIPTS = [
     REPORT / "web" / "story.js",
     REPORT / "play" / "web" / "about.js",
 ]
-NODE = Path(playwright.__file__).parent / "driver" / ("node.exe" if os.name == "nt" else "node")
-"""Node.js, which Playwright brings."""
 
 ADDED = "What the robots there offer is added up."
 SERVICE = "Help takes time: robots stay until the arc around the victim is closed."
@@ -54,11 +50,7 @@ def about(scenario: Scenario) -> str:
     worlds = json.dumps(playable_worlds(scenario))
     code = "\n".join(script.read_text("utf-8") for script in SCRIPTS)
     code += f"\nprocess.stdout.write(aboutText({worlds}, false, false));"
-    done = subprocess.run(
-        [str(NODE), "-"], input=code.encode(), capture_output=True, timeout=60, check=False
-    )
-    assert done.returncode == 0, done.stderr.decode()
-    return done.stdout.decode()
+    return run_in_node(code).decode()
 
 
 def test_there_is_a_row_for_each_worked_scenario() -> None:
