@@ -200,7 +200,7 @@ def test_it_plays_without_a_word_in_the_console(
         assert page.evaluate("play.run.now.step") >= steps
         assert page.evaluate("play.run.now.rescued") > 5
         assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-        assert page.get_by_text("This policy has no attention.").is_visible()
+        assert page.get_by_text("This policy shows no attention.").is_visible()
         assert "attention" not in page.locator("#subtitle").inner_text()
         assert not [one for one in said if not one.startswith("file:")]
 

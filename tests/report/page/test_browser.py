@@ -330,7 +330,7 @@ def test_text_of_others_is_only_text(browser: Browser, tmp_path: Path) -> None:
         heading = seen.page.get_by_role("heading", level=1)
         assert heading.inner_text() == f"Play with {HOSTILE}"
         assert seen.page.evaluate("window.struck") is None
-        assert seen.page.get_by_text("This policy has no attention.").is_visible()
+        assert seen.page.get_by_text("This policy shows no attention.").is_visible()
 
 
 def test_the_file_is_small(file: Path) -> None:

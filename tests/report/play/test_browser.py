@@ -298,7 +298,7 @@ def test_another_policy_acts_on_the_same_state(browser: Browser, team: Any) -> N
         settle(page)
         after = state(page)
         assert (after["positions"], after["attention"]) == (before["positions"], None)
-        assert page.get_by_text("This policy has no attention.").is_visible()
+        assert page.get_by_text("This policy shows no attention.").is_visible()
         page.get_by_role("button", name="Step", exact=True).click()
         page.keyboard.press("p")
         page.keyboard.press("p")
@@ -388,7 +388,7 @@ def test_mappo_has_no_attention(browser: Browser, tmp_path: Path) -> None:
     with played(make) as server, visit(browser, server.address) as seen:
         ready(seen.page, paused=False)
         until(seen.page, "play.run.last >= 2")
-        assert seen.page.get_by_text("This policy has no attention.").is_visible()
+        assert seen.page.get_by_text("This policy shows no attention.").is_visible()
 
 
 def test_hostile_and_foreign_names_are_text(

@@ -203,7 +203,7 @@ def test_two_policies_side_by_side(browser: Browser, tmp_path: Path) -> None:
         assert page.locator("canvas").count() == 2
         assert page.locator("#which [aria-pressed=true]").inner_text() == "g"
         page.get_by_role("button", name="h", exact=True).click()
-        assert page.get_by_text("This policy has no attention.").is_visible()
+        assert page.get_by_text("This policy shows no attention.").is_visible()
         page.get_by_role("combobox", name="Sorted").select_option("difference")
         page.get_by_role("slider", name="Step").fill("24")
         episode = page.evaluate("replay.episode")
@@ -256,7 +256,7 @@ def few(**fields: Any) -> Scenario:
 def test_one_robot_without_teammates(browser: Browser, tmp_path: Path) -> None:
     with visit(browser, written(tmp_path, watched(few()))) as seen:
         ready(seen.page)
-        assert seen.page.get_by_text("This policy has no attention.").is_visible()
+        assert seen.page.get_by_text("This policy shows no attention.").is_visible()
         seen.page.get_by_role("button", name="Play").click()
         until(seen.page, "replay.step > 2")
 

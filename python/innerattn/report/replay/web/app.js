@@ -275,7 +275,7 @@ class App {
     const attends = (one) => Object.keys(one.attentions).length > 0;
     $("no-attention").hidden = Boolean(run.attention);
     $("no-attention").textContent = attends(run) ?
-      `The ${this.whose} of this policy has no attention.` : "This policy has no attention.";
+      `The ${this.whose} of this policy has no attention.` : "This policy shows no attention.";
     $("attention-settings").hidden = !this.runs.some(attends);
     [...$("which").children].forEach((button, index) => {
       button.setAttribute("aria-pressed", String(index === this.chosen));
