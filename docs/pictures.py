@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ from innerattn.stats.seeds import seed_estimate
 IMAGES = Path(__file__).parent / "images"
 RECORDS = Path(__file__).parent / "records"
 ALIKE = 0.03  # margin of the studies of attention
+SIGHTS_M = (4.0, 0.8, 0.4, 0.2)  # of the study of short sight
 RIGHT, LEFT = 1, 2  # actions
 SCRIPT = ("hungarian", "--seed", "99")
 INK, GREY, BLUE, ORANGE = "#1f2933", "#7b8794", "#2b6cb0", "#c05621"
@@ -221,14 +223,34 @@ def attention_map() -> Figure:
     """What learnt attention gains over equal weights, by robots, in runs that are published."""
     critic = (("train", "method"), ("network", "attention")), "ppo-inner", "ppo-uniform"
     actor = (("network", "pooling"),), "attention", "mean"
-    rows = {
-        "critic": _gains("fast", *critic, _in_mixed),
-        "critic, sites far apart": _gains("crowd", *critic, _in_full_crowd),
-        "actor and critic": _gains("actor", *actor, _in_mixed),
+    panels: dict[str, dict[str, dict[int, Estimate]]] = {
+        "in the critic": {
+            "mixed": _gains("fast", *critic, _in_mixed),
+            "sites far apart": _gains("crowd", *critic, _in_full_crowd),
+        },
+        "in the encoders": {"mixed": _gains("actor", *actor, _in_mixed)},
     }
-    sizes = sorted({robots for gains in rows.values() for robots in gains})
-    figure, axes = figure_of(7.2, 2.3)
-    for row, gains in enumerate(rows.values()):
+    for sight_m in SIGHTS_M:
+        row = f"sight {sight_m:g} m"
+        for rows, keys in zip(panels.values(), (critic, actor), strict=True):
+            rows[row] = _gains("short_sight", *keys, partial(_sees_so_far, sight_m))
+    names = list(panels["in the critic"])
+    sizes = [
+        sorted({robots for row in rows.values() for robots in row}) for rows in panels.values()
+    ]
+    figure = Figure(figsize=(7.2, 3.4), layout="constrained", dpi=110)
+    places = figure.subplots(1, 2, width_ratios=[len(of_panel) for of_panel in sizes])
+    for axes, (title, rows), of_panel in zip(places, panels.items(), sizes, strict=True):
+        _paint_gains(axes, [rows.get(name, {}) for name in names], of_panel)
+        axes.set_title(title, fontsize=9)
+    places[0].set_yticks(range(len(names)), names)
+    places[1].set_yticks([])
+    return figure
+
+
+def _paint_gains(axes: Axes, rows: Sequence[dict[int, Estimate]], sizes: Sequence[int]) -> None:
+    """A field for each row and number of robots, with a gain where there are runs."""
+    for row, gains in enumerate(rows):
         for column, robots in enumerate(sizes):
             gain = gains.get(robots)
             colour = "#f0f0f0" if gain is None else colormaps["RdBu"](0.5 + gain.mean / 0.2)
@@ -237,13 +259,11 @@ def attention_map() -> Figure:
                 decided = gain.low > 0 or gain.high < 0 or max(-gain.low, gain.high) < ALIKE
                 text = f"{gain.mean:+.2f}".replace("-0.00", "+0.00")
                 text += " \u25cf" if decided else ""
-                axes.text(column, row, text, ha="center", va="center", fontsize=9, color=INK)
+                axes.text(column, row, text, ha="center", va="center", fontsize=8, color=INK)
     axes.set(xlim=(-0.5, len(sizes) - 0.5), ylim=(len(rows) - 0.5, -0.5), xlabel="robots")
     axes.set_xticks(range(len(sizes)), [str(robots) for robots in sizes])
-    axes.set_yticks(range(len(rows)), list(rows))
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
-    return figure
 
 
 def _gains(
@@ -288,6 +308,11 @@ def _gains(
 def _in_mixed(config: RunConfig) -> bool:
     """Whether a run is one of the preset mixed, or of its larger teams."""
     return config.scenario.situation == "mixed"
+
+
+def _sees_so_far(sight_m: float, config: RunConfig) -> bool:
+    """Whether the robots of a run see so far."""
+    return config.scenario.robots[0].sight_m == sight_m
 
 
 def _in_full_crowd(config: RunConfig) -> bool:
