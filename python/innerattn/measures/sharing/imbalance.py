@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from innerattn.measures.cooperation import shared_abilities
+from innerattn.measures.cooperation import columns_of_choices, shared_abilities
 from innerattn.measures.measure import Measure
 from innerattn.records.record import Record
 
@@ -41,9 +41,7 @@ def helpers_by_need(record: Record) -> list[NDArray[np.int64]]:
         for ability in shared:
             if ability not in task.needs:
                 continue
-            columns = [
-                f"helper_{need}" for need, role in enumerate(task.roles) if role == ability
-            ] or [name for name in events.dtype.names or () if name.startswith("helper_")]
+            columns = columns_of_choices(task, {ability}, events)
             helpers = np.concatenate([events[name] for name in columns])
             total = np.bincount(helpers[helpers >= 0], minlength=len(robots))
             found.append(total[[ability in robot.abilities for robot in robots]].astype(np.int64))
