@@ -14,9 +14,16 @@ IMITATION = Weights(learning_rate=3e-3, imitation=1.0, policy=0.0, entropy=0.0)
 POLICY = Weights(learning_rate=3e-3, imitation=0.0, policy=1.0, entropy=0.01)
 
 
-def learner(seed: int = 0) -> TeamLearner:
+def learner(seed: int = 0, *, plain_features: bool = False) -> TeamLearner:
     return TeamLearner(
-        width=16, pooling="inner", key_width=8, gamma=0.9, gae_lambda=0.7, clip=0.2, seed=seed
+        width=16,
+        pooling="inner",
+        key_width=8,
+        plain_features=plain_features,
+        gamma=0.9,
+        gae_lambda=0.7,
+        clip=0.2,
+        seed=seed,
     )
 
 
@@ -154,3 +161,23 @@ def test_the_loss_of_the_policy_is_clipped() -> None:
     expected = -sum(gains) / len(gains) - 0.01 * float(found["entropy"])
     assert float(loss.detach()) == pytest.approx(expected, abs=1e-5)
     assert float(found["kl"]) > 0.0
+
+
+def test_weights_of_plain_features_stay_zero() -> None:
+    one = learner(plain_features=True)
+    first, fourth, home = (
+        layer.weight.detach().clone()
+        for layer in (one.actor.first, one.actor.fourth, one.actor.home)
+    )
+    for seed, weights in enumerate((IMITATION, POLICY, POLICY)):
+        steps, after = rollout(one, seed)
+        one.learn(steps, after, GROUPS, weights)
+    for layer, before, columns, width in (
+        (one.actor.first, first, {1, 5, 7, 8, 14, 15, 17, 18, 19, 20, 26}, 27),
+        (one.actor.fourth, fourth, {1, 5, 7, 8, 14, 15, 17, 18, 19, 20, 26, *range(35, 46)}, 46),
+        (one.actor.home, home, {6, 8, 9, *range(16, 25)}, 25),
+    ):
+        empty = (layer.weight == 0.0).all(0).nonzero().squeeze(1).tolist()
+        assert set(empty) == columns
+        changed = (layer.weight != before).any(0)[:width].nonzero().squeeze(1).tolist()
+        assert set(changed) == set(range(width)) - columns

@@ -28,6 +28,11 @@ class TeamConfig(AlgorithmConfig):
     )
     hidden_width: int = Field(48, ge=1, le=4096, description="width of the actor's layers")
     key_width: int = Field(16, ge=1, le=4096, description="width of queries and keys")
+    features: Annotated[Literal["all", "plain"], ADDED_LATER] = Field(
+        "all",
+        description="what a robot knows of a victim; plain: places, speeds, bodies, needs and "
+        "abilities; all: also arrival times, and what follows from them and from the law of motion",
+    )
     teams: int = Field(
         16, ge=1, le=4096, description="teams trained side by side; divides train.num_envs"
     )

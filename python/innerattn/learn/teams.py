@@ -73,6 +73,7 @@ class TeamLearner:
         width: int,
         pooling: str,
         key_width: int,
+        plain_features: bool = False,
         gamma: float,
         gae_lambda: float,
         clip: float,
@@ -81,8 +82,8 @@ class TeamLearner:
         """Draw initial weights; what is drawn follows from ``seed`` alone."""
         with torch.random.fork_rng([]):
             torch.manual_seed(seed)
-            self.actor = TeamActor(width, pooling, key_width)
-            self.critic = TeamCritic()
+            self.actor = TeamActor(width, pooling, key_width, plain_features=plain_features)
+            self.critic = TeamCritic(plain_features=plain_features)
         self._gamma, self._lambda, self._clip = gamma, gae_lambda, clip
         self._generator = torch.Generator().manual_seed(seed)
         self._parameters = [*self.actor.parameters(), *self.critic.parameters()]

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from innerattn.nn.teams.features import WORKED_OUT, plain
 from innerattn.nn.teams.frames import turn_back_choices
 from innerattn.nn.teams.pooling import POOLINGS, Pooling, as_table
 from innerattn.nn.teams.relations import (
@@ -40,16 +41,20 @@ class TeamActor(nn.Module):
     the mixture pi(a) = sum_v softmax(w)_v p_v(a).
     """
 
-    def __init__(self, width: int, pooling: str, key_width: int) -> None:
+    def __init__(
+        self, width: int, pooling: str, key_width: int, *, plain_features: bool = False
+    ) -> None:
         """Draw initial weights from torch's global generator.
 
         Args:
             width: H, hidden units.
             pooling: one of `POOLINGS`.
             key_width: width of queries and keys, where the pooling has any.
+            plain_features: leave out all columns that are worked out. Their weights are 0 and stay
+                so; exported networks need not know of it.
         """
         super().__init__()
-        self.width = width
+        self.width, self.plain_features = width, plain_features
         self.first, self.second = layer(PAIR_WIDTH, width), layer(2 * width, width)
         self.rivals, self.partners, self.rivals_again, self.partners_again = (
             POOLINGS[pooling](width, key_width) for _ in range(4)
@@ -59,9 +64,18 @@ class TeamActor(nn.Module):
         self.fifth, self.out = layer(width, width), layer(width, 1 + NUM_CHOICES, 0.01)
         self.home = layer(HOME_WIDTH + width, _HOME_HIDDEN)
         self.home_out = layer(_HOME_HIDDEN, 1 + NUM_CHOICES, 0.01)
+        if plain_features:
+            turning = tuple(PAIR_WIDTH + column for column in WORKED_OUT["turning"])
+            for one, columns in (
+                (self.first, WORKED_OUT["pairs"]),
+                (self.fourth, WORKED_OUT["pairs"] + turning),
+                (self.home, WORKED_OUT["homes"]),
+            ):
+                one.weight.data[:, columns] = 0.0
 
     def forward(self, seen: Relations) -> Tensor:
         """Log-probabilities (N, 5) of stay, +x, -x, +y, -y for all robots of all worlds."""
+        seen = plain(seen) if self.plain_features else seen
         robots = len(seen.homes)
 
         def of_robot(rows: Tensor) -> Tensor:

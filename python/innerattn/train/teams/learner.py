@@ -24,6 +24,7 @@ def build_team_learner(config: RunConfig) -> TeamLearner:
         width=team.hidden_width,
         pooling=team.pooling,
         key_width=team.key_width,
+        plain_features=team.features == "plain",
         gamma=team.gamma,
         gae_lambda=team.gae_lambda,
         clip=team.clip,
