@@ -4,6 +4,9 @@
 and with one for each core in turn, three times, and times the exchange of gradients beside gloo's
 `all_reduce` in the same run. The model reads update times of one worker, for the rows that each of
 several would have.
+
+With `--any-team` it trains a policy for any team (`innerattn train --family any`) instead, and
+nothing else.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from mmap import mmap
 from pathlib import Path
@@ -40,6 +43,8 @@ from innerattn.train.workers.exchange import Exchange, memory_bytes
 PAGE = Path(__file__).parents[1] / "docs" / "scale.md"
 METHODS = {"mappo": 1_500_000, "ppo-inner": 1_500_000, "td-inner": 40_000}
 """Env-steps that are trained, by method."""
+ANY_TEAM = {"team-inner": 128_000}
+"""The same of policies for any team: five rollouts."""
 SIZES = (10, 1_000, 10_000, 30_000, 100_000, 1_000_000)
 WORKERS = (1, 2, 4, 8, 16, 32)
 ROUNDS = 3
@@ -52,17 +57,18 @@ def trained(method: str, workers: int, folder: Path) -> tuple[float, float]:
     """Env-steps/s of the second half of a training, and seconds of the whole command."""
     run = folder / f"{method}-{workers}-{time.monotonic_ns()}"
     begun = time.monotonic()
+    env_steps = (METHODS | ANY_TEAM)[method]
     options = {
         "--method": method,
         "--budget": "fast",
-        "--train.compile": "on",
         "--train.workers": str(workers),
         "--train.threads": "1",
-        "--train.env-steps": str(METHODS[method]),
-        "--train.log-every-env-steps": str(METHODS[method] // 20),
+        "--train.env-steps": str(env_steps),
+        "--train.log-every-env-steps": str(env_steps // 20),
         "--evaluate.score-episodes": "100",
         "--run-dir": str(run),
     }
+    options |= {"--family": "any"} if method in ANY_TEAM else {"--train.compile": "on"}
     words = [word for pair in options.items() for word in pair]
     subprocess.run([sys.executable, "-m", "innerattn", "train", "--quiet", *words], check=True)
     seconds = time.monotonic() - begun
@@ -72,11 +78,11 @@ def trained(method: str, workers: int, folder: Path) -> tuple[float, float]:
     return steps / (lines[-1]["seconds"] - lines[middle]["seconds"]), seconds
 
 
-def speed_table(most: int) -> str:
+def speed_table(methods: Mapping[str, int], most: int) -> str:
     """Training with one worker and with several, in turn."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        for method in METHODS:
+        for method, env_steps in methods.items():
             found: dict[int, list[tuple[float, float]]] = {1: [], most: []}
             for _ in range(ROUNDS):
                 for workers in found:
@@ -85,7 +91,7 @@ def speed_table(most: int) -> str:
             for workers, results in found.items():
                 rates, seconds = zip(*results, strict=True)
                 share = "" if workers == 1 else _listed(ratios, ".2f")
-                name = f"{method}, {METHODS[method]:,} env-steps"
+                name = f"{method}, {env_steps:,} env-steps"
                 rows.append(
                     (name, str(workers), _listed(rates, ",.0f"), share, _listed(seconds, ".0f"))
                 )
@@ -224,9 +230,14 @@ def _measured(method: str, workers: int) -> tuple[float, float, float]:
 
 def main() -> None:
     """Measure, print, and fill the page."""
-    argparse.ArgumentParser(description=__doc__).parse_args()
-    keep_heap_small()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--any-team", action="store_true", help="train a policy for any team alone")
     most = usable_cores()
+    if parser.parse_args().any_team:
+        text = f"{machine('torch')}.\n\n{speed_table(ANY_TEAM, most)}"
+        publish("any_team_speed", text, PAGE)
+        return
+    keep_heap_small()
     times = exchange_times(most)
     exchange = table(
         ("float32 numbers", "shared memory, µs", "gloo, µs", "ratio"),
@@ -239,7 +250,7 @@ def main() -> None:
     text = "\n\n".join(
         [
             f"{machine('torch')}.",
-            speed_table(most),
+            speed_table(METHODS, most),
             f"Exchanges of {most} workers:",
             exchange,
             model_table(of_gradients),

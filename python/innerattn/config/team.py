@@ -71,14 +71,19 @@ class TeamConfig(AlgorithmConfig):
         return 1
 
     def rows_of_training(self, env_steps: int) -> int:
-        """None that would be compiled."""
-        del env_steps
-        return 0
+        """Each control step of a world is used once."""
+        return env_steps
+
+    @property
+    def batches(self) -> Mapping[str, int]:
+        """The teams; see `AlgorithmConfig.batches`."""
+        return {"teams": self.teams}
 
 
 TEAM = Algorithm(
     config=TeamConfig,
     learner="innerattn.train.teams.policy:TeamPolicy",
+    averages_over_workers=True,
     methods={
         f"team-{pooling}": {"team": {"pooling": pooling}}
         for pooling in ("inner", "uniform", "max", "nearest")

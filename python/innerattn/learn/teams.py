@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from innerattn.learn import workers
 from innerattn.learn.advantage import generalised_advantage
 from innerattn.learn.resume import State, inside, take, take_generator, take_whole, under, whole
 from innerattn.nn.teams import Relations, TeamActor, TeamCritic
@@ -198,11 +199,15 @@ class TeamLearner:
         for options in self._adam.param_groups:
             options["lr"] = weights.learning_rate
         totals: dict[str, float] = {}
-        order = torch.randperm(len(rollout.seen), generator=self._generator).tolist()
+        drawn = torch.randperm(len(rollout.seen), generator=self._generator)
+        order = workers.of_first(
+            drawn
+        ).tolist()  # of all workers, so that a step is the same for all
         for step in order:
             loss, found = self._loss(rollout, step, advantage[step], target[step], weights)
             self._adam.zero_grad()
             torch.autograd.backward(loss)
+            found = self._averaged(found, robots=len(rollout.actions[step]))
             torch.nn.utils.clip_grad_norm_(self._parameters, _MOST_GRADIENT)
             self._adam.step()
             self.updates += 1
@@ -210,6 +215,28 @@ class TeamLearner:
                 totals[name] = totals.get(name, 0.0) + float(value) / len(order)
         self.rollouts += 1
         return totals
+
+    def _averaged(self, found: dict[str, Tensor], robots: int) -> dict[str, Tensor]:
+        """Let gradients, and numbers that were found, be those of the worlds of all workers.
+
+        Means over robots count by how many robots a worker has. The critic's are means over
+        worlds, of which all workers have as many.
+        """
+        if workers.count() == 1:
+            return found
+        weight = torch.tensor(float(robots))
+        own = {}
+        for name, one in self._named():
+            assert one.grad is not None  # a loss is of all of them
+            own[name] = one.grad * weight if name.startswith("actor.") else one.grad
+        numbers = [one if name == "critic_loss" else one * weight for name, one in found.items()]
+        (means,), (mean_weight, *numbers) = workers.averaged([own], [weight, *numbers])
+        for name, one in self._named():
+            one.grad = means[name] / mean_weight if name.startswith("actor.") else means[name]
+        return {
+            name: one if name == "critic_loss" else one / mean_weight
+            for name, one in zip(found, numbers, strict=True)
+        }
 
     def _targets(
         self, rollout: TeamRollout, after: Relations, groups: int
@@ -239,6 +266,7 @@ class TeamLearner:
     @torch.no_grad()
     def _rescale(self, returns: Tensor) -> None:
         """Follow mean and deviation of returns; what the critic says stays the same (PopArt)."""
+        returns = workers.gathered(returns)
         share = max(_SLOWEST_AVERAGE, 1.0 / (self.rollouts + 1))
         mean = self._mean + (returns.mean() - self._mean) * share
         std = self._std + (returns.std().clamp(min=_RETURN_FLOOR) - self._std) * share

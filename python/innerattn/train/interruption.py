@@ -99,14 +99,11 @@ class CommonInterruptions(Interruptions):
     The first request always waits, also for the compiler: what all workers have is saved together.
     """
 
-    _EVERY = 8
-    """Calls of `check` between two exchanges, each of which takes some time."""
-
-    def __init__(self) -> None:
-        """Nobody has asked yet."""
+    def __init__(self, every: int) -> None:
+        """Nobody has asked yet; ``every`` as of `remembered_interruptions`."""
         super().__init__()
         self._deferred = True
-        self._calls = 0
+        self._every, self._calls = every, 0
 
     def check(self) -> None:
         """Raise if there was a request to any worker; all of them call this equally often.
@@ -115,7 +112,7 @@ class CommonInterruptions(Interruptions):
             Interrupted: there was one.
         """
         self._calls += 1
-        if self._calls % self._EVERY == 0:
+        if self._calls % self._every == 0:
             newest = self._asked[-1] if self._asked else 0
             asked = int(workers.largest(torch.tensor(newest)))
             if asked:
@@ -132,15 +129,19 @@ class CommonInterruptions(Interruptions):
 
 
 @contextmanager
-def remembered_interruptions() -> Iterator[Interruptions]:
+def remembered_interruptions(every: int = 8) -> Iterator[Interruptions]:
     """Remember every signal that raises KeyboardInterrupt.
 
     Signals with other handlers are not changed, nor is anything outside the main thread.
 
+    Args:
+        every: calls of `Interruptions.check` between two exchanges of several workers, each of
+            which takes some time.
+
     Yields:
         What tells whether there has been such a signal.
     """
-    interruptions = Interruptions() if workers.count() == 1 else CommonInterruptions()
+    interruptions = Interruptions() if workers.count() == 1 else CommonInterruptions(every)
     before = {}
     if threading.current_thread() is threading.main_thread():
         handlers = {one: signal.getsignal(one) for one in signal.valid_signals()}

@@ -55,14 +55,16 @@ def prepared(
         ConfigError: the configuration cannot be run here.
     """
     keep_heap_small()
+    of_any_team = config.algorithm.for_any_team
     if workers.rank() == 0:
         warn_of_slow_bfloat16(config.network.precision, config.train.device)
     with (
         torch_threads(threads),
         chosen_matmul_backend(config.train.matmul_backend) as matmul_backend,
-        remembered_interruptions() as interruptions,
+        # A step of any team is a whole rollout.
+        remembered_interruptions(every=1 if of_any_team else 8) as interruptions,
     ):
-        if config.algorithm.for_any_team:
+        if of_any_team:
             with closing(TeamTraining(config, stage)) as training:
                 yield Prepared(training, False, matmul_backend, interruptions)
             return

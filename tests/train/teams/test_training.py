@@ -82,18 +82,25 @@ def test_a_run_acts_in_worlds_of_any_team(tmp_path: Path, method: str) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("env_steps", "stage", "pull"),
+    ("env_steps", "stage", "pull", "workers"),
     [
-        (160, "imitating", 0.0),
-        (480, "imitating", 0.0),
-        (320, "training", 0.0),
-        (320, "training", 0.5),
+        (160, "imitating", 0.0, 1),
+        (480, "imitating", 0.0, 1),
+        (320, "training", 0.0, 1),
+        (320, "training", 0.5, 1),
+        (320, "imitating", 0.5, 2),
+        (320, "training", 0.5, 2),
     ],
 )
 def test_a_stopped_run_goes_on_to_the_same_bits(
-    tmp_path: Path, env_steps: int, stage: str, pull: float
+    tmp_path: Path, env_steps: int, stage: str, pull: float, workers: int
 ) -> None:
-    chosen = config(train__warm_start="hungarian", train__stagger_starts=True, team__pull=pull)
+    chosen = config(
+        train__warm_start="hungarian",
+        train__stagger_starts=True,
+        train__workers=workers,
+        team__pull=pull,
+    )
     whole = train(chosen, tmp_path / "whole")
     with pytest.raises(KeyboardInterrupt):
         train(chosen, tmp_path / "run", progress=stops_after(env_steps, stage))

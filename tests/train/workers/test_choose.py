@@ -25,6 +25,8 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> Callable[..., int | str]:
 def test_as_many_as_there_are_cores_for_and_enough_rows(chosen: Callable[..., int]) -> None:
     assert [chosen(cores) for cores in (1, 2, 4, 16)] == [1, 2, 4, 4]  # 512 rows an update
     assert [chosen(cores, "td-inner") for cores in (1, 2, 4, 16)] == [1, 2, 4, 8]
+    assert [chosen(cores, "team-inner") for cores in (1, 2, 4, 16)] == [1, 2, 4, 8]  # 1,024 worlds
+    assert chosen(16, "team-inner", **{"team.teams": 12, "train.num_envs": 1_152}) == 6
 
 
 def test_shares_are_equal(chosen: Callable[..., int]) -> None:

@@ -7,6 +7,7 @@ from torch import nn
 
 from innerattn.config import RunConfig
 from innerattn.config.team import TeamConfig
+from innerattn.learn import workers
 from innerattn.learn.teams import TeamLearner
 from innerattn.nn.teams import TeamActor, TeamCritic
 
@@ -18,9 +19,9 @@ def team_section(config: RunConfig) -> TeamConfig:
 
 
 def build_team_learner(config: RunConfig) -> TeamLearner:
-    """A learner with initial weights, seeded by `train.seed`."""
-    team = team_section(config)
-    return TeamLearner(
+    """A learner with initial weights, seeded by `train.seed`; workers draw actions of their own."""
+    team, seeds = team_section(config), np.random.SeedSequence([config.train.seed, 3])
+    learner = TeamLearner(
         width=team.hidden_width,
         pooling=team.pooling,
         key_width=team.key_width,
@@ -28,8 +29,14 @@ def build_team_learner(config: RunConfig) -> TeamLearner:
         gamma=team.gamma,
         gae_lambda=team.gae_lambda,
         clip=team.clip,
-        seed=int(np.random.SeedSequence([config.train.seed, 3]).generate_state(1)[0]),
+        seed=_number(seeds),
     )
+    learner.seed_draws(_number(workers.own_seed(seeds)))
+    return learner
+
+
+def _number(seeds: np.random.SeedSequence) -> int:
+    return int(seeds.generate_state(1)[0])
 
 
 def team_networks(team: TeamConfig) -> tuple[nn.Module, ...]:

@@ -11,6 +11,7 @@ from innerattn.config import RunConfig, Scenario
 from innerattn.config.streams import stream_seed
 from innerattn.config.team import TeamConfig
 from innerattn.errors import ConfigError
+from innerattn.learn import workers
 from innerattn.learn.interruptions import Interruptions
 from innerattn.learn.resume import Resumable, State, inside, under
 from innerattn.learn.ring import Ring
@@ -79,7 +80,8 @@ class TeamTraining(Training):
         del share
         # Robots are measured by their likeliest actions. By these they may wait for each other for
         # ever, which by drawn ones they hardly ever do: half of the worlds show such states.
-        every_other = torch.arange(self.config.train.num_envs) % 2 == 0
+        count = workers.share_of(self.config.train.num_envs)
+        every_other = (torch.arange(count) + workers.rank() * count) % 2 == 0
         self._collect(self._progress_weight(0.0), imitates=True, greedy=every_other)
         return {}
 
@@ -178,7 +180,7 @@ class TeamTraining(Training):
         self._rollout, self._after = rollout, seen
 
     def _update(self, weights: Weights) -> Mapping[str, float]:
-        found = self._learner.learn(self._rollout, self._after, self._team.teams, weights)
+        found = self._learner.learn(self._rollout, self._after, self._worlds.groups, weights)
         self._rollout = TeamRollout()
         if self._team.new_teams:
             self._worlds.redraw(self._team.new_teams)

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from innerattn.config import Scenario
 from innerattn.envs import BatchEnv, MixedBatchEnv
+from innerattn.learn import workers
 from innerattn.learn.resume import State, take, take_within
 from innerattn.nn.teams import Relations, joined_tables, relate
 from innerattn.policies import Policy, PolicyInput, WorldState, scripted_policy
@@ -61,8 +62,11 @@ class _Group:
 class TeamWorlds:
     """G teams in a number of worlds each, stepped as one batch of B.
 
+    Several workers have a share of the teams each. Together they have the teams, and the worlds,
+    that one alone would have.
+
     Attributes:
-        groups: G.
+        groups: G, of this worker.
     """
 
     def __init__(
@@ -80,27 +84,31 @@ class TeamWorlds:
         Args:
             draw: gives team 0, 1, 2 and so on.
             seed: of the worlds, and of which teams are replaced.
-            groups: G.
+            groups: teams of all workers.
             worlds_per_group: worlds of each team.
             script: whose actions `wanted` gives; None: nobody's.
             stagger_starts: let worlds of a team be at different steps of their episodes.
         """
-        self.groups = groups
+        self.groups, self._of_all = workers.share_of(groups), groups
+        self._first = workers.rank() * self.groups
         self._scenario, self._seed, self._script = draw, seed, script
         self._count, self._stagger = worlds_per_group, stagger_starts
-        self._drawn = self._redrawn = 0
+        self._drawn, self._redrawn = groups, 0
         self._counts = np.zeros(5, np.int64)  # as `Tally`
         self._progress = BatchEnv.reward_component_names.index("progress")
-        self._worlds = [self._draw() for _ in range(groups)]
+        self._worlds = [self._group(self._first + number) for number in range(self.groups)]
         self._env = MixedBatchEnv([one.env for one in self._worlds], num_threads=1)
 
     def redraw(self, count: int) -> None:
-        """Replace ``count`` teams, chosen at random, by new ones."""
+        """Replace ``count`` teams of all workers, chosen at random, by new ones."""
         choice = np.random.default_rng([self._seed, 1, self._redrawn])
         self._redrawn += 1
-        for index in choice.choice(self.groups, count, replace=False):
-            self._worlds[index] = new = self._draw()
-            self._env.replace(int(index), new.env)
+        replaced = choice.choice(self._of_all, count, replace=False) - self._first
+        for number, index in enumerate(replaced.tolist(), start=self._drawn):
+            if 0 <= index < self.groups:
+                self._worlds[index] = new = self._group(number)
+                self._env.replace(index, new.env)
+        self._drawn += count
 
     def relations(self) -> Relations:
         """What is to be seen now."""
@@ -147,10 +155,10 @@ class TeamWorlds:
         )
 
     def take_tally(self) -> Tally:
-        """Counts since the last call."""
-        counts = self._counts.tolist()
+        """Counts since the last call, of all workers."""
+        mortal = sum(one.env.scenario.has_deadlines for one in self._worlds)
+        *counts, mortal = workers.total(torch.tensor([*self._counts, mortal])).tolist()
         self._counts[[0, 1, 3, 4]] = 0
-        mortal = any(one.env.scenario.has_deadlines for one in self._worlds)
         return Tally(*counts) if mortal else Tally(*counts[:4])
 
     def resume_state(self) -> dict[str, Tensor]:
@@ -192,10 +200,6 @@ class TeamWorlds:
     def close(self) -> None:
         """Free all worlds."""
         self._env.close()
-
-    def _draw(self) -> _Group:
-        self._drawn += 1
-        return self._group(self._drawn - 1)
 
     def _group(self, number: int) -> _Group:
         seed = int(np.random.SeedSequence([self._seed, 2, number]).generate_state(1)[0])

@@ -43,7 +43,9 @@ def workers_that_pay(config: RunConfig) -> int:
         or algorithm.rows_of_training(train.env_steps) < _WORTH_ROWS
     ):
         return 1
-    most = min(usable_cores(), algorithm.rows_per_update // _LEAST_ROWS)
+    # For any team, each control step of all worlds is an update.
+    rows = train.num_envs if algorithm.for_any_team else algorithm.rows_per_update
+    most = min(usable_cores(), rows // _LEAST_ROWS)
     wholes = config.shared_by_workers().values()
     fitting = (count for count in range(most, 1, -1) if not any(whole % count for whole in wholes))
     return next(fitting, 1)
