@@ -200,9 +200,7 @@ class TeamLearner:
             options["lr"] = weights.learning_rate
         totals: dict[str, float] = {}
         drawn = torch.randperm(len(rollout.seen), generator=self._generator)
-        order = workers.of_first(
-            drawn
-        ).tolist()  # of all workers, so that a step is the same for all
+        order = workers.of_first(drawn).tolist()
         for step in order:
             loss, found = self._loss(rollout, step, advantage[step], target[step], weights)
             self._adam.zero_grad()

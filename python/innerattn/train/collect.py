@@ -72,7 +72,9 @@ class Collector:
         self._device = device
         self._schedule = schedule
         self._afterstates = afterstates
-        self._obs = self._tensor(staggered(env) if stagger_starts else env.reset())
+        self._obs = self._tensor(
+            staggered(env, workers.rank() * env.num_envs) if stagger_starts else env.reset()
+        )
         self._open_rescues: NDArray[np.int64] = np.zeros(env.num_envs, np.int64)
         self._episodes = self._rescues = self._total = self._all_rescues = 0
         self._all_lost = self._all_turned_away = 0
@@ -169,16 +171,20 @@ class Collector:
         return torch.tensor(array, device=self._device)
 
 
-def staggered(env: BatchEnv) -> NDArray[np.float32]:
+def staggered(env: BatchEnv, first: int = 0) -> NDArray[np.float32]:
     """Begin episodes so that worlds are at different steps of them; observations (E, R, D).
 
     Until then the robots stand still.
+
+    Args:
+        env: the worlds.
+        first: number of the first of them, among those of all workers.
     """
     obs = env.reset()
     length = env.scenario.episode_steps
     shape = (env.num_envs, env.num_robots, *([2] if env.continuous else []))
     still = np.zeros(shape, np.float32 if env.continuous else np.int64)
-    begins = (np.arange(env.num_envs) + workers.rank() * env.num_envs) % length
+    begins = (np.arange(env.num_envs) + first) % length
     for step in range(1, length):
         env.step(still)
         obs = env.reset(mask=begins == step)

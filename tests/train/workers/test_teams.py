@@ -103,6 +103,7 @@ def team_worlds() -> TeamWorlds:
         groups=4,
         worlds_per_group=3,
         script="greedy",
+        stagger_starts=True,
     )
 
 
