@@ -7,6 +7,7 @@ from torch import Tensor
 
 from innerattn.learn.teams import TeamLearner, TeamRollout, Weights
 from innerattn.nn.teams import Relations, joined_tables, relate
+from innerattn.nn.teams.features import Bodies, Features
 from innerattn.nn.teams.frames import turn_back_choices
 
 STEPS, GROUPS, WORLDS = 6, 2, 8
@@ -14,12 +15,13 @@ IMITATION = Weights(learning_rate=3e-3, imitation=1.0, policy=0.0, entropy=0.0)
 POLICY = Weights(learning_rate=3e-3, imitation=0.0, policy=1.0, entropy=0.01)
 
 
-def learner(seed: int = 0, *, plain_features: bool = False) -> TeamLearner:
+def learner(seed: int = 0, *, features: Features = "all", bodies: Bodies = "told") -> TeamLearner:
     return TeamLearner(
         width=16,
         pooling="inner",
         key_width=8,
-        plain_features=plain_features,
+        features=features,
+        bodies=bodies,
         gamma=0.9,
         gae_lambda=0.7,
         clip=0.2,
@@ -163,8 +165,12 @@ def test_the_loss_of_the_policy_is_clipped() -> None:
     assert float(found["kl"]) > 0.0
 
 
-def test_weights_of_plain_features_stay_zero() -> None:
-    one = learner(plain_features=True)
+@pytest.mark.parametrize("bodies", ["told", "hidden"])
+def test_weights_of_hidden_columns_stay_zero(bodies: Bodies) -> None:
+    one = learner(features="plain", bodies=bodies)
+    pairs, homes = {1, 5, 7, 8, 14, 15, 17, 18, 19, 20, 26}, {6, 8, 9, *range(16, 25)}
+    if bodies == "hidden":
+        pairs, homes = pairs | {9, 10}, homes | {0, 1, 2}
     first, fourth, home = (
         layer.weight.detach().clone()
         for layer in (one.actor.first, one.actor.fourth, one.actor.home)
@@ -173,9 +179,9 @@ def test_weights_of_plain_features_stay_zero() -> None:
         steps, after = rollout(one, seed)
         one.learn(steps, after, GROUPS, weights)
     for layer, before, columns, width in (
-        (one.actor.first, first, {1, 5, 7, 8, 14, 15, 17, 18, 19, 20, 26}, 27),
-        (one.actor.fourth, fourth, {1, 5, 7, 8, 14, 15, 17, 18, 19, 20, 26, *range(35, 46)}, 46),
-        (one.actor.home, home, {6, 8, 9, *range(16, 25)}, 25),
+        (one.actor.first, first, pairs, 27),
+        (one.actor.fourth, fourth, {*pairs, *range(35, 46)}, 46),
+        (one.actor.home, home, homes, 25),
     ):
         empty = (layer.weight == 0.0).all(0).nonzero().squeeze(1).tolist()
         assert set(empty) == columns

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from innerattn.config.algorithm import Algorithm, AlgorithmConfig
 from innerattn.config.files import PRESETS
@@ -32,6 +32,12 @@ class TeamConfig(AlgorithmConfig):
         "all",
         description="what a robot knows of a victim; plain: places, speeds, bodies, needs and "
         "abilities; all: also arrival times, and what follows from them and from the law of motion",
+    )
+    bodies: Annotated[Literal["told", "hidden", "hypernetwork"], ADDED_LATER] = Field(
+        "told",
+        description="how robots know bodies (speed, start, push); told: by numbers; hidden: not at "
+        "all; hypernetwork: a network makes a robot's last layer of its own body. hidden and "
+        "hypernetwork need features = 'plain'; what has a hypernetwork cannot be exported",
     )
     teams: int = Field(
         16, ge=1, le=4096, description="teams trained side by side; divides train.num_envs"
@@ -64,6 +70,15 @@ class TeamConfig(AlgorithmConfig):
         description="weight of the cross-entropy to the script's actions while the policy learns "
         "from rewards after a warm start; it falls linearly to 0 at the end of training",
     )
+
+    @model_validator(mode="after")
+    def _check_bodies(self) -> Self:
+        if self.bodies != "told" and self.features == "all":
+            raise ValueError(
+                f"team.bodies = {self.bodies!r}: needs team.features = 'plain'; times of arrival "
+                "follow from bodies"
+            )
+        return self
 
     @property
     def rows_per_update(self) -> int:

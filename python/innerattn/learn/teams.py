@@ -15,6 +15,7 @@ from innerattn.learn import workers
 from innerattn.learn.advantage import generalised_advantage
 from innerattn.learn.resume import State, inside, take, take_generator, take_whole, under, whole
 from innerattn.nn.teams import Relations, TeamActor, TeamCritic
+from innerattn.nn.teams.features import Bodies, Features
 
 _ADVANTAGE_FLOOR = 0.02
 _RETURN_FLOOR = 1e-2
@@ -74,7 +75,8 @@ class TeamLearner:
         width: int,
         pooling: str,
         key_width: int,
-        plain_features: bool = False,
+        features: Features = "all",
+        bodies: Bodies = "told",
         gamma: float,
         gae_lambda: float,
         clip: float,
@@ -83,8 +85,8 @@ class TeamLearner:
         """Draw initial weights; what is drawn follows from ``seed`` alone."""
         with torch.random.fork_rng([]):
             torch.manual_seed(seed)
-            self.actor = TeamActor(width, pooling, key_width, plain_features=plain_features)
-            self.critic = TeamCritic(plain_features=plain_features)
+            self.actor = TeamActor(width, pooling, key_width, features=features, bodies=bodies)
+            self.critic = TeamCritic(features=features)
         self._gamma, self._lambda, self._clip = gamma, gae_lambda, clip
         self._generator = torch.Generator().manual_seed(seed)
         self._parameters = [*self.actor.parameters(), *self.critic.parameters()]

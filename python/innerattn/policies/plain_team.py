@@ -20,7 +20,7 @@ from innerattn.config import RunConfig, Scenario
 from innerattn.config.team import TeamConfig
 from innerattn.config.turning import ray_turns
 from innerattn.envs import BatchEnv
-from innerattn.errors import RunError
+from innerattn.errors import ConfigError, RunError
 from innerattn.policies.columns import able_columns, entity_columns, frame_columns
 from innerattn.policies.exported.contract import CONTINUOUS_OUTPUTS, LogStd, Network, PairRules
 from innerattn.policies.exported.frame import Frame
@@ -209,7 +209,16 @@ def newest_tensors(files: RunFiles) -> Mapping[str, NDArray[np.float32]]:
 
 
 def pair_network(team: TeamConfig, scenario: Scenario) -> Network:
-    """That of a policy for any team in the worlds of ``scenario``."""
+    """That of a policy for any team in the worlds of ``scenario``.
+
+    Raises:
+        ConfigError: a network makes its last layer of robots' bodies.
+    """
+    if team.bodies == "hypernetwork":
+        raise ConfigError(
+            f"team.bodies = {team.bodies!r}: such a policy acts from its run alone; it has no "
+            "export, and no page shows it"
+        )
     services = tuple(task.service_s for task in scenario.tasks) if scenario.has_services else ()
     return Network(
         encoder="pairs",

@@ -10,10 +10,12 @@ import torch
 from fresh_run import make_run, run_config
 from team_of_any import TEAM, config_of
 
-from innerattn.config import Battery, RangeSensor, Scenario
+from innerattn.config import Battery, RangeSensor, Scenario, load_run_config
 from innerattn.envs import BatchEnv
 from innerattn.errors import ConfigError, ExportError
+from innerattn.evaluate import load_trained
 from innerattn.policies import Exported, PolicyInput
+from innerattn.report.page.team import read_team
 from innerattn.train.export import export_run
 from innerattn.train.export.check import check_pairs
 from innerattn.train.policy import load_policy
@@ -85,6 +87,34 @@ def test_without_a_scenario_it_is_that_of_the_run(tmp_path: Path) -> None:
     assert contract.network.pooling == "nearest"
     document = json.loads((folder / "contract.json").read_text())
     assert document["run"]["method"] == "team-nearest"
+
+
+def without_bodies(folder: Path, bodies: str) -> Path:
+    """A run whose policy does not see bodies."""
+    config = load_run_config(
+        method="team-inner",
+        overrides={"team.features": "plain", "team.bodies": bodies, "team.hidden_width": 24},
+    )
+    return make_run(folder, config)
+
+
+def test_what_a_policy_does_not_see_needs_no_mask_in_an_export(tmp_path: Path) -> None:
+    _, contract = export_run(without_bodies(tmp_path / "run", "hidden"))
+    assert contract.checked is not None
+    assert contract.checked.largest_difference_numpy < 1e-4
+    assert contract.checked.largest_difference_onnx is not None
+    assert contract.checked.largest_difference_onnx < 1e-4
+
+
+def test_a_hypernetwork_is_not_exported(tmp_path: Path) -> None:
+    run = without_bodies(tmp_path / "run", "hypernetwork")
+    for made in (lambda: export_run(run), lambda: read_team(run)):
+        with pytest.raises(ConfigError, match=r"team\.bodies = 'hypernetwork': such a policy acts"):
+            made()
+    assert not (run / "export").exists()
+    _, policy = load_trained(run, TEAM)
+    with closing(BatchEnv(TEAM, 3, seed=9, num_threads=1)) as env:
+        assert policy.act(PolicyInput(env.reset())).shape == (3, len(TEAM.robots))
 
 
 def test_no_library_of_onnx_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

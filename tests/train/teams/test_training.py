@@ -185,6 +185,7 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
     [
         ({"team.teams": 5}, "train.num_envs = 32: must be a multiple of team.teams = 5"),
         ({"team.new_teams": 7}, r"team.new_teams = 7: must be in 0\.\.=4"),
+        ({"team.bodies": "hidden"}, r"team\.bodies = 'hidden': needs team\.features = 'plain'"),
         ({"team.pull": 0.5}, "team.pull = 0.5: needs a script to follow, train.warm_start"),
         ({"train.potential": "greedy"}, "train.potential: method 'team-inner' cannot follow it"),
         ({"train.on_divergence": "skip"}, "train.on_divergence: method 'team-inner' cannot"),

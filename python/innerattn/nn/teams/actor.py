@@ -6,8 +6,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from innerattn.nn.teams.features import WORKED_OUT, plain
+from innerattn.nn.teams.features import Bodies, Features, hidden_columns, without
 from innerattn.nn.teams.frames import turn_back_choices
+from innerattn.nn.teams.layers import BODY_WIDTH, BodyLayer, layer
 from innerattn.nn.teams.pooling import POOLINGS, Pooling, as_table
 from innerattn.nn.teams.relations import (
     HOME_WIDTH,
@@ -23,14 +24,6 @@ _SHARPNESS = 10.0
 """Outputs begin small, so that all actions begin alike, and are to grow soon."""
 
 
-def layer(inputs: int, outputs: int, gain: float = 2.0**0.5) -> nn.Linear:
-    """A linear layer with orthogonal weights and no bias at first."""
-    made = nn.Linear(inputs, outputs)
-    nn.init.orthogonal_(made.weight, gain)
-    nn.init.zeros_(made.bias)
-    return made
-
-
 class TeamActor(nn.Module):
     """Log-probabilities of the actions of every robot in every world.
 
@@ -42,7 +35,13 @@ class TeamActor(nn.Module):
     """
 
     def __init__(
-        self, width: int, pooling: str, key_width: int, *, plain_features: bool = False
+        self,
+        width: int,
+        pooling: str,
+        key_width: int,
+        *,
+        features: Features = "all",
+        bodies: Bodies = "told",
     ) -> None:
         """Draw initial weights from torch's global generator.
 
@@ -50,32 +49,37 @@ class TeamActor(nn.Module):
             width: H, hidden units.
             pooling: one of `POOLINGS`.
             key_width: width of queries and keys, where the pooling has any.
-            plain_features: leave out all columns that are worked out. Their weights are 0 and stay
-                so; exported networks need not know of it.
+            features: "plain" leaves out all columns that are worked out.
+            bodies: "hidden" leaves out bodies; so does "hypernetwork", but a network makes the last
+                layer for victims of each robot's body.
         """
         super().__init__()
-        self.width, self.plain_features = width, plain_features
+        self.width, self.hidden = width, hidden_columns(features, bodies)
         self.first, self.second = layer(PAIR_WIDTH, width), layer(2 * width, width)
         self.rivals, self.partners, self.rivals_again, self.partners_again = (
             POOLINGS[pooling](width, key_width) for _ in range(4)
         )
         self.third = layer(4 * width, width)
         self.fourth = layer(PAIR_WIDTH + PAIR_TURNING_WIDTH + 4 * width, width)
-        self.fifth, self.out = layer(width, width), layer(width, 1 + NUM_CHOICES, 0.01)
+        self.fifth = layer(width, width)
+        self.made_of_bodies = bodies == "hypernetwork"
+        last = BodyLayer if self.made_of_bodies else layer
+        self.out = last(width, 1 + NUM_CHOICES, 0.01)
         self.home = layer(HOME_WIDTH + width, _HOME_HIDDEN)
         self.home_out = layer(_HOME_HIDDEN, 1 + NUM_CHOICES, 0.01)
-        if plain_features:
-            turning = tuple(PAIR_WIDTH + column for column in WORKED_OUT["turning"])
-            for one, columns in (
-                (self.first, WORKED_OUT["pairs"]),
-                (self.fourth, WORKED_OUT["pairs"] + turning),
-                (self.home, WORKED_OUT["homes"]),
-            ):
-                one.weight.data[:, columns] = 0.0
+        pairs = self.hidden.get("pairs", ())
+        turning = (PAIR_WIDTH + column for column in self.hidden.get("turning", ()))
+        for one, columns in (
+            (self.first, pairs),
+            (self.fourth, (*pairs, *turning)),
+            (self.home, self.hidden.get("homes", ())),
+        ):
+            one.weight.data[:, columns] = 0.0
 
     def forward(self, seen: Relations) -> Tensor:
         """Log-probabilities (N, 5) of stay, +x, -x, +y, -y for all robots of all worlds."""
-        seen = plain(seen) if self.plain_features else seen
+        bodies = seen.homes[:, :BODY_WIDTH]
+        seen = without(seen, self.hidden)
         robots = len(seen.homes)
 
         def of_robot(rows: Tensor) -> Tensor:
@@ -98,7 +102,9 @@ class TeamActor(nn.Module):
         own, others = of_robot(rows), of_others(rows, self.rivals_again, self.partners_again)
         parts = [seen.pairs, seen.turning, rows, *others, own.index_select(0, seen.robots)]
         rows = functional.relu(self.fourth(torch.cat(parts, 1)))
-        out = self.out(functional.relu(self.fifth(rows))) * _SHARPNESS
+        rows = functional.relu(self.fifth(rows))
+        made = (seen.robots, bodies) if self.made_of_bodies else ()
+        out = self.out(rows, *made) * _SHARPNESS
         home = self.home(torch.cat([seen.homes, own], 1))
         home = self.home_out(functional.relu(home)) * _SHARPNESS
 

@@ -6,8 +6,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from innerattn.nn.teams.actor import layer
-from innerattn.nn.teams.features import plain
+from innerattn.nn.teams.features import Features, hidden_columns, without
+from innerattn.nn.teams.layers import layer
 from innerattn.nn.teams.pooling import as_table
 from innerattn.nn.teams.relations import (
     PAIR_WIDTH,
@@ -23,14 +23,14 @@ _ROBOT_HIDDEN, _VICTIM_HIDDEN, _HIDDEN = 32, 64, 96
 class TeamCritic(nn.Module):
     """V of a world, from sums and maxima over its pairs, victims and robots."""
 
-    def __init__(self, *, plain_features: bool = False) -> None:
+    def __init__(self, *, features: Features = "all") -> None:
         """Draw initial weights from torch's global generator.
 
         Args:
-            plain_features: leave out all columns that are worked out.
+            features: "plain" leaves out all columns that are worked out.
         """
         super().__init__()
-        self.plain_features = plain_features
+        self.hidden = hidden_columns(features, "told")
         self.pair = layer(PAIR_WIDTH, _ROBOT_HIDDEN)
         self.victim = layer(VICTIM_WIDTH + 2 * _ROBOT_HIDDEN, _VICTIM_HIDDEN)
         self.robot = layer(ROBOT_WIDTH, _ROBOT_HIDDEN)
@@ -39,7 +39,7 @@ class TeamCritic(nn.Module):
 
     def forward(self, seen: Relations) -> Tensor:
         """Values (B,), as many returns' standard deviations above their mean."""
-        seen = plain(seen) if self.plain_features else seen
+        seen = without(seen, self.hidden)
         victims, size = seen.times.shape
         worlds = len(seen.worlds)
         pairs = functional.relu(self.pair(seen.pairs))

@@ -144,6 +144,7 @@ def _write_pairs(
     """
     with closing(BatchEnv(config.scenario, 1, num_threads=1)) as env:
         names = env.observation_names()
+    network = network_of(config, names, None)  # refuses what cannot be exported
     tensors = {f"{ANY}.{name}": one.detach() for name, one in policy.actor.state_dict().items()}
     weights_sha256 = write_weights(out / WEIGHTS, tensors, FORMAT)
     file = WEIGHTS
@@ -155,7 +156,7 @@ def _write_pairs(
     document = contract_document(
         config,
         names,
-        network_of(config, names, None),
+        network,
         of_robot=[ANY] * len(config.scenario.robots),
         actors={ANY: file},
         weights_sha256=weights_sha256,
