@@ -56,6 +56,19 @@ def test_tasks_take_time_without_changing_the_team(seed: int, number: int) -> No
         assert set(task.after) <= set(names[:index])
 
 
+@given(seed=st.integers(0, 2**31), number=st.integers(0, 1_000))
+def test_victims_may_arrive_at_random(seed: int, number: int) -> None:
+    family = Family(situations=("poisson",), arrival_rate_hz=(0.5, 0.7), max_victims=(2, 3))
+    found = family.draw(seed, number)
+    rates = [task.arrival_rate_hz for task in found.tasks]
+    assert all(0.5 <= rate <= 0.7 for rate in rates)
+    assert found.num_victims == found.max_victims * len(found.tasks)
+    # Everything else is as where none arrives.
+    tasks = [task.model_dump() | {"arrival_rate_hz": 0.0} for task in found.tasks]
+    mixed = Family(situations=("mixed",), max_victims=(2, 3)).draw(seed, number)
+    assert found.replace(situation="mixed", tasks=tasks) == mixed
+
+
 def test_seed_and_number_fix_a_team() -> None:
     assert FAMILY.draw(3, 5) == FAMILY.draw(3, 5)
     teams = [FAMILY.draw(seed, number) for seed in range(3) for number in range(3)]
@@ -82,6 +95,7 @@ def test_shares_are_about_what_is_asked_for() -> None:
     [
         ({"robots": (5, 2)}, "family.robots = [5, 2]: the low end must not be above the high end"),
         ({"robots": (5, 65)}, "family.robots = [5, 65]: at most 64"),
+        ({"arrival_rate_hz": (2.0, 1.0)}, "family.arrival_rate_hz = [2.0, 1.0]: the low end"),
         ({"needs": ()}, "family.needs = []: must have an entry"),
         ({"unavailable": 1.5}, "less than or equal to 1"),
         ({"robot": (2, 3)}, "robot"),

@@ -7,11 +7,11 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from innerattn.config.model import Model
+from innerattn.config.model import ADDED_LATER, Model
 from innerattn.config.scenario import Scenario
 from innerattn.errors import ConfigError
 
-Situation = Literal["single", "double", "mixed"]
+Situation = Literal["single", "double", "mixed", "poisson"]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 _Range = tuple[float, float]
 _Count = Annotated[int, Field(ge=1)]
@@ -48,7 +48,12 @@ class Family(Model):
         ("mixed", "mixed", "mixed", "double", "single"),
         description="situations; each entry is equally likely",
     )
-    max_victims: _Counts = Field((1, 6), description="most victims of a wave in mixed")
+    max_victims: _Counts = Field(
+        (1, 6), description="most victims of a wave in mixed, and of each task at a time in poisson"
+    )
+    arrival_rate_hz: Annotated[_Range, ADDED_LATER] = Field(
+        (0.3, 1.5), description="how many victims of a task arrive in poisson on average [1/s]"
+    )
     arena_half_width_m: _Range = Field(
         (0.8, 1.2), description="half the side of the arena [m]; the high end grows with the team"
     )
@@ -110,7 +115,7 @@ class Family(Model):
     def _values(
         self, rng: np.random.Generator, timing: np.random.Generator, base: Scenario
     ) -> dict[str, Any]:
-        """What is drawn; ``timing`` draws how long tasks take, and changes nothing else."""
+        """What is drawn; ``timing`` draws how long tasks take and how many arrive, no more."""
         count = _whole(rng, self.robots)
         abilities = [f"ability_{index}" for index in range(_whole(rng, self.abilities))]
         team = self._team(rng, count, abilities)
@@ -128,6 +133,9 @@ class Family(Model):
             "faults": self._faults(rng, count, base.episode_steps),
         }
         self._let_tasks_take_time(timing, tasks)
+        if situation == "poisson":
+            for task in tasks:
+                task["arrival_rate_hz"] = round(float(timing.uniform(*self.arrival_rate_hz)), 2)
         if rng.random() >= self.usual_arena:
             low, high = self.arena_half_width_m
             high += self.arena_growth_m * max(0, count - 4)
