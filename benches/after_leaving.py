@@ -78,11 +78,12 @@ def main() -> None:
     trained_side_by_side(jobs, given.budget, given.at_once)
     rows, shares = [], []
     for run, team in zip(runs, teams, strict=True):
-        policies = (
+        afterwards = (
             scripted_policy("hungarian", team),
             load_trained(run, team)[1],
             load_trained("zoo:any", team)[1],
         )
+        policies = [TakingOver(load_trained("zoo:any", team)[1], one) for one in afterwards]
         found = [late_rescues(one, team, given.episodes) for one in policies]
         told = [mean_interval(one, SEED) for one in found]
         shares.append(told[-1].mean / told[-2].mean)
@@ -121,9 +122,8 @@ def staying(team: Scenario) -> Scenario:
     return team.replace(robots=team.robots[1:], faults=[])
 
 
-def late_rescues(after: Policy, team: Scenario, episodes: int) -> NDArray[np.int64]:
-    """Rescues (episodes,) from half time on, where ``after`` acts from then on."""
-    policy = TakingOver(load_trained("zoo:any", team)[1], after)
+def late_rescues(policy: Policy, team: Scenario, episodes: int) -> NDArray[np.int64]:
+    """Rescues (episodes,) of a policy from half time on."""
     record = run_episodes(policy, team, episodes, SEED)
     late = record.rescues[record.rescues["step"] >= HALF]
     return np.bincount(late["episode"], minlength=episodes)
