@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from page import machine, publish, table
-from specialists import trained_side_by_side, write_scenario
+from specialists import ENV_STEPS, trained_side_by_side, write_scenario
 
 from innerattn.config import Scenario
 from innerattn.config.family import Family
@@ -64,7 +64,7 @@ def main() -> None:
     """Train what is missing, measure, and fill the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=Path, default=Path("runs/specialists"))
-    parser.add_argument("--budget", default="paper")
+    parser.add_argument("--env-steps", type=int, default=ENV_STEPS, help="of each training")
     parser.add_argument("--episodes", type=int, default=1000)
     parser.add_argument("--at-once", type=int, default=2, help="trainings side by side")
     given = parser.parse_args()
@@ -75,7 +75,7 @@ def main() -> None:
         (run, ["--scenario", str(write_scenario(run, staying(team))), "--seed", "0"])
         for run, team in zip(runs, teams, strict=True)
     ]
-    trained_side_by_side(jobs, given.budget, given.at_once)
+    trained_side_by_side(jobs, given.env_steps, given.at_once)
     rows, shares = [], []
     for run, team in zip(runs, teams, strict=True):
         afterwards = (
@@ -91,7 +91,7 @@ def main() -> None:
         rows.append([f"{len(team.robots)} robots", *cells, f"{shares[-1]:.2f}"])
     text = (
         f"Rescues in the {HALF} steps after a robot left. {machine('torch')}. One specialist a "
-        f"team, {given.episodes} episodes, the same worlds for all; ± is half the 95 % interval."
+        f"team, {given.env_steps:,} env-steps, {given.episodes} episodes, the same worlds for all; ± is half the 95 % interval."
     )
     publish("after_leaving", f"{table(HEAD, rows)}\n\n{text}", PAGE)
 

@@ -14,7 +14,7 @@ from statistics import mean
 
 import tomli_w
 from page import machine, publish, table
-from specialists import SEEDS, trained_side_by_side
+from specialists import ENV_STEPS, SEEDS, trained_side_by_side
 
 from innerattn.config import Scenario
 from innerattn.config.family import Family
@@ -34,7 +34,7 @@ def main() -> None:
     """Train what is missing, measure, and fill the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=Path, default=Path("runs/specialists"))
-    parser.add_argument("--budget", default="paper")
+    parser.add_argument("--env-steps", type=int, default=ENV_STEPS, help="of each training")
     parser.add_argument("--episodes", type=int, default=500)
     parser.add_argument("--at-once", type=int, default=2, help="trainings side by side")
     given = parser.parse_args()
@@ -47,7 +47,7 @@ def main() -> None:
         (run, ["--family", str(family), "--seed", str(seed)])
         for run, seed in zip(runs, SEEDS, strict=True)
     ]
-    trained_side_by_side(jobs, given.budget, given.at_once)
+    trained_side_by_side(jobs, given.env_steps, given.at_once)
     rows, found = [], []
     for number, team in enumerate(large_teams()):
         policies = [
@@ -61,7 +61,8 @@ def main() -> None:
     for name, of in (("mean", mean), ("worst", min)):
         rows.append([f"**{name}**", *(f"{of(each):.2f}" for each in zip(*found, strict=True))])
     told = (
-        f"{machine('torch')}. {given.episodes} episodes of {EPISODE_STEPS} steps each; 0 rescues "
+        f"{machine('torch')}. {given.env_steps:,} env-steps, {given.episodes} episodes of "
+        f"{EPISODE_STEPS} steps each; 0 rescues "
         "as many as `random`, 1 as many as `hungarian`."
     )
     publish("larger_teams", f"{table(HEAD, rows)}\n\n{told}", PAGE)

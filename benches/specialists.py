@@ -28,6 +28,8 @@ from innerattn.policies import Policy
 PAGE = Path(__file__).parents[1] / "docs" / "teams.md"
 HEAD = ["team", "robots", "specialist", "any team", "any / specialist", "`zoo:any`"]
 SEEDS = (0, 1, 2)
+ENV_STEPS = 312_500
+"""Of each training: half of the budget `paper`."""
 ENOUGH = 0.97
 """The share of a specialist's score that a policy for any team is asked for."""
 
@@ -36,7 +38,7 @@ def main() -> None:
     """Train what is missing, measure, and fill the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=Path, default=Path("runs/specialists"))
-    parser.add_argument("--budget", default="paper")
+    parser.add_argument("--env-steps", type=int, default=ENV_STEPS, help="of each training")
     parser.add_argument("--episodes", type=int, default=500)
     parser.add_argument("--at-once", type=int, default=2, help="trainings side by side")
     given = parser.parse_args()
@@ -54,7 +56,7 @@ def main() -> None:
             for run, team in zip(of_one, teams, strict=True)
         ),
     ]
-    trained_side_by_side(jobs, given.budget, given.at_once)
+    trained_side_by_side(jobs, given.env_steps, given.at_once)
 
     each = [scores([run] * len(teams), given.episodes) for run in of_any]
     any_team = [mean(of_team) for of_team in zip(*each, strict=True)]
@@ -70,7 +72,7 @@ def main() -> None:
         f"{enough(any_team, specialist)} of {len(teams)} teams: any team has at least {ENOUGH} of "
         f"the specialist's score; `zoo:any`: {enough(of_zoo, specialist)}. {machine('torch')}. "
         f"One specialist a team, seeds {SEEDS[0]} to {SEEDS[-1]} of any team, "
-        f"{given.episodes} episodes of {EPISODE_STEPS} steps each."
+        f"{given.env_steps:,} env-steps, {given.episodes} episodes of {EPISODE_STEPS} steps each."
     )
     publish("specialists", f"{table(HEAD, rows)}\n\n{told}", PAGE)
 
@@ -83,25 +85,27 @@ def write_scenario(run: Path, scenario: Scenario) -> Path:
 
 
 def trained_side_by_side(
-    jobs: Sequence[tuple[Path, Sequence[str]]], budget: str, at_once: int
+    jobs: Sequence[tuple[Path, Sequence[str]]], env_steps: int, at_once: int
 ) -> None:
     """Train policies by rewards alone, each on one core, unless they are there already.
 
     Args:
         jobs: run folders, and words of the command that say what is trained there.
-        budget: how long.
+        env_steps: how long.
         at_once: how many side by side.
     """
     with ThreadPoolExecutor(at_once) as pool:
-        list(pool.map(lambda job: _train(job[0], budget, job[1]), jobs))
+        list(pool.map(lambda job: _train(job[0], env_steps, job[1]), jobs))
 
 
-def _train(run: Path, budget: str, words: Sequence[str]) -> None:
+def _train(run: Path, env_steps: int, words: Sequence[str]) -> None:
     if (run / "evaluation" / "summary.json").exists():
         return
     options = {
         "--method": "team-inner",
-        "--budget": budget,
+        "--budget": "paper",
+        "--train.env-steps": str(env_steps),
+        "--train.workers": "1",
         "--train.threads": "1",
         "--evaluate.score-episodes": "50",
         "--evaluate.long-episodes": "10",
