@@ -91,7 +91,8 @@ def main() -> None:
         rows.append([f"{len(team.robots)} robots", *cells, f"{shares[-1]:.2f}"])
     text = (
         f"Rescues in the {HALF} steps after a robot left. {machine('torch')}. One specialist a "
-        f"team, {given.env_steps:,} env-steps, {given.episodes} episodes, the same worlds for all; ± is half the 95 % interval."
+        f"team, {given.env_steps:,} env-steps, {given.episodes} episodes, the same worlds "
+        "for all; ± is half the 95 % interval."
     )
     publish("after_leaving", f"{table(HEAD, rows)}\n\n{text}", PAGE)
 

@@ -79,6 +79,7 @@ def main() -> None:
 
 def write_scenario(run: Path, scenario: Scenario) -> Path:
     """Write the worlds of a run beside its folder; where they are."""
+    run.parent.mkdir(parents=True, exist_ok=True)
     file = run.with_suffix(".toml")
     write_whole(file, tomli_w.dumps(scenario.model_dump(mode="json", exclude_none=True)).encode())
     return file
