@@ -8,7 +8,6 @@ trained by rewards alone in worlds of those that stay, or the script `hungarian`
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from page import machine, publish, table
-from specialists import ENV_STEPS, trained_side_by_side, write_scenario
+from specialists import options, trained_side_by_side, write_scenario
 
 from innerattn.config import Scenario
 from innerattn.config.family import Family
@@ -62,12 +61,7 @@ class TakingOver:
 
 def main() -> None:
     """Train what is missing, measure, and fill the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=Path, default=Path("runs/specialists"))
-    parser.add_argument("--env-steps", type=int, default=ENV_STEPS, help="of each training")
-    parser.add_argument("--episodes", type=int, default=1000)
-    parser.add_argument("--at-once", type=int, default=2, help="trainings side by side")
-    given = parser.parse_args()
+    given = options(__doc__)
 
     teams = list(losing_teams(TEAMS))
     runs = [given.runs / f"left-{number}" for number in range(len(teams))]

@@ -7,14 +7,13 @@ the policies. Runs that are done are kept in the folder given by --runs.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 from statistics import mean
 
 import tomli_w
 from page import machine, publish, table
-from specialists import ENV_STEPS, SEEDS, trained_side_by_side
+from specialists import SEEDS, options, trained_side_by_side
 
 from innerattn.config import Scenario
 from innerattn.config.family import Family
@@ -32,12 +31,7 @@ _FIRST = 500
 
 def main() -> None:
     """Train what is missing, measure, and fill the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=Path, default=Path("runs/specialists"))
-    parser.add_argument("--env-steps", type=int, default=ENV_STEPS, help="of each training")
-    parser.add_argument("--episodes", type=int, default=500)
-    parser.add_argument("--at-once", type=int, default=2, help="trainings side by side")
-    given = parser.parse_args()
+    given = options(__doc__)
     given.runs.mkdir(parents=True, exist_ok=True)
 
     family = given.runs / "small-teams.toml"

@@ -36,13 +36,7 @@ ENOUGH = 0.97
 
 def main() -> None:
     """Train what is missing, measure, and fill the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=Path, default=Path("runs/specialists"))
-    parser.add_argument("--env-steps", type=int, default=ENV_STEPS, help="of each training")
-    parser.add_argument("--episodes", type=int, default=500)
-    parser.add_argument("--at-once", type=int, default=2, help="trainings side by side")
-    given = parser.parse_args()
-
+    given = options(__doc__)
     teams = unseen_teams()
     of_any = [given.runs / f"any-s{seed}" for seed in SEEDS]
     of_one = [given.runs / f"team-{number:02}" for number in range(len(teams))]
@@ -75,6 +69,16 @@ def main() -> None:
         f"{given.env_steps:,} env-steps, {given.episodes} episodes of {EPISODE_STEPS} steps each."
     )
     publish("specialists", f"{table(HEAD, rows)}\n\n{told}", PAGE)
+
+
+def options(told: str | None) -> argparse.Namespace:
+    """What was given to a benchmark of trainings: runs, env_steps, episodes, at_once."""
+    parser = argparse.ArgumentParser(description=told)
+    parser.add_argument("--runs", type=Path, default=Path("runs/specialists"))
+    parser.add_argument("--env-steps", type=int, default=ENV_STEPS, help="of each training")
+    parser.add_argument("--episodes", type=int, default=500)
+    parser.add_argument("--at-once", type=int, default=2, help="trainings side by side")
+    return parser.parse_args()
 
 
 def write_scenario(run: Path, scenario: Scenario) -> Path:
