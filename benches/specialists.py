@@ -12,7 +12,9 @@ import argparse
 import subprocess
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from itertools import repeat
+from multiprocessing import get_context
 from pathlib import Path
 from statistics import mean
 
@@ -52,10 +54,10 @@ def main() -> None:
     ]
     trained_side_by_side(jobs, given.env_steps, given.at_once)
 
-    each = [scores([run] * len(teams), given.episodes) for run in of_any]
+    played = [*([run] * len(teams) for run in of_any), of_one, ["zoo:any"] * len(teams)]
+    with ProcessPoolExecutor(given.at_once, get_context("spawn")) as pool:
+        *each, specialist, of_zoo = pool.map(scores, played, repeat(given.episodes))
     any_team = [mean(of_team) for of_team in zip(*each, strict=True)]
-    specialist = scores(of_one, given.episodes)
-    of_zoo = scores(["zoo:any"] * len(teams), given.episodes)
     rows = []
     for team, *found in zip(teams, specialist, any_team, of_zoo, strict=True):
         size = str(len(team.scenario.robots))
@@ -77,7 +79,7 @@ def options(told: str | None) -> argparse.Namespace:
     parser.add_argument("--runs", type=Path, default=Path("runs/specialists"))
     parser.add_argument("--env-steps", type=int, default=ENV_STEPS, help="of each training")
     parser.add_argument("--episodes", type=int, default=500)
-    parser.add_argument("--at-once", type=int, default=2, help="trainings side by side")
+    parser.add_argument("--at-once", type=int, default=2, help="processes side by side")
     return parser.parse_args()
 
 
